@@ -1,0 +1,1 @@
+"""robocov: multi-robot coverage control among unknown obstacles."""

@@ -1,0 +1,181 @@
+"""The environment: outer boundary, obstacles, named starts, and the geometry derived from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Polygon
+
+from robocov.errors import StartError, unknown_name
+from robocov.region import Region
+from robocov.starts import Start, StartSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from shapely.geometry.base import BaseGeometry
+
+Point: TypeAlias = tuple[float, float]
+Ring: TypeAlias = tuple[Point, ...]
+
+GRID = 1e-6
+"""Derived geometry is computed on a grid of one micrometre, so that unions and differences are
+robust: what touches to within rounding touches exactly, and no sliver survives."""
+
+SAGITTA = 1e-3
+"""Largest distance in metres between a circle and the polygon that stands for it."""
+
+
+@dataclass(frozen=True)
+class PolygonObstacle:
+    """A solid polygon, with holes where given (a courtyard)."""
+
+    vertices: Ring
+    holes: tuple[Ring, ...] = ()
+    name: str | None = None
+
+    @cached_property
+    def polygon(self) -> Polygon:
+        """The obstacle as a shapely polygon."""
+        return Polygon(self.vertices, self.holes)
+
+
+@dataclass(frozen=True)
+class CircleObstacle:
+    """A round pillar: the inscribed regular polygon of at most `SAGITTA` for physics and cost alike."""
+
+    center: Point
+    radius: float
+    name: str | None = None
+
+    @cached_property
+    def polygon(self) -> Polygon:
+        """The obstacle as a shapely polygon."""
+        sides = 12
+        if self.radius > SAGITTA:
+            sides = max(sides, math.ceil(math.pi / math.acos(1.0 - SAGITTA / self.radius)))
+        angle = np.arange(sides) * (2.0 * np.pi / sides)
+        ring = np.column_stack([np.cos(angle), np.sin(angle)]) * self.radius + self.center
+        return Polygon(ring)
+
+
+@dataclass(frozen=True)
+class WallObstacle:
+    """A poly-line of some width, with flat ends at its first and last point and mitred corners."""
+
+    points: Ring
+    width: float
+    name: str | None = None
+
+    @cached_property
+    def polygon(self) -> BaseGeometry:
+        """The obstacle as a shapely polygon (or polygons, where the line doubles back)."""
+        line = LineString(self.points)
+        return line.buffer(self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=4.0)
+
+
+Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A map: what is there, and where a team may start. Immutable; equal when the content is equal.
+
+    Only the physics, the sensor and the evaluation know the obstacles. A controller gets
+    `region`, the convex hull of the boundary, and what its robots sense.
+
+    Attributes
+    ----------
+    name, description : str
+    boundary : ring of [x, y], m
+        The outer boundary as it was given: either way round, convex or not.
+    obstacles : tuple of obstacles
+        They may overlap, touch and stick out of the boundary.
+    starts : dict of name to start
+        The first is the default.
+    extra : dict
+        Free keys of the file, kept untouched.
+    schema : str or None
+        The file's ``$schema``, kept untouched.
+    """
+
+    name: str
+    boundary: Ring
+    obstacles: tuple[Obstacle, ...] = ()
+    starts: Mapping[str, StartSpec] = field(default_factory=dict)
+    description: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+    schema: str | None = None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.boundary, self.obstacles))
+
+    @cached_property
+    def region(self) -> Region:
+        """The convex hull of the boundary: all that the robots know of the map."""
+        return Region(np.asarray(self.boundary, dtype=float))
+
+    @cached_property
+    def boundary_polygon(self) -> Polygon:
+        """The boundary as a counter-clockwise shapely polygon."""
+        return shapely.orient_polygons(Polygon(self.boundary))
+
+    @cached_property
+    def free(self) -> MultiPolygon:
+        """The free space: inside the boundary, outside every obstacle; one polygon a component.
+
+        Components are ordered by area, the largest first.
+        """
+        inside = shapely.set_precision(self.boundary_polygon, GRID)
+        if self.obstacles:
+            solid = shapely.union_all([shape.polygon for shape in self.obstacles], grid_size=GRID)
+            inside = shapely.difference(inside, solid, grid_size=GRID)
+        return _polygons(inside)
+
+    @cached_property
+    def blocked(self) -> MultiPolygon:
+        """What is not free of the region: obstacles, and the region outside a non-convex boundary."""
+        region = shapely.set_precision(self.region.polygon, GRID)
+        return _polygons(shapely.difference(region, self.free, grid_size=GRID))
+
+    @property
+    def area(self) -> float:
+        """Area inside the boundary, m²."""
+        return float(self.boundary_polygon.area)
+
+    @property
+    def free_area(self) -> float:
+        """Area of the free space, m²."""
+        return float(self.free.area)
+
+    def start(self, name: str | None = None) -> Start:
+        """Return the start called `name`, by default the map's first.
+
+        Raises
+        ------
+        StartError
+            When there is none of that name; the message names the nearest.
+        """
+        if name is None:
+            if not self.starts:
+                raise StartError(f"map {self.name!r} has no starts; positions or a start in the map was wanted")
+            name = next(iter(self.starts))
+        if name not in self.starts:
+            raise StartError(f"map {self.name!r}: {unknown_name('start', name, self.starts)}")
+        return Start(name, self.starts[name], self.free)
+
+    def _repr_svg_(self) -> str:
+        """Show the free space in notebooks."""
+        return str(self.free._repr_svg_())
+
+
+def _polygons(geometry: BaseGeometry) -> MultiPolygon:
+    """Return the polygons of `geometry`, counter-clockwise, the largest first; lines and points go."""
+    parts = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon) and part.area > 0.0]
+    parts.sort(key=lambda part: (-part.area, part.bounds))
+    return MultiPolygon([shapely.orient_polygons(part) for part in parts])

@@ -1,0 +1,66 @@
+"""The errors that robocov raises on purpose.
+
+    RobocovError
+    ├── InputError            what a user gave cannot be used (exit status 2)
+    │   ├── MapError          a map file, with the JSON path of the place
+    │   ├── StartError        a start without room for the team
+    │   └── ParameterError    a gain, a limit, a name of a controller
+    └── OutputError           a result cannot be written (exit status 2)
+
+Every message is one line and names the source (file or argument), the place in it,
+the value found there and what was wanted.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class RobocovError(Exception):
+    """Base class of every error that robocov raises on purpose."""
+
+
+class InputError(RobocovError):
+    """Something that the user gave cannot be used."""
+
+
+class MapError(InputError):
+    """A map cannot be used; the message names the file, the JSON path, the value and what was wanted."""
+
+
+class StartError(InputError):
+    """A start has no room for the team, or lies inside an obstacle."""
+
+
+class ParameterError(InputError):
+    """A gain, a limit of the team, or a name is out of range or unknown."""
+
+
+class OutputError(RobocovError):
+    """A result cannot be written: no permission, no space, a folder that is in use."""
+
+
+def shown(value: object, limit: int = 60) -> str:
+    """Return `value` as it is quoted in messages: its repr, cut to `limit` characters.
+
+    >>> shown("x" * 100, limit=12)
+    "'xxxxxxxx..."
+    """
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for a name that is not among `known`, with the nearest one.
+
+    >>> unknown_name("controller", "rapff", ["lloyd", "rapf", "rpf"])
+    "unknown controller 'rapff': did you mean 'rapf'? (known: lloyd, rapf, rpf)"
+    """
+    names = sorted(known)
+    near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
+    hint = f": did you mean {near[0]!r}?" if near else ":"
+    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(names)})"

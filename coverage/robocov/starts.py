@@ -1,0 +1,185 @@
+"""Named starts: where a team may begin, and how its positions are drawn.
+
+The draw depends on the start, the number of robots, the radius and the seed only, so that
+every controller gets the same positions for the same seed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array
+from robocov.errors import StartError
+from robocov.robots import DEFAULT_RADIUS
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+GAP = 0.02
+"""Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""
+
+_DARTS_PER_ROBOT = 200
+
+
+@dataclass(frozen=True)
+class DiscStart:
+    """The robots start somewhere in a disc: a team that was unloaded in one place."""
+
+    center: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class UniformStart:
+    """The robots start anywhere in the free space."""
+
+
+@dataclass(frozen=True)
+class PointsStart:
+    """The robots start at given positions; at most as many robots as there are positions."""
+
+    positions: tuple[tuple[float, float], ...]
+
+
+StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A named start of one environment, ready to draw positions from.
+
+    Attributes
+    ----------
+    name : str
+    spec : StartSpec
+    free : shapely geometry
+        The free space of the environment.
+    """
+
+    name: str
+    spec: StartSpec
+    free: BaseGeometry
+
+    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
+        """Draw positions of the centres of `n` discs that touch neither walls nor each other.
+
+        Parameters
+        ----------
+        n : int
+        seed : int
+            The same seed gives the same positions. It is not used where positions are given.
+        radius : float, m
+            Radius of a robot.
+
+        Returns
+        -------
+        (n, 2) m
+
+        Raises
+        ------
+        StartError
+            When the robots do not fit.
+        """
+        spacing = 2.0 * radius * (1.0 + GAP)
+        room = self._room(radius * (1.0 + GAP))
+        where = f"start {self.name!r}"
+        if isinstance(self.spec, PointsStart):
+            return self._given(n, radius, self.spec)
+        if room.is_empty:
+            raise StartError(f"{where}: no room for a robot of radius {radius:g} m; a wider start was wanted")
+        rng = np.random.default_rng([seed, n])
+        points = _darts(rng, room, n, spacing)
+        if len(points) < n:
+            points = _hexagonal(rng, room, n, spacing)
+        if len(points) < n:
+            raise StartError(
+                f"{where}: room for {len(points)} robots of radius {radius:g} m, but {n} were asked for; "
+                f"fewer robots or a wider start was wanted"
+            )
+        return points
+
+    def _room(self, clearance: float) -> BaseGeometry:
+        """Return where a robot's centre may be."""
+        room = self.free.buffer(-clearance)
+        if isinstance(self.spec, DiscStart):
+            # the disc holds the centres; robots may stick out of it by their radius
+            room = room.intersection(shapely.Point(self.spec.center).buffer(self.spec.radius, quad_segs=64))
+        return room
+
+    def _given(self, n: int, radius: float, spec: PointsStart) -> Array:
+        where = f"start {self.name!r}"
+        if n > len(spec.positions):
+            raise StartError(
+                f"{where}: has {len(spec.positions)} positions, but {n} robots were asked for; "
+                f"at most {len(spec.positions)} robots or another start was wanted"
+            )
+        points = np.array(spec.positions[:n], dtype=float)
+        distance = shapely.distance(shapely.points(points), self.free.boundary)
+        inside = shapely.contains_properly(self.free, shapely.points(points))
+        for k in range(n):
+            place = f"{where}: positions[{k}] = [{points[k, 0]:g}, {points[k, 1]:g}]"
+            if not inside[k]:
+                raise StartError(f"{place} is inside an obstacle or outside the boundary")
+            if distance[k] < radius:
+                raise StartError(
+                    f"{place} is {distance[k]:.3g} m from a wall, but a robot of radius {radius:g} m must fit"
+                )
+        gaps = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+        gaps[np.arange(n), np.arange(n)] = np.inf
+        if n > 1 and gaps.min() < 2 * radius:
+            i, j = np.unravel_index(int(gaps.argmin()), gaps.shape)
+            raise StartError(
+                f"{where}: positions[{min(i, j)}] and positions[{max(i, j)}] are {gaps.min():.3g} m apart, "
+                f"but at least {2 * radius:g} m, a robot's diameter, was wanted"
+            )
+        return points
+
+
+def _darts(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:
+    """Throw darts at `room`, keep those at least `spacing` apart; (up to n, 2)."""
+    low_x, low_y, high_x, high_y = room.bounds
+    kept = np.empty((n, 2))
+    count = 0
+    shapely.prepare(room)
+    for _ in range(_DARTS_PER_ROBOT):
+        darts = rng.uniform((low_x, low_y), (high_x, high_y), size=(max(64, 4 * n), 2))
+        darts = darts[shapely.contains_xy(room, darts[:, 0], darts[:, 1])]
+        for dart in darts:
+            if count and (np.hypot(*(kept[:count] - dart).T) < spacing).any():
+                continue
+            kept[count] = dart
+            count += 1
+            if count == n:
+                return kept
+    return kept[:count]
+
+
+def _hexagonal(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:
+    """Return up to n points of the best of some randomly laid hexagonal lattices.
+
+    Darts fill a plane only to about 55 %; the lattice reaches 91 %.
+    """
+    low_x, low_y, high_x, high_y = room.bounds
+    reach = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
+    steps = int(np.ceil(reach / (spacing * np.sqrt(3) / 2))) + 1
+    if steps > 2000:
+        return np.empty((0, 2))
+    a, b = np.meshgrid(np.arange(-steps, steps + 1), np.arange(-steps, steps + 1))
+    lattice = np.column_stack([(a + 0.5 * (b % 2)).ravel(), (b * np.sqrt(3) / 2).ravel()]) * spacing
+    middle = np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
+    best = np.empty((0, 2))
+    shapely.prepare(room)
+    for _ in range(20):
+        angle = rng.uniform(0, np.pi / 3)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        points = lattice @ turn.T + middle + rng.uniform(-spacing, spacing, size=2)
+        points = points[shapely.contains_xy(room, points[:, 0], points[:, 1])]
+        if len(points) > len(best):
+            best = points
+        if len(best) >= n:
+            return best[np.sort(rng.choice(len(best), size=n, replace=False))]
+    return best
