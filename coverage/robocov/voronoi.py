@@ -1,28 +1,113 @@
-"""Bounded Voronoi partition."""
+"""The bounded Voronoi partition of all robots at once: equation (1) and what equation (2) needs of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
-from robocov.arrays import Array
+import numpy as np
+
+from robocov.arrays import Array, IntArray, frozen
+from robocov.cell_edges import CellEdges
+from robocov.clipped_cells import clip_cells, edges_of, mass_and_centroid
+from robocov.errors import InputError, shown
 from robocov.observation import Neighbours
 from robocov.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 @dataclass(frozen=True, eq=False)
 class VoronoiPartition:
-    """Placeholder."""
+    """The cells V_i of equation (1) within a convex region, with density 1.
+
+    Mass and centroid are there at once; everything else is computed when it is first asked for.
+
+    Attributes
+    ----------
+    generators : (n, 2) m
+    mass : (n,) m²
+        M of equation (2) with density 1: the areas of the cells.
+    centroid : (n, 2) m
+        C of equation (2). An empty cell's is its generator.
+    """
 
     generators: Array
     mass: Array
     centroid: Array
+    _find_edges: Callable[[], CellEdges]
 
-    @property
+    @cached_property
+    def edges(self) -> CellEdges:
+        """The edges of all cells, with what lies beyond them."""
+        return self._find_edges()
+
+    @cached_property
     def polygons(self) -> list[Array]:
-        """The cells, (k, 2) m each, counter-clockwise."""
-        return []
+        """The cells, (k, 2) m each, counter-clockwise; (0, 2) where a cell is empty."""
+        return self.edges.polygons(self.generators)
+
+    @cached_property
+    def adjacency(self) -> IntArray:
+        """The pairs (i, j), i < j, of cells that share an edge, (m, 2), ascending.
+
+        Where communication is limited, cells overlap: i and j are then a pair when the bisector
+        between them is an edge of either.
+        """
+        return self.edges.adjacency()
+
+    @cached_property
+    def polar_moment(self) -> Array:
+        """J_{V,p} of equation (2), (n,) m⁴: the polar moments of the cells about their generators."""
+        return self.edges.polar_moment(len(self.generators))
+
+    @cached_property
+    def polar_moment_about_centroid(self) -> Array:
+        """J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
+        lever = self.generators - self.centroid
+        return self.polar_moment - self.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
 def partition(generators: Array, region: Region, neighbours: Neighbours | None = None) -> VoronoiPartition:
-    """Placeholder."""
-    raise RuntimeError
+    """Return the Voronoi cells of `generators` within `region`; obstacles play no part.
+
+    Parameters
+    ----------
+    generators : (n, 2) m
+        They may lie on the region's boundary or outside. Those at the very same place do not cut
+        each other: they get the same cell.
+    region : Region
+    neighbours : Neighbours or None
+        Who hears whom. Cell i is cut only by the bisectors to the robots that i hears, and depends,
+        to the last bit, on nothing else. None: everybody hears everybody.
+
+    Raises
+    ------
+    InputError
+        When the generators are not (n, 2) finite numbers.
+
+    Examples
+    --------
+    >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
+    >>> halves = partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
+    >>> halves.mass
+    array([2., 2.])
+    >>> halves.adjacency
+    array([[0, 1]])
+    """
+    points = np.array(generators, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InputError(f"generators: an array of shape {points.shape}, but (n, 2) was wanted")
+    if not np.isfinite(points).all():
+        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
+    points.setflags(write=False)
+    return _clipped(points, region, neighbours if neighbours is not None else Neighbours(len(points)))
+
+
+def _clipped(points: Array, region: Region, neighbours: Neighbours) -> VoronoiPartition:
+    cells = clip_cells(points, region, neighbours)
+    mass, centroid = mass_and_centroid(cells, points)
+    return VoronoiPartition(points, frozen(mass), frozen(centroid), partial(edges_of, cells))

@@ -1,0 +1,60 @@
+"""The edges of Voronoi cells, and what follows from them alone: polygons, moments, who borders whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+
+REGION = -1
+"""What lies beyond an edge of a cell that is a piece of the region's boundary."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellEdges:
+    """All edges of all cells, each cell's in one run and counter-clockwise round the cell.
+
+    Attributes
+    ----------
+    start, end : (s, 2) m
+        Ends of the edges **relative to the generator** of their cell, so that a tiny cell far from
+        the origin keeps all its digits.
+    cell : (s,)
+        Whose edge it is, ascending.
+    beyond : (s,)
+        The robot on the other side, or `REGION`.
+    """
+
+    start: Array
+    end: Array
+    cell: IntArray
+    beyond: IntArray
+
+    def polygons(self, generators: Array) -> list[Array]:
+        """Return one counter-clockwise ring a cell, (k, 2) m, the first vertex not repeated.
+
+        Edges of no length are left out; an empty cell is a (0, 2) array.
+        """
+        vertices = self.start + generators[self.cell]
+        long = (self.start != self.end).any(axis=1)
+        last = np.cumsum(np.bincount(self.cell[long], minlength=len(generators)))
+        vertices, stops = vertices[long], last.tolist()
+        return [vertices[start:stop] for start, stop in zip([0, *stops[:-1]], stops, strict=True)]
+
+    def polar_moment(self, count: int) -> Array:
+        """Return J_{V,p}, the polar moment of each of `count` cells about its generator, (n,) m⁴.
+
+        The second moment of equation (2): each edge adds the triangle that it spans with the generator.
+        """
+        (x, y), (u, v) = self.start.T, self.end.T
+        square = x * (x + u) + u * u + y * (y + v) + v * v
+        weights = (x * v - u * y) * square / 12.0
+        return np.bincount(self.cell, weights, minlength=count).astype(np.float64, copy=False)
+
+    def adjacency(self) -> IntArray:
+        """Return the pairs (i, j), i < j, of cells with an edge between them, (m, 2), ascending."""
+        between = (self.beyond != REGION) & (self.start != self.end).any(axis=1)
+        pairs = np.column_stack([self.cell[between], self.beyond[between]])
+        return np.unique(np.sort(pairs, axis=1), axis=0).astype(np.intp, copy=False).reshape(-1, 2)
