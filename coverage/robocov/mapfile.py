@@ -1,0 +1,285 @@
+"""Map files: the map JSON, version 1, to and from `Environment`; the bundled maps."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
+from robocov.errors import MapError, OutputError, unknown_name
+from robocov.mapmodels import (
+    FORMAT,
+    VERSION,
+    CircleModel,
+    DiscModel,
+    ObstacleModel,
+    PointsModel,
+    PolygonModel,
+    StartModel,
+    map_schema,
+    validate,
+)
+from robocov.maprules import check_rules
+from robocov.starts import DiscStart, PointsStart, StartSpec, UniformStart
+from robocov.strictjson import one_line, parse, read_bytes, require_json
+
+__all__ = [
+    "bundled_maps",
+    "dump_map",
+    "from_json",
+    "load_map",
+    "map_schema",
+    "parse_map",
+    "save_map",
+    "to_json",
+]
+
+_LINE = 100
+"""Objects that fit in so many characters stand on one line of a dumped map."""
+
+
+def load_map(source: str | Path) -> Environment:
+    """Return the map in a file, or the bundled map of that name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A path to a map JSON, or the name of a bundled map: a str without suffix and separator.
+
+    Raises
+    ------
+    MapError
+        One line: the file, the JSON path, the value and what was wanted; for an unknown
+        name the nearest one.
+
+    Examples
+    --------
+    >>> load_map("square").area
+    100.0
+    """
+    if isinstance(source, str) and _is_name(source):
+        known = bundled_maps()
+        if source in known:
+            path = known[source]
+        elif Path(source).is_file():
+            path = Path(source)
+        else:
+            raise MapError(unknown_name("map", source, known))
+    else:
+        path = Path(source)
+    return parse_map(read_bytes(path), str(path))
+
+
+def parse_map(text: str | bytes, where: str) -> Environment:
+    """Return the map in the JSON `text`; messages call it `where`.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    return _environment(parse(text, where), one_line(where))
+
+
+def from_json(document: dict[str, Any], where: str = "map") -> Environment:
+    """Return the map in a parsed JSON `document`; messages call it `where`.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    where = one_line(where)
+    require_json(document, where)
+    return _environment(document, where)
+
+
+def to_json(environment: Environment) -> dict[str, Any]:
+    """Return `environment` as a JSON document that `from_json` turns into an equal one.
+
+    Whole numbers are int, so that the text is short.
+    """
+    document: dict[str, Any] = {} if environment.schema is None else {"$schema": environment.schema}
+    document |= {"format": FORMAT, "version": VERSION, "name": environment.name}
+    if environment.description:
+        document["description"] = environment.description
+    document["boundary"] = _points(environment.boundary)
+    document["obstacles"] = [_obstacle_document(obstacle) for obstacle in environment.obstacles]
+    document["starts"] = {name: _start_document(spec) for name, spec in environment.starts.items()}
+    if environment.extra:
+        document["extra"] = dict(environment.extra)
+    return document
+
+
+def dump_map(environment: Environment) -> str:
+    """Return the text of a map file: keys in a fixed order, one list of vertices on a line."""
+    document = to_json(environment)
+    lines = []
+    for key, value in document.items():
+        if key in ("obstacles", "starts"):
+            text = _expanded(value, "  ")
+        else:
+            text = _text(value, "  ", len(key) + 6)
+        lines.append(f"  {_compact(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def save_map(environment: Environment, path: str | Path) -> None:
+    """Write `environment` to `path`, whole or not at all.
+
+    Raises
+    ------
+    MapError
+        When the map breaks a rule, so that it could not be loaded again.
+    OutputError
+        When the file cannot be written; a file that was there before is then untouched.
+    """
+    target = Path(path)
+    from_json(to_json(environment), str(path))
+    text = dump_map(environment).encode()
+    try:
+        # through a link, the file that it points to is replaced, not the link
+        target = target.resolve()
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+        try:
+            with temporary.open("wb") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"{one_line(path)}: cannot be written: {one_line(reason)}") from None
+
+
+def bundled_maps() -> dict[str, Path]:
+    """Return the files of the bundled maps by name, sorted.
+
+    An installed package holds them; in a checkout they are in the folder ``maps``.
+    """
+    here = Path(__file__).resolve()
+    for folder in (here.parent / "maps", here.parents[2] / "maps"):
+        files = sorted(folder.glob("*.json"))
+        if files:
+            return {file.stem: file for file in files}
+    return {}
+
+
+def _is_name(source: str) -> bool:
+    return not any(char in source for char in "./\\\0")
+
+
+def _environment(document: object, where: str) -> Environment:
+    model = validate(document, where)
+    environment = Environment(
+        name=model.name,
+        boundary=_ring(model.boundary),
+        obstacles=tuple(_obstacle(item) for item in model.obstacles),
+        starts={name: _start(item) for name, item in model.starts.items()},
+        description=model.description,
+        extra=_plain(model.extra),
+        schema=model.schema_,
+    )
+    check_rules(environment, where)
+    return environment
+
+
+def _ring(vertices: list[list[float]]) -> Ring:
+    return tuple((x, y) for x, y in vertices)
+
+
+def _obstacle(model: ObstacleModel) -> Obstacle:
+    if isinstance(model, PolygonModel):
+        return PolygonObstacle(_ring(model.vertices), tuple(_ring(hole) for hole in model.holes), model.name)
+    if isinstance(model, CircleModel):
+        return CircleObstacle((model.center[0], model.center[1]), model.radius, model.name)
+    return WallObstacle(_ring(model.points), model.width, model.name)
+
+
+def _start(model: StartModel) -> StartSpec:
+    if isinstance(model, DiscModel):
+        return DiscStart((model.center[0], model.center[1]), model.radius)
+    if isinstance(model, PointsModel):
+        return PointsStart(_ring(model.positions))
+    return UniformStart()
+
+
+def _plain(value: Any) -> Any:
+    """Return a copy of a JSON value made of plain dict and list."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _number(value: float) -> int | float:
+    return int(value) if float(value).is_integer() else float(value)
+
+
+def _points(points: Ring) -> list[list[int | float]]:
+    return [[_number(x), _number(y)] for x, y in points]
+
+
+def _obstacle_document(obstacle: Obstacle) -> dict[str, Any]:
+    document: dict[str, Any]
+    if isinstance(obstacle, PolygonObstacle):
+        document = {"kind": "polygon", "vertices": _points(obstacle.vertices)}
+        if obstacle.holes:
+            document["holes"] = [_points(hole) for hole in obstacle.holes]
+    elif isinstance(obstacle, CircleObstacle):
+        (center,) = _points((obstacle.center,))
+        document = {"kind": "circle", "center": center, "radius": _number(obstacle.radius)}
+    else:
+        document = {"kind": "wall", "points": _points(obstacle.points), "width": _number(obstacle.width)}
+    if obstacle.name is not None:
+        document = {"kind": document.pop("kind"), "name": obstacle.name, **document}
+    return document
+
+
+def _start_document(spec: StartSpec) -> dict[str, Any]:
+    if isinstance(spec, DiscStart):
+        (center,) = _points((spec.center,))
+        return {"kind": "disc", "center": center, "radius": _number(spec.radius)}
+    if isinstance(spec, PointsStart):
+        return {"kind": "points", "positions": _points(spec.positions)}
+    return {"kind": "uniform"}
+
+
+def _compact(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _is_ring(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
+
+
+def _text(value: object, indent: str, used: int) -> str:
+    """Return `value` on one line where it fits or is a list of points, else one item on a line."""
+    line = _compact(value)
+    if used + len(line) <= _LINE or not isinstance(value, (dict, list)):
+        return line
+    if isinstance(value, list) and all(isinstance(item, list) and not _is_ring(item) for item in value):
+        return line
+    return _expanded(value, indent)
+
+
+def _expanded(value: dict[str, Any] | list[Any], indent: str) -> str:
+    """Return a list or an object with one item on a line."""
+    inner = indent + "  "
+    if not value:
+        return _compact(value)
+    if isinstance(value, dict):
+        items = []
+        for key, item in value.items():
+            head = f"{_compact(key)}: "
+            items.append(head + _text(item, inner, len(inner) + len(head)))
+        left, right = "{", "}"
+    else:
+        items = [_text(item, inner, len(inner)) for item in value]
+        left, right = "[", "]"
+    return left + "\n" + ",\n".join(inner + item for item in items) + f"\n{indent}{right}"

@@ -1,0 +1,232 @@
+"""The map JSON, version 1, as pydantic models: its structure, its JSON Schema, its structural errors."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from robocov.errors import MapError, unknown_name
+from robocov.strictjson import place, shown_json
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+FORMAT = "robocov-map"
+VERSION = 1
+SMALLEST = 1e-3
+"""Smallest size of anything in metres."""
+LARGEST = 1e4
+"""Largest size of anything in metres."""
+FARTHEST = 1e7
+"""Largest coordinate in metres: national grids fit, and a micrometre still counts."""
+
+_NAME = r"^[^\x00-\x1f\x7f]+$"
+
+Coordinate: TypeAlias = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST, description="metres")
+]
+Size: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+Vertex: TypeAlias = Annotated[list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]])]
+VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3)]
+Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=100, pattern=_NAME)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", populate_by_name=False)
+
+
+class PolygonModel(_Model):
+    """A solid polygon, with holes where given."""
+
+    kind: Literal["polygon"]
+    name: Label | None = Field(None, description="What it is, for people", examples=["desk"])
+    vertices: VertexRing = Field(
+        description="Corners in order, either way round, the first not repeated",
+        examples=[[[1, 1], [2, 1], [2, 3]]],
+    )
+    holes: list[VertexRing] = Field([], description="Rings inside that are free, such as courtyards")
+
+
+class CircleModel(_Model):
+    """A round pillar."""
+
+    kind: Literal["circle"]
+    name: Label | None = Field(None, description="What it is, for people", examples=["pillar"])
+    center: Vertex = Field(description="Its centre [x, y] in metres")
+    radius: Size = Field(description="Its radius in metres", examples=[0.5])
+
+
+class WallModel(_Model):
+    """A poly-line of some width, with flat ends."""
+
+    kind: Literal["wall"]
+    name: Label | None = Field(None, description="What it is, for people", examples=["west wall"])
+    points: list[Vertex] = Field(
+        min_length=2, description="The middle line, from end to end", examples=[[[5, 0], [5, 2.4]]]
+    )
+    width: Size = Field(description="Its width in metres", examples=[0.1])
+
+
+class DiscModel(_Model):
+    """The robots start somewhere in a disc."""
+
+    kind: Literal["disc"]
+    center: Vertex = Field(description="The disc's centre [x, y] in metres")
+    radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
+
+
+class UniformModel(_Model):
+    """The robots start anywhere in the free space."""
+
+    kind: Literal["uniform"]
+
+
+class PointsModel(_Model):
+    """The robots start at given positions."""
+
+    kind: Literal["points"]
+    positions: list[Vertex] = Field(
+        min_length=1, description="One [x, y] a robot, in metres", examples=[[[1, 1], [1.5, 1]]]
+    )
+
+
+ObstacleModel: TypeAlias = Annotated[
+    PolygonModel | CircleModel | WallModel, Field(discriminator="kind", description="An obstacle")
+]
+StartModel: TypeAlias = Annotated[
+    DiscModel | UniformModel | PointsModel, Field(discriminator="kind", description="Where a team may start")
+]
+
+
+class MapModel(_Model):
+    """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
+
+    schema_: Annotated[str, Field(strict=True)] | None = Field(
+        None, alias="$schema", description="Where this schema is, for editors"
+    )
+    format: Literal["robocov-map"] = Field(description="Says what this file is")
+    version: Literal[1] = Field(description="Version of the format")
+    name: Label = Field(description="The map's name, for people", examples=["Two rooms"])
+    description: Annotated[str, Field(strict=True, max_length=10_000)] = Field(
+        "", description="A sentence about it"
+    )
+    boundary: VertexRing = Field(
+        description="The outer boundary, convex or not, either way round; the robots know its convex hull",
+        examples=[[[0, 0], [10, 0], [10, 6], [0, 6]]],
+    )
+    obstacles: list[ObstacleModel] = Field(
+        [], description="They may overlap, touch, and stick out of the boundary"
+    )
+    starts: dict[Label, StartModel] = Field(
+        {},
+        description="Named starts; the first is the default",
+        examples=[{"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}],
+    )
+    extra: dict[str, Any] = Field({}, description="Free keys of yours; kept untouched")
+
+
+def map_schema() -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of a map, with descriptions and examples for editors."""
+    schema = MapModel.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "robocov map"}
+
+
+def validate(document: object, where: str) -> MapModel:
+    """Return `document` as a model.
+
+    Raises
+    ------
+    MapError
+        One line with the first structural error, and how many more there are.
+    """
+    _check_header(document, where)
+    try:
+        return MapModel.model_validate(document)
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False)
+    # a misspelt key is also a missing one: naming the key that is there helps more
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
+    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
+    raise MapError(f"{where}: {_message(details[0], document)}{more}")
+
+
+def _check_header(document: object, where: str) -> None:
+    """Reject what is not a map, or is one of another version, before its content is looked at."""
+    if not isinstance(document, dict):
+        raise MapError(f"{where}: {shown_json(document)}, but a JSON object with a map was wanted")
+    found = document.get("format")
+    if found != FORMAT:
+        state = shown_json(found) if "format" in document else "missing"
+        raise MapError(f'{where}: format: {state}, but "{FORMAT}" was wanted')
+    version = document.get("version")
+    if type(version) is not int or version != VERSION:
+        state = shown_json(version) if "version" in document else "missing"
+        newer = type(version) is int and version > VERSION
+        advice = "; it needs a newer robocov" if newer else ""
+        raise MapError(f"{where}: version: {state}, but {VERSION} was wanted{advice}")
+
+
+_CHOICES: dict[str, dict[str, type[_Model]]] = {
+    "obstacles": {"polygon": PolygonModel, "circle": CircleModel, "wall": WallModel},
+    "starts": {"disc": DiscModel, "uniform": UniformModel, "points": PointsModel},
+}
+
+_POINT = "a point [x, y] in metres"
+_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
+_SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
+_RING = "a list of at least 3 points [x, y]"
+_LABEL = "a text of 1 to 100 characters on one line"
+_WANTED: dict[str, tuple[str, ...]] = {
+    # what is wanted at a key, in its items, in their items, ...
+    "boundary": (_RING, _POINT, _COORDINATE),
+    "vertices": (_RING, _POINT, _COORDINATE),
+    "holes": ("a list of rings", _RING, _POINT, _COORDINATE),
+    "points": ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
+    "positions": ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
+    "center": (_POINT, _COORDINATE),
+    "radius": (_SIZE,),
+    "width": (_SIZE,),
+    "name": (_LABEL,),
+    "description": ("a text of at most 10000 characters",),
+    "extra": ("an object",),
+    "$schema": ("a text",),
+    "obstacles": ("a list of obstacles",),
+    "starts": ("an object of named starts",),
+}
+
+
+def _message(detail: ErrorDetails, document: object) -> str:
+    """Return one structural error in the project's words: place, value, what was wanted."""
+    loc, value = list(detail["loc"]), detail["input"]
+    group = _CHOICES.get(str(loc[0]))
+    model: type[_Model] = MapModel
+    if group is not None and len(loc) > 2:
+        if loc[-1] == "[key]":
+            return f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
+        # pydantic names the chosen kind as a step of the path
+        model = group[str(loc.pop(2))]
+    elif group is not None and len(loc) == 2:
+        return _kind_message(place(loc), value, list(group))
+    if detail["type"] == "extra_forbidden":
+        *parent, key = loc
+        known = [field.alias or name for name, field in model.model_fields.items()]
+        at = f"{place(parent)}: " if parent else ""
+        return f"{at}{unknown_name('key', str(key), known)}"
+    found = "missing" if detail["type"] == "missing" else shown_json(value)
+    steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
+    wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
+    return f"{place(loc)}: {found}, but {wanted} was wanted"
+
+
+def _kind_message(at: str, value: object, kinds: list[str]) -> str:
+    """Return the message for an obstacle or a start whose kind is not known."""
+    wanted = f"one of {', '.join(kinds)}"
+    if not isinstance(value, dict):
+        return f"{at}: {shown_json(value)}, but an object whose kind is {wanted} was wanted"
+    if "kind" not in value:
+        return f"{at}.kind: missing, but {wanted} was wanted"
+    near = get_close_matches(str(value["kind"]).lower(), kinds, n=1, cutoff=0.5)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    return f"{at}.kind: {shown_json(value['kind'])}, but {wanted} was wanted{hint}"
