@@ -1,0 +1,141 @@
+"""The control laws, one file each, and how they are found by name.
+
+A controller is named in one of three ways: a built-in name (``rapf``), a name that an installed
+package offers in the entry-point group ``robocov.controllers``, or a class in a file
+(``mine.py:MyController``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robocov.controllers.base import Controller
+from robocov.controllers.gains import gain_values, gains_of, with_gains
+from robocov.controllers.individual import IndividualController, Individually, OwnView
+from robocov.controllers.lloyd import Lloyd
+from robocov.controllers.rapf import Rapf
+from robocov.controllers.rpf import Rpf
+from robocov.errors import ParameterError, shown, unknown_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = [
+    "CONTROLLERS",
+    "FLAGSHIP",
+    "Controller",
+    "IndividualController",
+    "Individually",
+    "Lloyd",
+    "OwnView",
+    "Rapf",
+    "Rpf",
+    "controller_kind",
+    "controller_kinds",
+    "gain_values",
+    "gains_of",
+    "make_controller",
+]
+
+CONTROLLERS: dict[str, type[Any]] = {kind.name: kind for kind in (Rapf, Rpf, Lloyd)}
+"""The built-in controllers by name."""
+
+FLAGSHIP = "rapf"
+"""The controller that the project recommends."""
+
+
+def controller_kinds() -> dict[str, type[Any]]:
+    """Return all controller classes by name: built in, then those that installed packages offer.
+
+    Raises
+    ------
+    ParameterError
+        When an installed package's controller cannot be loaded.
+    """
+    kinds = dict(CONTROLLERS)
+    for entry in entry_points(group="robocov.controllers"):
+        try:
+            kinds.setdefault(entry.name, entry.load())
+        except Exception as error:
+            raise ParameterError(
+                f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded: {error}"
+            ) from error
+    return kinds
+
+
+def controller_kind(name: str) -> type[Any]:
+    """Return the controller class called `name`, or the class of ``file.py:ClassName``.
+
+    Raises
+    ------
+    ParameterError
+        When there is none; the message gives the nearest name, or what is wrong with the file.
+    """
+    if ".py:" in name or name.endswith(".py"):
+        return _kind_in_file(name)
+    kinds = controller_kinds()
+    if name not in kinds:
+        raise ParameterError(unknown_name("controller", name, kinds))
+    return kinds[name]
+
+
+def make_controller(name: str, gains: Mapping[str, object] | None = None) -> Controller:
+    """Return the controller called `name` with the given gains, all others at their defaults.
+
+    >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
+    0.3
+
+    Raises
+    ------
+    ParameterError
+        On an unknown controller or gain (with the nearest name), or a gain out of range.
+    """
+    kind = controller_kind(name)
+    controller = with_gains(kind, gains or {})
+    if isinstance(controller, IndividualController) and not hasattr(controller, "decide"):
+        return Individually(controller)
+    return controller  # type: ignore[no-any-return]
+
+
+def _kind_in_file(name: str) -> type[Any]:
+    file, _, class_name = name.rpartition(":")
+    if not class_name or not file.endswith(".py"):
+        raise ParameterError(f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted")
+    path = Path(file).resolve()
+    if not path.is_file():
+        raise ParameterError(f"controller {shown(name)}: there is no file {file}")
+    # a name of its own for each file, so that two files called mine.py do not replace each other
+    module_name = f"robocov_user_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise ParameterError(f"controller {shown(name)}: {file} is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ParameterError(
+            f"controller {shown(name)}: {file} cannot be run: {type(error).__name__}: {error}"
+        ) from error
+    kinds = {
+        key: value
+        for key, value in vars(module).items()
+        if isinstance(value, type) and (hasattr(value, "decide") or hasattr(value, "force"))
+    }
+    if class_name not in kinds:
+        if class_name in vars(module):
+            raise ParameterError(
+                f"controller {shown(name)}: {class_name} has neither a method decide(seen, memory) nor force(own)"
+            )
+        raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
+    kind = kinds[class_name]
+    if not hasattr(kind, "__dataclass_fields__"):
+        raise ParameterError(
+            f"controller {shown(name)}: {class_name} is not a dataclass; write @dataclass(frozen=True) above it"
+        )
+    return kind

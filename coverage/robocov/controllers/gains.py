@@ -1,0 +1,119 @@
+"""Gains of a controller: dataclass fields with a unit, a range and one line of meaning."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from robocov.errors import ParameterError, shown, unknown_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What is known of one gain.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    default : float or None
+    low, high : float
+        The range, both ends included.
+    optional : bool
+        Whether None ("no limit") is a value.
+    """
+
+    name: str
+    default: float | None
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    optional: bool = False
+
+    def validated(self, value: object, where: str) -> float | None:
+        """Return `value` as the gain takes it.
+
+        Raises
+        ------
+        ParameterError
+            When it is not a number in range; the message names `where`, value and range.
+        """
+        if value is None and self.optional:
+            return None
+        also = ", or null for no limit," if self.optional else ""
+        wanted = f"but a number from {self.low:g} to {self.high:g} {self.unit}{also} was wanted"
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
+        if not self.low <= value <= self.high:
+            raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
+        return float(value)
+
+
+def gain(
+    default: float | None, unit: str, meaning: str, *, low: float = 0.0, high: float = 1e6, optional: bool = False
+) -> Any:
+    """Declare a gain as a dataclass field.
+
+    >>> @dataclass(frozen=True)
+    ... class Mine:
+    ...     k: float = gain(1.0, "N/m", "stiffness")
+    >>> gains_of(Mine)["k"].unit
+    'N/m'
+    """
+    return field(default=default, metadata={"gain": (unit, low, high, meaning, optional)})
+
+
+def gains_of(controller: Any) -> dict[str, Gain]:
+    """Return the gains of a controller class or instance by name, in their order of declaration."""
+    found: dict[str, Gain] = {}
+    for each in fields(controller):
+        default = None if each.default is MISSING else each.default
+        if "gain" in each.metadata:
+            unit, low, high, meaning, optional = each.metadata["gain"]
+        elif isinstance(default, int | float) and not isinstance(default, bool):
+            # a user's plain dataclass field is a gain of any value
+            unit, low, high, meaning, optional = "", -1e12, 1e12, "", False
+        else:
+            continue
+        found[each.name] = Gain(each.name, default, unit, low, high, meaning, optional)
+    return found
+
+
+def gain_values(controller: Any) -> dict[str, float | None]:
+    """Return the values of the gains of a controller instance."""
+    return {name: getattr(controller, name) for name in gains_of(controller)}
+
+
+def validate_gains(controller: Any) -> None:
+    """Check every gain of a controller instance; call it from ``__post_init__``.
+
+    Raises
+    ------
+    ParameterError
+        On the first gain out of range.
+    """
+    where = getattr(controller, "name", type(controller).__name__)
+    for name, known in gains_of(controller).items():
+        object.__setattr__(controller, name, known.validated(getattr(controller, name), where))
+
+
+def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
+    """Return an instance of the controller class `kind` with the given gains.
+
+    Raises
+    ------
+    ParameterError
+        On an unknown gain (with the nearest name) or a value out of range.
+    """
+    known = gains_of(kind)
+    where = getattr(kind, "name", kind.__name__)
+    for name in values:
+        if name not in known:
+            if not known:
+                raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
+            raise ParameterError(f"{where}: {unknown_name('gain', name, known)}")
+    return kind(**{name: known[name].validated(value, where) for name, value in values.items()})

@@ -1,0 +1,108 @@
+"""Control laws written for one robot at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.observation import Decision, Observations
+from robocov.region import Region
+from robocov.robots import Team
+from robocov.voronoi import VoronoiPartition, partition
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@dataclass(frozen=True, eq=False)
+class OwnView:
+    """All that one robot knows.
+
+    Attributes
+    ----------
+    number : int
+        The robot's own number, from 0.
+    position : (2,) m
+    velocity : (2,) m/s
+    neighbours : (k, 2) m
+        Positions of the robots that it hears.
+    obstacle_point : (2,) m or None
+        The closest obstacle or boundary point in sensing range.
+    region : Region
+        The known convex outer boundary.
+    time : float, s
+    """
+
+    number: int
+    position: Array
+    velocity: Array
+    neighbours: Array
+    obstacle_point: Array | None
+    region: Region
+    time: float
+    _cells: VoronoiPartition
+
+    @property
+    def centroid(self) -> Array:
+        """Centroid of the robot's Voronoi cell, (2,) m."""
+        return self._cells.centroid[self.number]
+
+    @property
+    def cell(self) -> Array:
+        """The robot's Voronoi cell, (k, 2) m counter-clockwise."""
+        return self._cells.polygons[self.number]
+
+
+@runtime_checkable
+class IndividualController(Protocol):
+    """A law for one robot: one method from what it knows to the force that it wants."""
+
+    def force(self, own: OwnView) -> Sequence[float] | Array:
+        """Return the force in newtons, two numbers."""
+        ...
+
+
+class Individually:
+    """Makes a controller for the team of a law for one robot: it is asked for every robot in turn.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Home:
+    ...     stiffness: float = 0.5
+    ...     def force(self, own):
+    ...         return self.stiffness * (own.centroid - own.position)
+    >>> Individually(Home()).name
+    'Home'
+    """
+
+    def __init__(self, law: IndividualController) -> None:
+        self.law = law
+        kind = type(law)
+        self.name = str(getattr(law, "name", kind.__name__))
+        self.label = str(getattr(law, "label", self.name))
+        self.summary = str(getattr(law, "summary", (kind.__doc__ or "").strip().split("\n")[0]))
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered."""
+
+    def decide(self, seen: Observations, memory: Any) -> Decision:
+        """Ask the law for each robot's force."""
+        cells = partition(seen.positions, seen.region, seen.neighbours)
+        forces = np.empty_like(seen.positions)
+        for i in range(len(forces)):
+            point = seen.obstacle_points[i]
+            own = OwnView(
+                number=i,
+                position=seen.positions[i].copy(),
+                velocity=seen.velocities[i].copy(),
+                neighbours=seen.positions[seen.neighbours.of(i)],
+                obstacle_point=None if np.isnan(point[0]) else point.copy(),
+                region=seen.region,
+                time=seen.time,
+                _cells=cells,
+            )
+            forces[i] = self.law.force(own)
+        return Decision(forces=forces, goals=cells.centroid, cells=cells)

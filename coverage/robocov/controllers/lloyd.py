@@ -1,0 +1,50 @@
+"""LA: Lloyd's algorithm under kinematic limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from robocov.controllers.gains import gain, validate_gains
+from robocov.observation import Decision, Observations
+from robocov.region import Region
+from robocov.robots import Team
+from robocov.voronoi import partition
+
+
+@dataclass(frozen=True)
+class Lloyd:
+    """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
+
+    Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the
+    last metres so that its deceleration stays within the limits. The drive tracks that velocity
+    and makes up for viscosity. Obstacles are not known to the law: the robot slides along them.
+    """
+
+    name: ClassVar[str] = "lloyd"
+    label: ClassVar[str] = "LA"
+    summary: ClassVar[str] = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
+
+    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    response_time: float = gain(0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0)
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+
+    def begin(self, region: Region, team: Team) -> Team:
+        """Return the team: a robot knows its own mass, viscosity and largest speed."""
+        return team
+
+    def decide(self, seen: Observations, memory: Team) -> Decision:
+        """Return the forces that drive each robot to its centroid."""
+        team = memory
+        cells = partition(seen.positions, seen.region, seen.neighbours)
+        offset = cells.centroid - seen.positions
+        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        speed_per_metre = np.minimum(self.k_prop, team.max_speed / np.maximum(distance, 1e-300))
+        wanted = offset * speed_per_metre[:, None]
+        drive = (wanted - seen.velocities) * (team.mass / self.response_time)[:, None]
+        forces = drive + seen.velocities * team.viscosity[:, None]
+        return Decision(forces=forces, goals=cells.centroid, terms={"attraction": forces}, cells=cells, memory=team)

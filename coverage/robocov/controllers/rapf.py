@@ -1,0 +1,57 @@
+"""RAPF: repulsion and attraction to the centroid of the robot's Voronoi cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
+from robocov.observation import Decision, Observations
+from robocov.potential import attractive_force
+from robocov.region import Region
+from robocov.robots import Team
+from robocov.voronoi import partition
+
+
+@dataclass(frozen=True)
+class Rapf:
+    """Repulsive and attractive potential field (Renzaglia and Martinelli), equations (23)-(28).
+
+    As RPF, but every robot is also drawn to the centroid of its Voronoi cell of the known convex
+    region. The cells ignore the unknown obstacles; the repulsion keeps robots off them.
+    The goal may lie in or behind an obstacle: then the robot rests where the forces balance.
+
+    With `attraction_limit` at viscosity x maximum speed (2 N by default) the attraction never
+    exceeds what drives a robot at full speed, and no wall is touched; None is the paper's (27).
+    """
+
+    name: ClassVar[str] = "rapf"
+    label: ClassVar[str] = "RAPF"
+    summary: ClassVar[str] = "the paper's law: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
+
+    k_rep: float = gain(0.1, "N m³", "strength of the repulsion, (24)")
+    rho_0: float = gain(2.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
+    k_att: float = gain(30.0, "N/m³", "strength of the attraction, (27)")
+    attraction_limit: float | None = gain(
+        2.0, "N", "cap of the attraction; null is the paper's formula", low=1e-6, optional=True
+    )
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Return the forces (25) + (27)."""
+        cells = partition(seen.positions, seen.region, seen.neighbours)
+        attraction = attractive_force(cells.centroid - seen.positions, self.k_att, self.attraction_limit)
+        robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
+        obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
+        return Decision(
+            forces=attraction + robots + obstacle,
+            goals=cells.centroid,
+            terms={"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle},
+            cells=cells,
+        )

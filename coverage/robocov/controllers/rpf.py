@@ -1,0 +1,43 @@
+"""RPF: repulsion only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
+from robocov.observation import Decision, Observations
+from robocov.region import Region
+from robocov.robots import Team
+
+
+@dataclass(frozen=True)
+class Rpf:
+    """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
+
+    Every robot is pushed away from the neighbours within `rho_0` and from the single closest
+    obstacle point; viscosity brings the team to rest.
+    """
+
+    name: ClassVar[str] = "rpf"
+    label: ClassVar[str] = "RPF"
+    summary: ClassVar[str] = "repulsion from robots and the nearest obstacle only, (23)-(25)"
+
+    k_rep: float = gain(1.0, "N m³", "strength of the repulsion, (24)")
+    rho_0: float = gain(6.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Return the forces (25)."""
+        robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
+        obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
+        return Decision(
+            forces=robots + obstacle,
+            terms={"repulsion_robots": robots, "repulsion_obstacle": obstacle},
+        )

@@ -1,0 +1,221 @@
+"""The record of a run: all of it as arrays, saved in one folder."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.atomic import written
+from robocov.controllers import CONTROLLERS, gain_values
+from robocov.environment import Environment
+from robocov.errors import InputError
+from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.robots import Team
+
+if TYPE_CHECKING:
+    from robocov.controllers.base import Controller
+
+ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A whole run.
+
+    Attributes
+    ----------
+    environment : Environment
+    team : Team
+    controller : str
+        Name of the controller.
+    label : str
+        Its name as shown to people.
+    gains : dict of name to value
+    start : str or None
+        Name of the start, None where positions were given.
+    seed : int or None
+    dt : float, s
+    time : (T,) s
+    positions : (T, n, 2) m
+    velocities : (T, n, 2) m/s
+    forces : (T, n, 2) N
+        The controller's force at that state, before any limit, viscosity apart.
+    goals : (T, n, 2) m
+        nan where none.
+    obstacle_points : (T, n, 2) m
+        The nearest obstacle point that each robot sensed, nan where none.
+    """
+
+    environment: Environment
+    team: Team
+    controller: str
+    label: str
+    gains: Mapping[str, float | None]
+    start: str | None
+    seed: int | None
+    dt: float
+    time: Array
+    positions: Array
+    velocities: Array
+    forces: Array
+    goals: Array
+    obstacle_points: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def snapshot(self, k: int) -> Snapshot:
+        """Return the moment number `k` as far as it was recorded: without force terms and cells."""
+        positions = self.positions[k]
+        seen = Observations(
+            positions=positions,
+            velocities=self.velocities[k],
+            neighbours=Neighbours.within(positions, self.team.communication_range),
+            obstacle_points=self.obstacle_points[k],
+            region=self.environment.region,
+            time=float(self.time[k]),
+        )
+        goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
+        return Snapshot(seen, Decision(forces=self.forces[k], goals=goals))
+
+    def to_json(self, summary: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary."""
+        from robocov.mapfile import to_json
+
+        return {
+            "format": "robocov-run",
+            "version": 1,
+            "map": to_json(self.environment),
+            "controller": {"name": self.controller, "gains": dict(self.gains)},
+            "team": self.team.to_dict(),
+            "start": self.start,
+            "starts_m": self.positions[0].tolist(),
+            "seed": self.seed,
+            "dt_s": self.dt,
+            "duration_s": float(self.time[-1]),
+            "versions": versions(),
+            "summary": dict(summary or {}),
+        }
+
+    def save(self, folder: Path, summary: Mapping[str, Any] | None = None) -> None:
+        """Write ``record.npz`` and ``run.json`` to `folder`; each appears whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            When they cannot be written.
+        """
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        with written(folder / "record.npz") as part, part.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+        with written(folder / "run.json") as part:
+            text = json.dumps(self.to_json(summary), indent=1, allow_nan=False)
+            part.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: Path) -> Record:
+        """Return the record that `save` wrote to `folder`.
+
+        Raises
+        ------
+        InputError
+            When the folder holds no run, or one that cannot be read; the message names the file.
+        """
+        from robocov.mapfile import from_json
+
+        path = folder / "run.json"
+        try:
+            run = json.loads(path.read_text(encoding="utf-8"))
+            with np.load(folder / "record.npz", allow_pickle=False) as saved:
+                arrays = {name: np.asarray(saved[name], dtype=float) for name in ARRAYS}
+            name = run["controller"]["name"]
+            record = cls(
+                environment=from_json(run["map"], f"{path}: map"),
+                team=Team.from_dict(run["team"]),
+                controller=name,
+                label=str(getattr(CONTROLLERS.get(name), "label", name)),
+                gains=run["controller"]["gains"],
+                start=run["start"],
+                seed=run["seed"],
+                dt=float(run["dt_s"]),
+                **arrays,
+            )
+        except FileNotFoundError as error:
+            raise InputError(f"{folder}: not the folder of a run (there is no {Path(error.filename).name})") from error
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{folder}: the run cannot be read: {type(error).__name__}: {error}") from error
+        shape = (len(record.time), len(record.team), 2)
+        for name in ARRAYS[1:]:
+            if arrays[name].shape != shape:
+                raise InputError(f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted")
+        return record
+
+
+class Recorder:
+    """Collects snapshots into a `Record`; what was collected can be had at any time."""
+
+    def __init__(
+        self,
+        environment: Environment,
+        team: Team,
+        controller: Controller,
+        dt: float,
+        *,
+        start: str | None = None,
+        seed: int | None = None,
+    ) -> None:
+        self._environment, self._team, self._controller, self._dt = environment, team, controller, dt
+        self._start, self._seed = start, seed
+        self._time: list[float] = []
+        self._rows: dict[str, list[Array]] = {name: [] for name in ARRAYS[1:]}
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Append one moment."""
+        seen, decision = snapshot.seen, snapshot.decision
+        self._time.append(seen.time)
+        goals = decision.goals if decision.goals is not None else np.full_like(seen.positions, np.nan)
+        for name, row in (
+            ("positions", seen.positions),
+            ("velocities", seen.velocities),
+            ("forces", decision.forces),
+            ("goals", goals),
+            ("obstacle_points", seen.obstacle_points),
+        ):
+            self._rows[name].append(row)
+
+    def record(self) -> Record:
+        """Return what was collected so far."""
+        law = getattr(self._controller, "law", self._controller)
+        return Record(
+            environment=self._environment,
+            team=self._team,
+            controller=self._controller.name,
+            label=self._controller.label,
+            gains=gain_values(law),
+            start=self._start,
+            seed=self._seed,
+            dt=self._dt,
+            time=np.array(self._time),
+            **{name: np.array(rows) for name, rows in self._rows.items()},
+        )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    found = {"python": platform.python_version()}
+    for name in ("robocov", "numpy", "scipy", "shapely", "pymunk"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found

@@ -1,0 +1,211 @@
+"""The simulation: observe all, decide all, then move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array
+from robocov.controllers.base import Controller
+from robocov.environment import Environment
+from robocov.errors import ParameterError, StartError, shown
+from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.record import Record, Recorder
+from robocov.robots import Team
+from robocov.sensor import RangeSensor
+from robocov.solid import solid_pieces
+from robocov.world import World
+
+DEFAULT_DT = 1 / 60
+"""Control period in seconds where nothing else is said."""
+
+
+class Simulation:
+    """A team under one controller in one environment.
+
+    Parameters
+    ----------
+    environment : Environment
+    controller : Controller
+    starts : (n, 2) m
+        Centres of the robots at the beginning.
+    team : Team
+        By default `Team.homogeneous(n)`.
+    dt : float, s
+        Control period. The physics takes substeps where it needs them.
+
+    Raises
+    ------
+    StartError
+        When a robot would start in a wall or in another robot.
+    ParameterError
+        When dt is out of range, or team and starts differ in size.
+
+    Examples
+    --------
+    >>> from robocov.controllers import Rapf
+    >>> from robocov.environment import Environment
+    >>> room = Environment("room", ((0, 0), (10, 0), (10, 10), (0, 10)))
+    >>> simulation = Simulation(room, Rapf(), starts=[[1.0, 1.0], [2.0, 1.0]])
+    >>> simulation.step()
+    >>> simulation.positions.shape
+    (2, 2)
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        controller: Controller,
+        starts: Array | list[list[float]],
+        team: Team | None = None,
+        dt: float = DEFAULT_DT,
+    ) -> None:
+        positions = np.array(starts, dtype=float)
+        if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
+            raise StartError(f"starts: an array of shape {positions.shape}, but (n, 2) with n of at least 1 was wanted")
+        self.team = Team.homogeneous(len(positions)) if team is None else team
+        if len(self.team) != len(positions):
+            raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
+        if not 1e-4 <= dt <= 1.0:
+            raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
+        _check_starts(environment, positions, self.team)
+        self.environment = environment
+        self.controller = controller
+        self.dt = dt
+        pieces = solid_pieces(environment)
+        self._sensor = RangeSensor(pieces)
+        self._world = World(pieces, self.team, positions)
+        self._memory = controller.begin(environment.region, self.team)
+        self._steps = 0
+        self._snapshot: Snapshot | None = None
+
+    @property
+    def time(self) -> float:
+        """Simulated time in seconds."""
+        return self._steps * self.dt
+
+    @property
+    def positions(self) -> Array:
+        """Centres of the robots, (n, 2) m."""
+        return self._world.positions
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, (n, 2) m/s."""
+        return self._world.velocities
+
+    @property
+    def sensor(self) -> RangeSensor:
+        """The range sensor of the robots, for ray scans."""
+        return self._sensor
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The present state, what is seen in it, and what is decided on it."""
+        if self._snapshot is None:
+            seen = self.observe()
+            self._snapshot = Snapshot(seen, self.controller.decide(seen, self._memory))
+        return self._snapshot
+
+    def observe(self) -> Observations:
+        """Return what each robot knows now."""
+        positions = self._world.positions
+        return Observations(
+            positions=positions,
+            velocities=self._world.velocities,
+            neighbours=Neighbours.within(positions, self.team.communication_range),
+            obstacle_points=self._sensor.nearest(positions, self.team.sensing_range),
+            region=self.environment.region,
+            time=self.time,
+        )
+
+    def step(self) -> None:
+        """Make one control step.
+
+        Raises
+        ------
+        ParameterError
+            When the controller returns anything but finite forces of shape (n, 2).
+        """
+        decision = self.snapshot.decision
+        self._check_forces(decision)
+        self._world.step(decision.forces, self.dt)
+        self._memory = decision.memory
+        self._steps += 1
+        self._snapshot = None
+
+    def snapshots(self, duration: float) -> Iterator[Snapshot]:
+        """Yield the present snapshot and one after every step, until `duration` seconds have passed."""
+        yield self.snapshot
+        for _ in range(round(duration / self.dt)):
+            self.step()
+            yield self.snapshot
+
+    def run(
+        self,
+        duration: float,
+        *,
+        start: str | None = None,
+        seed: int | None = None,
+        on_snapshot: Callable[[Snapshot], None] | None = None,
+    ) -> Record:
+        """Run for `duration` seconds and return the whole of it.
+
+        Parameters
+        ----------
+        duration : float, s
+        start : str, seed : int
+            Where the starts came from, kept in the record.
+        on_snapshot : callable
+            Called with every snapshot, for progress.
+        """
+        recorder = Recorder(self.environment, self.team, self.controller, self.dt, start=start, seed=seed)
+        for snapshot in self.snapshots(duration):
+            recorder.add(snapshot)
+            if on_snapshot is not None:
+                on_snapshot(snapshot)
+        return recorder.record()
+
+    def copy(self) -> Simulation:
+        """Return an independent simulation in the same state; it goes on identically, bit for bit."""
+        twin = object.__new__(Simulation)
+        twin.__dict__.update(self.__dict__)
+        twin._world = self._world.copy()
+        return twin
+
+    def _check_forces(self, decision: Decision) -> None:
+        forces = decision.forces
+        expected = (len(self.team), 2)
+        if forces.shape != expected:
+            raise ParameterError(
+                f"controller {self.controller.name!r}: forces of shape {forces.shape}, but {expected} was wanted"
+            )
+        if not np.isfinite(forces).all():
+            robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
+            raise ParameterError(
+                f"controller {self.controller.name!r}: force {forces[robot].tolist()} on robot {robot + 1} "
+                f"at {self.time:.3f} s, but finite newtons were wanted"
+            )
+
+
+def _check_starts(environment: Environment, positions: Array, team: Team) -> None:
+    points = shapely.points(positions)
+    inside = shapely.contains_properly(environment.free, points)
+    wall = shapely.distance(environment.free.boundary, points)
+    for i in range(len(positions)):
+        place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
+        if not np.isfinite(positions[i]).all():
+            raise StartError(f"{place}: finite numbers were wanted")
+        if not inside[i]:
+            raise StartError(f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}")
+        if wall[i] < team.radius[i] - 1e-6:
+            raise StartError(
+                f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
+            )
+    first, second, distance = Neighbours(len(positions)).closer_than(positions, 2.0 * float(team.radius.max()))
+    clash = distance < team.radius[first] + team.radius[second] - 1e-6
+    if clash.any():
+        k = int(np.flatnonzero(clash)[0])
+        raise StartError(f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap")
