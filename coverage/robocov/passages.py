@@ -1,0 +1,200 @@
+"""The narrowest passage of a free space, exactly.
+
+A disc of growing radius can reach the same places, in the same ways, until its diameter
+passes the width of a gap. At such a gap the distance to the walls has a saddle: two wall points
+face each other, and the disc between them, with their segment as its diameter, holds no other.
+One of the two is then a corner that juts into the free space, or both sides are parallel
+and such a corner ends one of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from robocov.robots import DEFAULT_RADIUS
+
+if TYPE_CHECKING:
+    from shapely import MultiPolygon
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.arrays import Array, BoolArray, IntArray
+
+NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
+"""A gap to a pocket smaller than this, in m², is none: no robot would go there."""
+
+_TOUCHING = 4e-6
+"""Walls closer than this, in metres, touch: the grid of the derived geometry is 1e-6."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A passage of the free space.
+
+    Attributes
+    ----------
+    width : float, m
+        Diameter of the largest disc that passes.
+    between : two points (x, y), m
+        Where the walls are closest to each other.
+    """
+
+    width: float
+    between: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Walls:
+    """The e edges of the rings of a free space; the free space lies to the left of each.
+
+    Attributes
+    ----------
+    start, end : (e, 2) m
+    ring : (e,)
+        Index of the edge's ring.
+    origin : (e, 2) m
+        First vertex of the edge's ring.
+    swept : (e,) m²
+        Signed area that the ring sweeps about its origin up to the edge's start.
+    total : (e,) m²
+        Signed area of the edge's ring.
+    jutting : (j,)
+        The edges whose start is a corner that juts into the free space.
+    """
+
+    start: Array
+    end: Array
+    ring: IntArray
+    origin: Array
+    swept: Array
+    total: Array
+    jutting: IntArray
+
+
+def narrowest_gap(free: MultiPolygon) -> Gap | None:
+    """Return the narrowest passage of `free`, or None where there is none.
+
+    A passage leads round an obstacle, or to a part of the free space that is neither smaller
+    than `NEGLIGIBLE` nor smaller than the square over the gap: a niche that is shallower than
+    wide is none, and nor is an acute corner.
+
+    Parameters
+    ----------
+    free : MultiPolygon
+        Disjoint polygons, counter-clockwise.
+
+    Examples
+    --------
+    >>> room = shapely.box(0, 0, 6, 3) - shapely.box(2.9, 1, 3.1, 2.2)
+    >>> round(narrowest_gap(shapely.MultiPolygon([room])).width, 6)
+    0.8
+    """
+    if free.is_empty:
+        return None
+    walls = _walls(free)
+    corners = walls.start[walls.jutting]
+    edges = shapely.linestrings(np.stack([walls.start, walls.end], axis=1))
+    tree = shapely.STRtree(edges)
+    boundary = free.boundary
+    shapely.prepare(boundary)
+    shapely.prepare(free)
+    low_x, low_y, high_x, high_y = free.bounds
+    largest = math.hypot(high_x - low_x, high_y - low_y)
+    below, reach = _TOUCHING, largest / 256
+    # most maps have a gap far narrower than the map is wide: look near first
+    while len(corners) and below < largest:
+        corner, edge = tree.query(shapely.points(corners), predicate="dwithin", distance=reach)
+        found = _narrowest(walls, walls.jutting[corner], edge, below, boundary, free)
+        if found is not None:
+            return found
+        below, reach = reach, 2 * reach
+    return None
+
+
+def _walls(free: MultiPolygon) -> _Walls:
+    starts, ends, rings, origins, swept, totals, jutting = [], [], [], [], [], [], []
+    count = 0
+    for index, ring in enumerate(ring for part in free.geoms for ring in (part.exterior, *part.interiors)):
+        start = np.asarray(ring.coords)[:-1]
+        end = np.roll(start, -1, axis=0)
+        before = np.roll(start, 1, axis=0)
+        origin = start[0]
+        area = _cross(start - origin, end - origin) / 2
+        starts.append(start)
+        ends.append(end)
+        rings.append(np.full(len(start), index))
+        origins.append(np.broadcast_to(origin, start.shape))
+        swept.append(np.cumsum(area) - area)
+        totals.append(np.full(len(start), area.sum()))
+        jutting.append(count + np.flatnonzero(_cross(start - before, end - start) < 0))
+        count += len(start)
+    return _Walls(
+        np.concatenate(starts),
+        np.concatenate(ends),
+        np.concatenate(rings),
+        np.concatenate(origins),
+        np.concatenate(swept),
+        np.concatenate(totals),
+        np.concatenate(jutting),
+    )
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _narrowest(
+    walls: _Walls, corner: IntArray, edge: IntArray, below: float, boundary: BaseGeometry, free: MultiPolygon
+) -> Gap | None:
+    """Return the narrowest passage between the corners and the edges paired with them.
+
+    Pairs closer than `below` are known to be none.
+    """
+    p = walls.start[corner]
+    along = walls.end[edge] - walls.start[edge]
+    part = np.einsum("kd,kd->k", p - walls.start[edge], along) / np.einsum("kd,kd->k", along, along)
+    q = walls.start[edge] + np.clip(part, 0.0, 1.0)[:, None] * along
+    width = np.hypot(*(q - p).T)
+    wide = width > below
+    p, q, width, corner, edge = p[wide], q[wide], width[wide], corner[wide], edge[wide]
+    passage = _leads_on(walls, corner, edge, p, q, width)
+    p, q, width = p[passage], q[passage], width[passage]
+    order = np.argsort(width, kind="stable")
+    for some in np.array_split(order, max(1, len(order) // 512)):
+        middle = shapely.points((p[some] + q[some]) / 2)
+        clearance = shapely.distance(boundary, middle)
+        empty = clearance >= width[some] / 2 * (1 - 1e-9) - 1e-12
+        empty[empty] = shapely.contains_properly(free, middle[empty])
+        if empty.any():
+            first = some[int(np.argmax(empty))]
+            ends = sorted(
+                [(float(p[first, 0]), float(p[first, 1])), (float(q[first, 0]), float(q[first, 1]))]
+            )
+            return Gap(float(width[first]), (ends[0], ends[1]))
+    return None
+
+
+def _leads_on(walls: _Walls, corner: IntArray, edge: IntArray, p: Array, q: Array, width: Array) -> BoolArray:
+    """Return whether the gaps from corner points p to edge points q lead to more than a pocket.
+
+    A cut between two rings separates nothing: the way round is another one. A cut from a ring
+    to itself separates the part that the ring sweeps between the two points.
+    """
+
+    def swept(index: IntArray, point: Array) -> Array:
+        origin = walls.origin[index]
+        return walls.swept[index] + _cross(walls.start[index] - origin, point - origin) / 2
+
+    origin = walls.origin[corner]
+    total = walls.total[corner]
+    between = swept(edge, q) - swept(corner, p) + _cross(q - origin, p - origin) / 2
+    between = np.where(edge < corner, total + between, between)
+    sides = np.stack([between, total - between])
+    # outside a hole's ring there is no pocket: only the side of positive area is one
+    pocket = np.where(sides > 0, sides, np.inf).min(axis=0)
+    around = walls.ring[corner] != walls.ring[edge]
+    return np.asarray(around | (pocket >= np.maximum(NEGLIGIBLE, width * width)))
