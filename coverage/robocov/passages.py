@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from robocov.environment import SAGITTA
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
 
-_TOUCHING = 4e-6
-"""Walls closer than this, in metres, touch: the grid of the derived geometry is 1e-6."""
+_TOUCHING = 2 * SAGITTA
+"""Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
 
 
 @dataclass(frozen=True)
