@@ -1,0 +1,131 @@
+"""Cost curves: mean distance against time, each named at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.page import SMALL, TEXT, tone
+from robocov_app.view.theme import Theme
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Curve: TypeAlias = tuple[str, str, Array, Array]
+"""Label, controller's name, times (T,) s and mean distances (T,) m."""
+
+_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)), (0, (10, 3)))
+_FROM_ZERO = 0.4
+"""The axis begins at zero when the lowest value is below this part of the highest."""
+
+
+def end_label(curve: Curve) -> str:
+    """Return what stands at a curve's end: its name and its last finite value."""
+    label, _, _, values = curve
+    return f"{label}  {values[np.isfinite(values)][-1]:.3f} m"
+
+
+def draw_curves(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
+    """Draw curves with their labels at their right ends, pushed apart where they would overlap."""
+    _frame(axes, curves, theme)
+    ends = []
+    for number, curve in enumerate(curves):
+        _, controller, time, values = curve
+        colour = tone(theme.controller(controller))
+        axes.plot(time, values, color=colour, linewidth=1.8, linestyle=_DASHES[number % len(_DASHES)])
+        last = int(np.nonzero(np.isfinite(values))[0][-1])
+        axes.plot(time[last], values[last], "o", color=colour, markersize=5, clip_on=False, zorder=5)
+        ends.append((float(time[last]), float(values[last]), colour, end_label(curve)))
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    line_height = 1.45 * TEXT * figure.dpi / 72
+    at = axes.transData.transform([(x, y) for x, y, _, _ in ends])
+    box = axes.get_window_extent()
+    heights = spread(at[:, 1], line_height, float(box.y0), float(box.y1))
+    for (x, y, colour, text), height in zip(ends, heights.tolist(), strict=True):
+        fraction = (height - box.y0) / box.height
+        axes.annotate(
+            text,
+            xy=(x, y),
+            xytext=(1.0, fraction),
+            textcoords=axes.transAxes,
+            xycoords="data",
+            annotation_clip=False,
+            fontsize=TEXT,
+            fontweight="bold",
+            color=colour,
+            va="center",
+            ha="left",
+        ).set_position((1.0 + 12 * figure.dpi / 72 / box.width, fraction))
+        if abs(height - float(axes.transData.transform((x, y))[1])) > 0.3 * line_height:
+            axes.plot(
+                [1.0 + 4 * figure.dpi / 72 / box.width, 1.0 + 10 * figure.dpi / 72 / box.width],
+                [float(axes.transAxes.inverted().transform(axes.transData.transform((x, y)))[1]), fraction],
+                transform=axes.transAxes,
+                color=colour,
+                linewidth=0.8,
+                clip_on=False,
+            )
+
+
+def _frame(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
+    """Set limits, units and a quiet grid."""
+    ink, faint = tone(theme.ink), tone(theme.faint)
+    values = np.concatenate([np.asarray(curve[3])[np.isfinite(curve[3])] for curve in curves])
+    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
+    low, high = float(values.min()), float(values.max())
+    room = 0.08 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
+    axes.set_ylim(0.0 if low < _FROM_ZERO * high else low - room, high + room)
+    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
+    axes.set_facecolor(tone(theme.background))
+    axes.set_xlabel("time (s)", fontsize=TEXT, color=ink)
+    axes.set_ylabel("mean distance to the nearest robot (m)", fontsize=TEXT, color=ink)
+    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.7, alpha=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    axes.spines["bottom"].set_color(faint)
+    axes.tick_params(colors=faint, labelsize=SMALL, left=False)
+
+
+def spread(heights: Array, gap: float, low: float, high: float) -> Array:
+    """Return heights at least `gap` apart, in the same order, as near to the given ones as a sweep gets.
+
+    Parameters
+    ----------
+    heights : (m,)
+    gap : float
+    low, high : float
+        They stay within, as far as there is room.
+
+    Examples
+    --------
+    >>> spread(np.array([5.0, 5.0, 20.0]), 4.0, 0.0, 30.0).tolist()
+    [3.0, 7.0, 20.0]
+    """
+    order = np.argsort(heights, kind="stable")
+    blocks: list[list[float]] = []  # sum of wanted first heights, number of members
+    for rank in order.tolist():
+        blocks.append([float(heights[rank]), 1.0])
+        while len(blocks) > 1:
+            (above, m), (below, k) = blocks[-1], blocks[-2]
+            bottom = below / k - 0.5 * gap * (k - 1)
+            if above / m - 0.5 * gap * (m - 1) - (bottom + gap * (k - 1)) >= gap - 1e-9:
+                break
+            blocks[-2:] = [[below + above, k + m]]
+    placed: list[float] = []
+    for total, count in blocks:
+        first = total / count - 0.5 * gap * (count - 1)
+        placed += [first + gap * k for k in range(int(count))]
+    result = np.empty(len(heights))
+    result[order] = placed
+    for k, rank in enumerate(order.tolist()):
+        floor = low + gap * k
+        result[rank] = max(result[rank], floor)
+    for k, rank in enumerate(order[::-1].tolist()):
+        ceiling = high - gap * k
+        result[rank] = min(result[rank], ceiling)
+    return result

@@ -1,0 +1,355 @@
+"""Frames and films of a run, without a display."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import struct
+import subprocess
+import tempfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.atomic import written
+from robocov.errors import OutputError, ParameterError, shown
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array, IntArray
+    from robocov.record import Record
+
+Frame: TypeAlias = NDArray[np.uint8]
+"""An RGB picture, (height, width, 3), 0 to 255."""
+
+Progress: TypeAlias = Callable[[int, int | None], None]
+"""Is told how many frames are done, and of how many where that is known."""
+
+_NOTHING_NEW = "frames: none were given, but at least one was wanted"
+
+
+def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
+    """Return which row of a record each frame shows.
+
+    Parameters
+    ----------
+    time : (T,) s
+        Ascending.
+    fps : float
+        Frames per second of the film.
+    speed : float
+        Simulated seconds per second of the film.
+    hold : float, s
+        So long the film stays on the last row at its end.
+
+    Returns
+    -------
+    (m,) int
+
+    Raises
+    ------
+    ParameterError
+        When `fps` or `speed` is not positive.
+
+    Examples
+    --------
+    >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
+    [0, 2, 4]
+    """
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (np.isfinite(value) and value > 0):
+            raise ParameterError(f"{name}: {shown(value)}, but a positive number was wanted")
+    duration = float(time[-1] - time[0])
+    count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
+    at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
+    # half a microsecond forgives the rounding of sums of steps
+    rows = np.searchsorted(time, at + 5e-7, side="right") - 1
+    return np.clip(rows, 0, len(time) - 1).astype(np.intp)
+
+
+def iter_frames(
+    record: Record,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    theme: str = "light",
+    fps: float = 30.0,
+    speed: float = 1.0,
+    hold: float = 0.0,
+    show: Iterable[str] | None = None,
+    scale: float | None = None,
+    cost: tuple[Array, Array] | None = None,
+    rows: IntArray | None = None,
+) -> Iterator[Frame]:
+    """Draw the frames of a saved run, one at a time.
+
+    Parameters
+    ----------
+    record : Record
+    size : (width, height), px
+    theme : {"light", "dark"}
+    fps, speed, hold
+        See `frame_rows`.
+    show : names of layers or None
+        None shows those that are shown by default.
+    scale : float or None
+        Of text and lines; None for what suits the size.
+    cost : ((k,) s, (k,) m) or None
+        Times and mean distances; each frame says the latest known.
+    rows : (m,) int or None
+        The rows to show, instead of those that `fps` and `speed` give.
+
+    Yields
+    ------
+    (height, width, 3) RGB
+        The array is the caller's own.
+    """
+    from robocov_app.view.picture import Painter
+    from robocov_app.view.scene import Scene
+    from robocov_app.view.theme import theme_named
+
+    painter = Painter(record.environment, size, theme_named(theme), scale=scale)
+    if show is not None:
+        painter.show(show)
+    if rows is None:
+        rows = frame_rows(record.time, fps, speed, hold)
+    last, frame = -1, None
+    for row in rows.tolist():
+        if frame is None or row != last:
+            scene = Scene.of(
+                record.environment,
+                record.team,
+                record.snapshot(row),
+                starts=record.positions[0],
+                trail=record.positions[: row + 1],
+                trail_time=record.time[: row + 1],
+                label=record.label,
+                cost=_cost_text(float(record.time[row]), cost),
+            )
+            last, frame = row, painter.frame(scene)
+        yield frame
+
+
+def _cost_text(time: float, cost: tuple[Array, Array] | None) -> str:
+    if cost is None:
+        return ""
+    known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
+    if known < 0 or not np.isfinite(cost[1][known]):
+        return ""
+    return f"mean distance {cost[1][known]:.3f} m"
+
+
+def side_by_side(films: Sequence[Iterator[Frame]], gap: int = 2, grey: int = 128) -> Iterator[Frame]:
+    """Join the frames of several films of one height into frames that show them in a row.
+
+    Parameters
+    ----------
+    films : sequence of iterators of frames
+        Ends when all have ended; those that end before the others stay on their last frame.
+    gap : int, px
+        Width of the line between two.
+    grey : int
+        Its shade, 0 to 255.
+    """
+    current: list[Frame | None] = [None] * len(films)
+    while True:
+        fresh = [next(film, None) for film in films]
+        if all(frame is None for frame in fresh):
+            return
+        current = [new if new is not None else old for new, old in zip(fresh, current, strict=True)]
+        parts: list[Frame] = []
+        for frame in current:
+            if frame is None:
+                raise ParameterError(_NOTHING_NEW)
+            if parts:
+                parts.append(np.full((frame.shape[0], gap, 3), grey, dtype=np.uint8))
+            parts.append(frame)
+        yield np.concatenate(parts, axis=1)
+
+
+def png_bytes(frame: Frame) -> bytes:
+    """Return the frame as a PNG file. The same pixels give the same bytes.
+
+    Written here since it is quicker than the general encoders for drawings of flat colours, and
+    since a full disk is then seen where the bytes are written.
+    """
+    height, width, _ = frame.shape
+    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with filter 0: none
+    rows[:, 1:] = frame.reshape(height, 3 * width)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    body = zlib.compress(rows.tobytes(), 2)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
+def save_frames(
+    folder: Path | str,
+    frames: Iterable[Frame],
+    *,
+    total: int | None = None,
+    progress: Progress | None = None,
+) -> int:
+    """Write frames as ``000000.png``, ``000001.png``, ... and return how many.
+
+    Parameters
+    ----------
+    folder : path
+        Created when it is not there.
+    frames : iterable of (height, width, 3) RGB
+    total : int or None
+        Number of frames where it is known, for `progress`.
+    progress : callable or None
+        Called with (done, total) after each frame.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written. Frames already written stay; each one is whole.
+    """
+    folder = Path(folder)
+    done = 0
+    path = folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for frame in frames:
+            path = folder / f"{done:06d}.png"
+            _write_whole(path, png_bytes(frame))
+            done += 1
+            if progress is not None:
+                progress(done, total)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({_reason(error)})") from error
+    return done
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def save_film(
+    path: Path | str,
+    frames: Iterable[Frame],
+    *,
+    fps: float = 30.0,
+    total: int | None = None,
+    progress: Progress | None = None,
+) -> int:
+    """Write frames as an MP4 film (H.264, yuv420p: what browsers and slides play); return how many.
+
+    The film is made under another name in the same folder and gets its own at the end: after an
+    error or Ctrl-C there is no half film, and an older one of that name is still there.
+
+    Parameters
+    ----------
+    path : path
+        Its folder is created when it is not there.
+    frames : iterable of (height, width, 3) RGB
+        All of one size. H.264 wants even sizes: an odd one gets its last row or column twice.
+    fps : float
+    total : int or None
+        Number of frames where it is known, for `progress`.
+    progress : callable or None
+        Called with (done, total) after each frame.
+
+    Raises
+    ------
+    OutputError
+        When the encoder is missing or fails, or the film cannot be written.
+    ParameterError
+        When there are no frames, or frames of different sizes.
+    """
+    path = Path(path)
+    source = iter(frames)
+    first = next(source, None)
+    if first is None:
+        raise ParameterError(_NOTHING_NEW)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path.parent}: cannot be made ({_reason(error)})") from error
+    done = 0
+    with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
+        frame: Frame | None = first
+        while frame is not None:
+            if frame.shape != first.shape:
+                raise ParameterError(
+                    f"frames: {shown(frame.shape)} after {shown(first.shape)}, but one size was wanted"
+                )
+            pipe.write(np.ascontiguousarray(_even(frame)).data)
+            done += 1
+            if progress is not None:
+                progress(done, total)
+            frame = next(source, None)
+    return done
+
+
+def _even(frame: Frame) -> Frame:
+    """Return the frame with its last row or column repeated where its size is odd."""
+    height, width, _ = frame.shape
+    if height % 2 == 0 and width % 2 == 0:
+        return frame
+    return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+
+
+@contextlib.contextmanager
+def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[BinaryIO]:
+    """Run ffmpeg and give the pipe into it; when it ends badly, raise what it said."""
+    height, width, _ = frame.shape
+    command = [
+        *(_ffmpeg(), "-y", "-nostdin", "-loglevel", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-"),
+        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
+        # players take bt709 for high definition and bt601 otherwise unless the film says which
+        *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"),
+        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+        *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
+        str(part),
+    ]
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
+        assert process.stdin is not None
+        broken = False
+        try:
+            yield process.stdin  # type: ignore[misc]
+            process.stdin.close()
+        except BrokenPipeError:
+            broken = True
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            with contextlib.suppress(OSError):
+                process.stdin.close()
+            status = process.wait()
+        if broken or status != 0:
+            said.seek(0)
+            lines = said.read().decode("utf-8", "replace").strip().splitlines()
+            reason = lines[-1].strip() if lines else f"status {status}"
+            raise OutputError(f"{path}: the film's encoder failed ({reason})")
+
+
+def _ffmpeg() -> str:
+    import imageio_ffmpeg
+
+    try:
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError as error:
+        raise OutputError(
+            "film: no ffmpeg was found; set IMAGEIO_FFMPEG_EXE to one, or reinstall imageio-ffmpeg"
+        ) from error
+
+
+def _reason(error: OSError) -> str:
+    return os.strerror(error.errno) if error.errno is not None else str(error)

@@ -1,0 +1,114 @@
+"""The camera: world metres, y up, to pixels, y down, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robocov.arrays import Array
+
+SMALLEST, LARGEST = 1e-4, 1e5
+"""Limits of the zoom in pixels per metre: 10 km on a page, or 10 µm a pixel."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What part of the world is shown where; immutable, so that a picture can be kept for it.
+
+    Attributes
+    ----------
+    center : (x, y), m
+        The point of the world in the middle of the view.
+    zoom : float, px/m
+    view : (left, top, width, height), px
+        The rectangle of the surface that shows the world.
+    """
+
+    center: tuple[float, float]
+    zoom: float
+    view: tuple[float, float, float, float]
+
+    @classmethod
+    def fit(
+        cls,
+        bounds: tuple[float, float, float, float],
+        view: tuple[float, float, float, float],
+        margin: float = 0.0,
+    ) -> Camera:
+        """Return the camera that shows `bounds` as large as possible.
+
+        Parameters
+        ----------
+        bounds : (smallest x, smallest y, largest x, largest y), m
+        view : (left, top, width, height), px
+        margin : float, px
+            Left free on each side.
+        """
+        low_x, low_y, high_x, high_y = bounds
+        width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
+        room_x, room_y = max(view[2] - 2 * margin, 1.0), max(view[3] - 2 * margin, 1.0)
+        zoom = min(max(min(room_x / width, room_y / height), SMALLEST), LARGEST)
+        return cls(((low_x + high_x) / 2, (low_y + high_y) / 2), zoom, view)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """The middle of the view in pixels."""
+        left, top, width, height = self.view
+        return left + width / 2, top + height / 2
+
+    def to_pixels(self, points: Array) -> Array:
+        """Return the pixels of (..., 2) points in metres."""
+        x, y = self.middle
+        scale = np.array([self.zoom, -self.zoom])
+        return np.asarray((points - np.array(self.center)) * scale + np.array([x, y]))
+
+    def to_world(self, pixels: Array) -> Array:
+        """Return the points in metres of (..., 2) pixels."""
+        x, y = self.middle
+        scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
+        return np.asarray((pixels - np.array([x, y])) * scale + np.array(self.center))
+
+    def zoomed(self, factor: float, at: tuple[float, float]) -> Camera:
+        """Return the camera that magnifies by `factor` and keeps what is under pixel `at` there."""
+        zoom = min(max(self.zoom * factor, SMALLEST), LARGEST)
+        (x, y), (middle_x, middle_y) = at, self.middle
+        shrink = 1.0 / self.zoom - 1.0 / zoom
+        center = (self.center[0] + (x - middle_x) * shrink, self.center[1] - (y - middle_y) * shrink)
+        return replace(self, center=center, zoom=zoom)
+
+    def panned(self, dx: float, dy: float) -> Camera:
+        """Return the camera after the world was dragged by (`dx`, `dy`) pixels."""
+        return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
+
+    def within(self, view: tuple[float, float, float, float]) -> Camera:
+        """Return the camera that shows the same middle at the same zoom in another rectangle."""
+        return replace(self, view=view)
+
+    def visible(self) -> tuple[float, float, float, float]:
+        """Return the bounds of what is shown, in metres."""
+        half_x, half_y = self.view[2] / 2 / self.zoom, self.view[3] / 2 / self.zoom
+        x, y = self.center
+        return x - half_x, y - half_y, x + half_x, y + half_y
+
+
+def round_length(at_most: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`.
+
+    >>> [round_length(x) for x in (0.7, 1.0, 3.9, 49.0)]
+    [0.5, 1.0, 2.0, 20.0]
+    """
+    power = float(10.0 ** np.floor(np.log10(at_most) + 1e-12))
+    step = max(s for s in (1.0, 2.0, 5.0) if s * power <= at_most * (1 + 1e-9))
+    return float(f"{step * power:.12g}")
+
+
+def length_label(metres: float) -> str:
+    """Return a length as people write it.
+
+    >>> [length_label(x) for x in (0.05, 0.5, 2.0, 5000.0)]
+    ['5 cm', '0.5 m', '2 m', '5 km']
+    """
+    if metres >= 1000:
+        return f"{metres / 1000:g} km"
+    return f"{metres * 100:g} cm" if metres < 0.1 else f"{metres:g} m"

@@ -1,0 +1,158 @@
+"""The canvas: a surface with a camera and a theme, and the few strokes that layers are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov_app.view import sprites
+from robocov_app.view.fonts import label, text_width
+from robocov_app.view.theme import Colour
+
+if TYPE_CHECKING:
+    from robocov.arrays import IntArray
+    from robocov_app.view.camera import Camera
+    from robocov_app.view.theme import Theme
+
+Pixel: TypeAlias = Sequence[float]
+"""x to the right and y down from the surface's corner."""
+
+Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
+"""Gives the sprite for a shift in quarters of a pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """Where layers draw.
+
+    Attributes
+    ----------
+    surface : pygame.Surface
+    camera : Camera
+    theme : Theme
+    scale : float
+        Widths and text sizes of the theme are multiplied by it: 2 on a screen of twice the density.
+    hues : (n,) int
+        Index of each robot's colour in the theme.
+    """
+
+    surface: pygame.Surface
+    camera: Camera
+    theme: Theme
+    scale: float
+    hues: IntArray
+
+    def width(self, pixels: float) -> int:
+        """Return a stroke's width of `pixels` at scale 1: whole pixels, at least one."""
+        return max(1, round(pixels * self.scale))
+
+    def text_size(self, pixels: float) -> int:
+        """Return a text size in whole pixels."""
+        return max(7, round(pixels * self.scale))
+
+    def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
+        """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
+        if len(corners) > 2:
+            pygame.draw.polygon(self.surface, fill, np.rint(_bounded(corners)).tolist())
+
+    def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
+        """Draw the smooth line through the (k, 2) px points."""
+        points = _bounded(corners).tolist()
+        if closed and points:
+            points.append(points[0])
+        for start, end in pairwise(points):
+            pygame.draw.aaline(self.surface, colour, start, end, width)
+        if width > 2:  # lines have straight ends: fill the corners' notches
+            for x, y in points:
+                pygame.draw.circle(self.surface, colour, (x, y), width / 2)
+
+    def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
+        """Draw a smooth line between two pixels."""
+        pygame.draw.aaline(self.surface, colour, start, end, width)
+
+    def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
+        """Draw a dashed smooth line."""
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        length = float(np.hypot(*(b - a)))
+        count = max(1, round(length / (2 * dash * self.scale)))
+        for k in range(count):
+            first, last = a + (b - a) * (k / count), a + (b - a) * ((k + 0.55) / count)
+            pygame.draw.aaline(self.surface, colour, first.tolist(), last.tolist(), width)
+
+    def circle(self, center: Pixel, radius: float, colour: Colour, dashed: bool = False) -> None:
+        """Draw a large circle's line, a pixel or so wide."""
+        sides = int(min(max(radius, 24), 240)) // 2 * 2
+        angle = np.arange(sides + 1) * (2 * np.pi / sides)
+        points = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        corners = _bounded(points).tolist()
+        width = self.width(1.0)
+        for k in range(0, sides, 2 if dashed else 1):
+            pygame.draw.aaline(self.surface, colour, corners[k], corners[k + 1], width)
+
+    def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: int, head: str = "full") -> None:
+        """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        length = float(np.hypot(*(b - a)))
+        if length < 1.0:
+            return
+        along = (b - a) / length
+        across = np.array([-along[1], along[0]])
+        size = min(3.2 * width + 2 * self.scale, length)
+        if head == "dot":
+            self.line(a.tolist(), b.tolist(), colour, width)
+            self.stamp(lambda shift: sprites.dot(1.4 * width, colour, shift), b.tolist())
+            return
+        left, right = b - size * along + 0.5 * size * across, b - size * along - 0.5 * size * across
+        if head == "open":
+            self.line(a.tolist(), b.tolist(), colour, width)
+            self.line(left.tolist(), b.tolist(), colour, width)
+            self.line(right.tolist(), b.tolist(), colour, width)
+            return
+        self.line(a.tolist(), (b - 0.8 * size * along).tolist(), colour, width)
+        triangle = np.array([left, b, right])
+        self.polygon(triangle, colour)
+        self.outline(triangle, colour)
+
+    def stamp(self, sprite: Sprite, center: Pixel) -> None:
+        """Put a sprite where it belongs to a quarter of a pixel."""
+        quarters_x, quarters_y = round(center[0] * sprites.FINE), round(center[1] * sprites.FINE)
+        (x, shift_x), (y, shift_y) = divmod(quarters_x, sprites.FINE), divmod(quarters_y, sprites.FINE)
+        picture = sprite((shift_x, shift_y))
+        half = picture.get_width() // 2
+        self.surface.blit(picture, (x - half, y - half), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def text(
+        self,
+        text: str,
+        at: Pixel,
+        *,
+        size: float | None = None,
+        colour: Colour | None = None,
+        bold: bool = False,
+        anchor: str = "left",
+    ) -> int:
+        """Write one line, its middle at the height of `at`; return its width in pixels.
+
+        `anchor` is ``left``, ``right`` or ``middle``: which part of the text is at `at`.
+        """
+        pixels = self.text_size(self.theme.text if size is None else size)
+        picture = label(text, pixels, colour or self.theme.ink, bold)
+        width, height = picture.get_size()
+        left = at[0] - {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
+        self.surface.blit(picture, (round(left), round(at[1] - height / 2)))
+        return width
+
+    def text_width(self, text: str, size: float | None = None, bold: bool = False) -> int:
+        """Return how wide `text` will be, in pixels."""
+        return text_width(text, self.text_size(self.theme.text if size is None else size), bold)
+
+
+def _bounded(points: Array) -> Array:
+    """Keep pixels within what the drawing routines' integers hold, far outside any surface."""
+    return np.clip(points, -20000.0, 20000.0)

@@ -1,0 +1,72 @@
+"""Text: DejaVu Sans, which comes with matplotlib (a bare Linux has no fonts), and rendered labels."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import lru_cache
+from pathlib import Path
+
+import pygame
+
+from robocov_app.view.theme import Colour
+
+
+@lru_cache(maxsize=2)
+def font_path(bold: bool = False) -> Path | None:
+    """Return the font's file, or None where matplotlib came without it: pygame's own font is used then.
+
+    matplotlib is located, not imported: importing it would take longer than everything else here.
+    """
+    spec = importlib.util.find_spec("matplotlib")
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        path = Path(folder) / "mpl-data" / "fonts" / "ttf" / name
+        if path.is_file():
+            return path
+    return None
+
+
+@lru_cache(maxsize=64)
+def _font(size: int, bold: bool) -> pygame.font.Font:
+    return pygame.font.Font(font_path(bold), size)
+
+
+@lru_cache(maxsize=4096)
+def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
+    """Return `text` as a transparent picture; kept, since rendering costs far more than blitting.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+    size : int, px
+        Height of the letters' box.
+    """
+    if not pygame.font.get_init():
+        pygame.font.init()
+        _font.cache_clear()
+    try:
+        return _font(size, bold).render(text, True, colour)
+    except pygame.error:
+        # the font module was shut down and started again in between: its fonts are dead
+        _font.cache_clear()
+        return _font(size, bold).render(text, True, colour)
+
+
+def text_width(text: str, size: int, bold: bool = False) -> int:
+    """Return the width of `text` in pixels."""
+    return label(text, size, (0, 0, 0), bold).get_width()
+
+
+def shortened(text: str, size: int, width: float) -> str:
+    """Return `text`, cut and ended with an ellipsis where it is wider than `width` pixels."""
+    if text_width(text, size) <= width:
+        return text
+    low, high = 0, len(text)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if text_width(text[:middle].rstrip() + "…", size) <= width:
+            low = middle
+        else:
+            high = middle - 1
+    return text[:low].rstrip() + "…" if low else ""

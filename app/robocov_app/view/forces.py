@@ -1,0 +1,229 @@
+"""Layers that explain a decision: force terms, velocities, goals, ranges, neighbours, what was sensed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov_app.view import sprites
+from robocov_app.view.canvas import Canvas
+from robocov_app.view.layers import Layer, LegendEntry, drawn_radii
+from robocov_app.view.scene import Scene
+from robocov_app.view.theme import Colour, mix
+
+FORCE_LENGTH = 46.0
+"""Longest arrow of a force in pixels at scale 1."""
+
+VELOCITY_LENGTH = 34.0
+"""Length of the arrow of a robot at its largest speed in pixels at scale 1."""
+
+_HEADS = {"attraction": "full", "repulsion_robots": "open", "repulsion_obstacle": "dot"}
+_WORDS = {
+    "attraction": "attraction",
+    "repulsion_robots": "repulsion from robots",
+    "repulsion_obstacle": "repulsion from obstacle",
+    "resultant": "resultant force",
+}
+
+
+def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width: int, head: str) -> None:
+    """Draw (n, 2) px arrows that begin at the edges of the discs; those below 3 px are left out."""
+    if scene.snapshot is None:
+        return
+    centers = canvas.camera.to_pixels(scene.snapshot.positions)
+    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
+    for center, vector, length, radius in zip(
+        centers, vectors, lengths, drawn_radii(canvas, scene), strict=True
+    ):
+        if length >= 3.0:
+            start = center + vector * (radius / length)
+            canvas.arrow(start.tolist(), (start + vector).tolist(), colour, width, head)
+
+
+class ForceTerm(Layer):
+    """One term of the controller's force as arrows, or their sum.
+
+    Lengths saturate, since repulsion grows without limit: a force that would give the largest
+    acceleration has 63 % of `FORCE_LENGTH`.
+    """
+
+    default = False
+
+    def __init__(self, term: str) -> None:
+        self.term = term
+        self.name = f"force_{term}"  # type: ignore[misc]
+        self.title = _WORDS.get(term, term.replace("_", " ")).capitalize()  # type: ignore[misc]
+
+    def _vectors(self, scene: Scene) -> Array | None:
+        if scene.snapshot is None:
+            return None
+        decision = scene.snapshot.decision
+        return decision.forces if self.term == "resultant" else decision.terms.get(self.term)
+
+    def _style(self, canvas: Canvas) -> tuple[Colour, int, str]:
+        wide = 3.0 if self.term == "resultant" else canvas.theme.arrow_line
+        colour = canvas.theme.forces.get(self.term, canvas.theme.other)
+        return colour, canvas.width(wide), _HEADS.get(self.term, "full")
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        forces = self._vectors(scene)
+        if forces is None:
+            return
+        size = np.hypot(forces[:, 0], forces[:, 1])
+        full = scene.team.mass * scene.team.max_acceleration
+        length = FORCE_LENGTH * canvas.scale * -np.expm1(-size / full)
+        with np.errstate(invalid="ignore"):
+            direction = np.where(size[:, None] > 0.0, forces / np.maximum(size, 1e-300)[:, None], 0.0)
+        vectors = np.nan_to_num(direction * length[:, None]) * np.array([1.0, -1.0])
+        _arrows(canvas, scene, vectors, *self._style(canvas))
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            half = 10 * canvas.scale
+            canvas.arrow((x - half, y), (x + half, y), *self._style(canvas))
+
+        return [LegendEntry(self.title.lower(), glyph)] if self._vectors(scene) is not None else []
+
+
+class Velocities(Layer):
+    """Velocities as arrows, in proportion to each robot's largest speed."""
+
+    name = "velocities"
+    title = "Velocities"
+    default = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None:
+            return
+        part = scene.snapshot.velocities / scene.team.max_speed[:, None]
+        vectors = part * np.array([1.0, -1.0]) * VELOCITY_LENGTH * canvas.scale
+        _arrows(canvas, scene, vectors, canvas.theme.velocity, canvas.width(1.6), "open")
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            half = 10 * canvas.scale
+            canvas.arrow((x - half, y), (x + half, y), canvas.theme.velocity, canvas.width(1.6), "open")
+
+        return [LegendEntry("velocity", glyph)] if scene.snapshot is not None else []
+
+
+class Goals(Layer):
+    """A times sign where each robot is drawn to, and a dashed line to it."""
+
+    name = "goals"
+    title = "Goals"
+    default = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None or scene.snapshot.decision.goals is None:
+            return
+        goals = canvas.camera.to_pixels(scene.snapshot.decision.goals)
+        centers = canvas.camera.to_pixels(scene.snapshot.positions)
+        for goal, center in zip(goals, centers, strict=True):
+            if np.isfinite(goal).all():
+                canvas.dashes(center.tolist(), goal.tolist(), canvas.theme.faint)
+                self._times(canvas, float(goal[0]), float(goal[1]))
+
+    @staticmethod
+    def _times(canvas: Canvas, x: float, y: float) -> None:
+        arm, width, theme = 5.5 * canvas.scale, 1.8 * canvas.scale, canvas.theme
+        canvas.stamp(
+            lambda shift: sprites.cross(arm, theme.final, theme.background, width, True, shift), (x, y)
+        )
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        known = scene.snapshot is not None and scene.snapshot.decision.goals is not None
+        return [LegendEntry("goal", self._times)] if known else []
+
+
+class Ranges(Layer):
+    """Circles of the sensor's range (full) or of communication (dashed); unlimited ones are not drawn."""
+
+    default = False
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self.name = kind  # type: ignore[misc]
+        self.title = f"{kind.capitalize()} range"  # type: ignore[misc]
+
+    def _of(self, scene: Scene) -> Array:
+        return scene.team.sensing_range if self.kind == "sensing" else scene.team.communication_range
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None:
+            return
+        centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
+        for center, reach, hue in zip(centers, self._of(scene).tolist(), canvas.hues.tolist(), strict=True):
+            if np.isfinite(reach):
+                colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
+                canvas.circle(center, reach * canvas.camera.zoom, colour, dashed=self.kind != "sensing")
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            canvas.circle((x, y), 6.5 * canvas.scale, canvas.theme.ink, dashed=self.kind != "sensing")
+
+        drawn = scene.snapshot is not None and bool(np.isfinite(self._of(scene)).any())
+        return [LegendEntry(self.title.lower(), glyph)] if drawn else []
+
+
+class Links(Layer):
+    """Lines between neighbours.
+
+    Where everybody hears everybody, those are drawn whose cells share an edge: the others change nothing.
+    """
+
+    name = "links"
+    title = "Neighbours"
+    default = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None:
+            return
+        neighbours = scene.snapshot.seen.neighbours
+        if neighbours.indptr is not None and neighbours.indices is not None:
+            first = np.repeat(np.arange(neighbours.count), np.diff(neighbours.indptr))
+            pairs = np.column_stack([first, neighbours.indices])
+            pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+        elif scene.adjacency is not None:
+            pairs = scene.adjacency
+        else:
+            return
+        colour = mix(canvas.theme.background, canvas.theme.final, 0.7)
+        ends = canvas.camera.to_pixels(scene.snapshot.positions)[pairs]
+        for start, end in ends.tolist():
+            canvas.line(start, end, colour, canvas.width(canvas.theme.line))
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            half = 9 * canvas.scale
+            colour = mix(canvas.theme.background, canvas.theme.final, 0.7)
+            canvas.line((x - half, y), (x + half, y), colour, canvas.width(canvas.theme.line))
+
+        return [LegendEntry("neighbours", glyph)] if scene.snapshot is not None else []
+
+
+class ObstaclePoints(Layer):
+    """The single nearest obstacle point that each robot senses, and a line to it."""
+
+    name = "obstacle_points"
+    title = "Nearest obstacle points"
+    default = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None:
+            return
+        points = canvas.camera.to_pixels(scene.snapshot.seen.obstacle_points)
+        centers = canvas.camera.to_pixels(scene.snapshot.positions)
+        for point, center in zip(points, centers, strict=True):
+            if np.isfinite(point).all():
+                colour = canvas.theme.forces["repulsion_obstacle"]
+                canvas.dashes(center.tolist(), point.tolist(), colour, dash=3.0)
+                self._dot(canvas, float(point[0]), float(point[1]))
+
+    @staticmethod
+    def _dot(canvas: Canvas, x: float, y: float) -> None:
+        colour, radius = canvas.theme.forces["repulsion_obstacle"], 3.0 * canvas.scale
+        canvas.stamp(lambda shift: sprites.dot(radius, colour, shift), (x, y))
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        return [LegendEntry("nearest obstacle point", self._dot)] if scene.snapshot is not None else []

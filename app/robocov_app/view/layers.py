@@ -1,0 +1,277 @@
+"""What is drawn of the world, one class a layer: map, cells, robots and where they went.
+
+`forces` has the layers that explain a decision, `furniture` the scale bar, status and legend.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pygame
+import shapely
+
+from robocov_app.view import sprites
+from robocov_app.view.camera import round_length
+from robocov_app.view.canvas import Canvas
+from robocov_app.view.scene import Scene
+from robocov_app.view.theme import mix
+
+READABLE = 9.0
+"""Least radius of a drawn robot in pixels at scale 1: a number can be read in it."""
+
+GRID_GAP = 34.0
+"""Least distance between the lines of the grid in pixels at scale 1."""
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """A line of the legend: its text and how its glyph is drawn at a pixel, within 22 x 14 px at scale 1."""
+
+    text: str
+    draw: Callable[[Canvas, float, float], None]
+
+
+class Layer(ABC):
+    """One thing that a picture can show.
+
+    Attributes
+    ----------
+    name : str
+        Identifies the layer.
+    title : str
+        For check boxes and the legend.
+    default : bool
+        Whether it is shown unless asked otherwise.
+    static : bool
+        It depends on map, camera and theme alone: it is drawn once and kept.
+    in_world : bool
+        It stays inside the view of the camera.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    default: ClassVar[bool] = True
+    static: ClassVar[bool] = False
+    in_world: ClassVar[bool] = True
+
+    @abstractmethod
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw what `scene` has of this layer."""
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:
+        """Return the entries of the legend that explain what this layer draws of `scene`."""
+        return []
+
+
+class Cells(Layer):
+    """The Voronoi cells, in the tint of their robots."""
+
+    name = "cells"
+    title = "Voronoi cells"
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.cells is None:
+            return
+        corners = [canvas.camera.to_pixels(cell) for cell in scene.cells]
+        for cell, hue in zip(corners, canvas.hues.tolist(), strict=True):
+            canvas.polygon(cell, canvas.theme.cell(hue))
+        width = canvas.width(canvas.theme.line)
+        for cell in corners:
+            if len(cell) > 2:
+                canvas.outline(cell, canvas.theme.cell_edge, width)
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            size = 11 * canvas.scale
+            box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
+            pygame.draw.rect(canvas.surface, canvas.theme.cell(0), box)
+            pygame.draw.rect(canvas.surface, canvas.theme.cell_edge, box, canvas.width(canvas.theme.line))
+
+        return [LegendEntry("Voronoi cell", glyph)] if scene.cells else []
+
+
+class Grid(Layer):
+    """Lines at round distances of metres."""
+
+    name = "grid"
+    title = "Grid"
+    static = True
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        step = grid_step(canvas.camera.zoom, canvas.scale)
+        low_x, low_y, high_x, high_y = scene.environment.region.bounds
+        seen_x, seen_y, end_x, end_y = canvas.camera.visible()
+        colour = _premultiplied(canvas.theme.grid, 0.5)
+        width = canvas.width(canvas.theme.line)
+        xs = np.arange(np.ceil(max(low_x, seen_x) / step), np.floor(min(high_x, end_x) / step) + 1) * step
+        ys = np.arange(np.ceil(max(low_y, seen_y) / step), np.floor(min(high_y, end_y) / step) + 1) * step
+        left, top = canvas.camera.to_pixels(np.array([low_x, high_y])).tolist()
+        right, bottom = canvas.camera.to_pixels(np.array([high_x, low_y])).tolist()
+        clip = canvas.surface.get_clip()
+        for x in canvas.camera.to_pixels(np.column_stack([xs, np.zeros_like(xs)]))[:, 0]:
+            line = pygame.Rect(round(x - width / 2), round(top), width, round(bottom - top))
+            canvas.surface.fill(colour, line.clip(clip))
+        for y in canvas.camera.to_pixels(np.column_stack([np.zeros_like(ys), ys]))[:, 1]:
+            line = pygame.Rect(round(left), round(y - width / 2), round(right - left), width)
+            canvas.surface.fill(colour, line.clip(clip))
+
+
+def grid_step(zoom: float, scale: float) -> float:
+    """Return the distance of the grid's lines in metres: the least round one that leaves `GRID_GAP`."""
+    least = GRID_GAP * scale / zoom
+    below = round_length(least)
+    return below if below >= least else round_length(2.5001 * below)
+
+
+class Obstacles(Layer):
+    """Obstacles, and what of the robots' convex region lies outside the boundary: they know neither."""
+
+    name = "obstacles"
+    title = "Obstacles"
+    static = True
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        # courtyards are cut out of a page of their own, so that what lies below shows in them
+        page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+        page.set_clip(canvas.surface.get_clip())
+        own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
+        parts = sorted(scene.environment.blocked.geoms, key=lambda part: -shapely.Polygon(part.exterior).area)
+        rings = []
+        for part in parts:
+            outer = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+            own.polygon(outer, (*canvas.theme.obstacle, 255))
+            rings.append(outer)
+            for hole in part.interiors:
+                inner = canvas.camera.to_pixels(np.asarray(hole.coords)[:-1])
+                own.polygon(inner, (0, 0, 0, 0))
+                rings.append(inner)
+        for corners in rings:
+            own.outline(corners, canvas.theme.obstacle_edge, canvas.width(canvas.theme.line))
+        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            size = 11 * canvas.scale
+            box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
+            pygame.draw.rect(canvas.surface, canvas.theme.obstacle, box)
+            pygame.draw.rect(canvas.surface, canvas.theme.obstacle_edge, box, canvas.width(1.0))
+
+        found = not scene.environment.blocked.is_empty
+        return [LegendEntry("obstacle (unknown to robots)", glyph)] if found else []
+
+
+class Boundary(Layer):
+    """The outline of the convex region, all that robots know of the map."""
+
+    name = "boundary"
+    title = "Boundary"
+    static = True
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        corners = canvas.camera.to_pixels(scene.environment.region.vertices)
+        canvas.outline(corners, canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))
+
+
+class Starts(Layer):
+    """Green rings where the robots began."""
+
+    name = "starts"
+    title = "Starts"
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.starts is None:
+            return
+        for center in canvas.camera.to_pixels(scene.starts).tolist():
+            self._ring(canvas, center[0], center[1])
+
+    @staticmethod
+    def _ring(canvas: Canvas, x: float, y: float) -> None:
+        radius, width = 4.5 * canvas.scale, 1.6 * canvas.scale
+        colour = canvas.theme.start
+        canvas.stamp(lambda shift: sprites.ring(radius, colour, width, shift), (x, y))
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        return [LegendEntry("start", self._ring)] if scene.starts is not None else []
+
+
+class Centroids(Layer):
+    """A plus at the centroid of each cell, where the laws of the paper are drawn to."""
+
+    name = "centroids"
+    title = "Centroids"
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.centroids is None:
+            return
+        for center in canvas.camera.to_pixels(scene.centroids).tolist():
+            self._plus(canvas, center[0], center[1])
+
+    @staticmethod
+    def _plus(canvas: Canvas, x: float, y: float) -> None:
+        arm, width, theme = 5.5 * canvas.scale, 1.3 * canvas.scale, canvas.theme
+        canvas.stamp(
+            lambda shift: sprites.cross(arm, theme.ink, theme.background, width, False, shift), (x, y)
+        )
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        return [LegendEntry("cell centroid", self._plus)] if scene.centroids is not None else []
+
+
+class Robots(Layer):
+    """The robots: discs of their true size, or as small as can be read, each with its number."""
+
+    name = "robots"
+    title = "Robots"
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+        if scene.snapshot is None:
+            return
+        radii = drawn_radii(canvas, scene)
+        ring = 1.6 * canvas.scale
+        edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
+        centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
+        for robot, (center, hue, radius) in enumerate(
+            zip(centers, canvas.hues.tolist(), radii, strict=True), start=1
+        ):
+            fill = canvas.theme.robots[hue]
+            text = str(robot) if radius >= 6.5 * canvas.scale else ""
+            canvas.stamp(
+                lambda shift, radius=radius, fill=fill, text=text: sprites.disc(  # type: ignore[misc]
+                    radius, fill, canvas.theme.robot_ring, ring, edge, text, shift
+                ),
+                center,
+            )
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            theme, scale = canvas.theme, canvas.scale
+            edge = mix(theme.background, theme.ink, 0.55)
+            canvas.stamp(
+                lambda shift: sprites.disc(
+                    6.5 * scale, theme.robots[0], theme.robot_ring, 1.4 * scale, edge, "", shift
+                ),
+                (x, y),
+            )
+
+        return [LegendEntry("robot", glyph)] if scene.snapshot is not None else []
+
+
+def drawn_radii(canvas: Canvas, scene: Scene) -> list[float]:
+    """Return the radius in pixels at which each robot is drawn, in steps of half a pixel.
+
+    True to scale, but not below what can be read; in a dense crowd that least size shrinks.
+    """
+    area = scene.environment.region.area * canvas.camera.zoom**2
+    crowd = 0.3 * float(np.sqrt(area / len(scene.team)))
+    least = min(max(crowd, 3.0 * canvas.scale), READABLE * canvas.scale)
+    radii = np.maximum(scene.team.radius * canvas.camera.zoom, least)
+    return [float(radius) for radius in np.round(np.minimum(radii, 400.0) * 2) / 2]
+
+
+def _premultiplied(colour: tuple[int, int, int], alpha: float) -> tuple[int, int, int, int]:
+    red, green, blue = (round(c * alpha) for c in colour)
+    return red, green, blue, round(255 * alpha)

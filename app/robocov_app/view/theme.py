@@ -1,0 +1,269 @@
+"""Colours, line widths and text sizes, shared by the window, the films and the plots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from robocov.errors import ParameterError, unknown_name
+
+if TYPE_CHECKING:
+    from robocov.arrays import IntArray
+
+Colour: TypeAlias = tuple[int, int, int]
+"""Red, green, blue, 0 to 255."""
+
+ONE_HUE_EACH = 9
+"""Up to so many robots each have a hue of their own; no eye tells more hues apart."""
+
+MAP_COLOURS = 6
+"""Hues for larger teams, where only cells that share an edge must differ."""
+
+
+def rgb(code: str) -> Colour:
+    """Return the colour that is written as ``RRGGBB``.
+
+    >>> rgb("88CCEE")
+    (136, 204, 238)
+    """
+    return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
+
+
+def mix(first: Colour, second: Colour, part: float) -> Colour:
+    """Return `first` with `part` (0 to 1) of `second` mixed in.
+
+    >>> mix((0, 0, 0), (200, 100, 50), 0.5)
+    (100, 50, 25)
+    """
+    red, green, blue = (round(a + (b - a) * part) for a, b in zip(first, second, strict=True))
+    return red, green, blue
+
+
+def luminance(colour: Colour) -> float:
+    """Return the relative luminance of WCAG 2, 0 for black to 1 for white."""
+    channels = [c / 255 for c in colour]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(first: Colour, second: Colour) -> float:
+    """Return the contrast ratio of WCAG 2, 1 (none) to 21 (black on white)."""
+    low, high = sorted([luminance(first), luminance(second)])
+    return (high + 0.05) / (low + 0.05)
+
+
+def readable_on(colour: Colour) -> Colour:
+    """Return near-black or white, whichever is read better on `colour`."""
+    dark, light = (22, 27, 34), (255, 255, 255)
+    return light if contrast(colour, light) >= contrast(colour, dark) else dark
+
+
+# Paul Tol's "muted" scheme: nine hues that colour-blind readers tell apart. The first six lie
+# farthest from each other and serve as map colours.
+_MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "AA4499", "999933", "117733", "882255", "332288")
+
+
+@dataclass(frozen=True)
+class Theme:
+    """One look. Widths and text sizes are pixels at scale 1.
+
+    Attributes
+    ----------
+    background, ink, faint : Colour
+        The page, its text, and text or marks of lesser weight.
+    grid, boundary, obstacle, obstacle_edge, cell_edge : Colour
+    start, final, trajectory : Colour
+        The paper's green, blue and red.
+    controllers : dict of name to Colour
+        Colours of cost curves: the paper's blue for RAPF and red for RPF.
+    other : Colour
+        Curves of controllers that have no colour of their own.
+    forces : dict of term name to Colour
+    robots : nine colours
+        One for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one.
+    tint : float
+        How much of a robot's colour its cell takes on.
+    """
+
+    name: str
+    background: Colour
+    panel: Colour
+    ink: Colour
+    faint: Colour
+    grid: Colour
+    boundary: Colour
+    obstacle: Colour
+    obstacle_edge: Colour
+    cell_edge: Colour
+    robot_ring: Colour
+    start: Colour
+    final: Colour
+    trajectory: Colour
+    velocity: Colour
+    controllers: dict[str, Colour]
+    other: Colour
+    forces: dict[str, Colour]
+    robots: tuple[Colour, ...]
+    tint: float
+    text: float = 12.0
+    small_text: float = 11.0
+    line: float = 1.0
+    trajectory_line: float = 1.6
+    boundary_line: float = 2.0
+    arrow_line: float = 2.0
+
+    def cell(self, hue: int) -> Colour:
+        """Return the fill of a cell of the hue with index `hue`."""
+        return mix(self.background, self.robots[hue], self.tint)
+
+    def controller(self, name: str) -> Colour:
+        """Return the colour of a controller's curves and labels."""
+        return self.controllers.get(name, self.other)
+
+
+LIGHT = Theme(
+    name="light",
+    background=rgb("FFFFFF"),
+    panel=rgb("F4F6FA"),
+    ink=rgb("1B2330"),
+    faint=rgb("5A6678"),
+    grid=rgb("C3CCD8"),
+    boundary=rgb("414D60"),
+    obstacle=rgb("8C95A5"),
+    obstacle_edge=rgb("5B6576"),
+    cell_edge=rgb("66738A"),
+    robot_ring=rgb("FFFFFF"),
+    start=rgb("1E9E36"),
+    final=rgb("1F5FE0"),
+    trajectory=rgb("D62222"),
+    velocity=rgb("1F5FE0"),
+    controllers={
+        "rapf": rgb("1F5FE0"),
+        "rpf": rgb("D62222"),
+        "lloyd": rgb("118038"),
+    },
+    other=rgb("8A3FA8"),
+    forces={
+        "attraction": rgb("0B7A6F"),
+        "repulsion_robots": rgb("D9480F"),
+        "repulsion_obstacle": rgb("A81E62"),
+        "resultant": rgb("1B2330"),
+    },
+    robots=tuple(rgb(code) for code in _MUTED),
+    tint=0.25,
+)
+
+DARK = Theme(
+    name="dark",
+    background=rgb("13181F"),
+    panel=rgb("1B212B"),
+    ink=rgb("E8ECF2"),
+    faint=rgb("9AA6B8"),
+    grid=rgb("4A5566"),
+    boundary=rgb("A3AEC0"),
+    obstacle=rgb("485366"),
+    obstacle_edge=rgb("8793A6"),
+    cell_edge=rgb("7A879B"),
+    robot_ring=rgb("FFFFFF"),
+    start=rgb("46D160"),
+    final=rgb("5B9BFF"),
+    trajectory=rgb("FF6B63"),
+    velocity=rgb("5B9BFF"),
+    controllers={
+        "rapf": rgb("5B9BFF"),
+        "rpf": rgb("FF6B63"),
+        "lloyd": rgb("46C46A"),
+    },
+    other=rgb("CF8BE8"),
+    forces={
+        "attraction": rgb("2DD4BF"),
+        "repulsion_robots": rgb("FF9354"),
+        "repulsion_obstacle": rgb("FF7AB6"),
+        "resultant": rgb("FFFFFF"),
+    },
+    # the darkest three would sink into the background
+    robots=tuple(
+        mix(rgb(code), (255, 255, 255), 0.38 if luminance(rgb(code)) < 0.16 else 0.0) for code in _MUTED
+    ),
+    tint=0.26,
+)
+
+THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
+
+
+def theme_named(name: str) -> Theme:
+    """Return the theme called `name`.
+
+    Raises
+    ------
+    ParameterError
+        When there is none of that name.
+    """
+    if name not in THEMES:
+        raise ParameterError(unknown_name("theme", name, THEMES))
+    return THEMES[name]
+
+
+def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | None = None) -> IntArray:
+    """Return for each robot the index of its colour in `Theme.robots`.
+
+    Up to `ONE_HUE_EACH` robots have one each. In larger teams hue identifies nobody; then cells that
+    share an edge differ, and the robots carry numbers.
+
+    Parameters
+    ----------
+    n : int
+    adjacency : (m, 2) int or None
+        Pairs of robots whose cells share an edge; None when not known: hues then repeat in turn.
+    previous : (n,) int or None
+        The colours of the frame before. They stay, but for cells that now conflict.
+
+    Returns
+    -------
+    (n,) int
+    """
+    if n <= ONE_HUE_EACH:
+        return np.arange(n, dtype=np.intp)
+    if adjacency is None:
+        return previous if previous is not None and len(previous) == n else np.arange(n, dtype=np.intp) % 6
+    neighbours: list[list[int]] = [[] for _ in range(n)]
+    for first, second in adjacency.tolist():
+        neighbours[first].append(second)
+        neighbours[second].append(first)
+    if previous is None or len(previous) != n:
+        return np.array(_dsatur(neighbours), dtype=np.intp)
+    hues = previous.tolist()
+    for robot in range(n):
+        if any(hues[other] == hues[robot] for other in neighbours[robot] if other < robot):
+            taken = {hues[other] for other in neighbours[robot]}
+            free = [hue for hue in range(MAP_COLOURS) if hue not in taken]
+            if not free:
+                return np.array(_dsatur(neighbours), dtype=np.intp)
+            hues[robot] = free[robot % len(free)]
+    return np.array(hues, dtype=np.intp)
+
+
+def _dsatur(neighbours: list[list[int]]) -> list[int]:
+    """Colour a graph: always the vertex whose neighbours show most colours, then of most neighbours.
+
+    Among the allowed colours the one used least so far is taken, so that all are used alike.
+    A vertex whose neighbours show every colour (which planar graphs of cells practically never
+    have) takes the colour that fewest of them show.
+    """
+    n = len(neighbours)
+    hues = [-1] * n
+    uses = [0] * MAP_COLOURS
+    seen: list[set[int]] = [set() for _ in range(n)]
+    left = set(range(n))
+    while left:
+        vertex = max(left, key=lambda v: (len(seen[v]), len(neighbours[v]), -v))
+        left.remove(vertex)
+        around = [hues[other] for other in neighbours[vertex]]
+        hue = min(range(MAP_COLOURS), key=lambda h: (around.count(h), uses[h], h))
+        hues[vertex] = hue
+        uses[hue] += 1
+        for other in neighbours[vertex]:
+            seen[other].add(hue)
+    return hues
