@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
 
 REGION = -1
 """What lies beyond an edge of a cell that is a piece of the region's boundary."""
@@ -37,11 +38,11 @@ class CellEdges:
 
         Edges of no length are left out; an empty cell is a (0, 2) array.
         """
-        vertices = self.start + generators[self.cell]
-        long = (self.start != self.end).any(axis=1)
-        last = np.cumsum(np.bincount(self.cell[long], minlength=len(generators)))
-        vertices, stops = vertices[long], last.tolist()
-        return [vertices[start:stop] for start, stop in zip([0, *stops[:-1]], stops, strict=True)]
+        long = self._long()
+        cell = self.cell[long]
+        vertices = self.start[long] + generators[cell]
+        stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
+        return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
     def polar_moment(self, count: int) -> Array:
         """Return J_{V,p}, the polar moment of each of `count` cells about its generator, (n,) m⁴.
@@ -55,6 +56,11 @@ class CellEdges:
 
     def adjacency(self) -> IntArray:
         """Return the pairs (i, j), i < j, of cells with an edge between them, (m, 2), ascending."""
-        between = (self.beyond != REGION) & (self.start != self.end).any(axis=1)
+        between = (self.beyond != REGION) & self._long()
         pairs = np.column_stack([self.cell[between], self.beyond[between]])
         return np.unique(np.sort(pairs, axis=1), axis=0).astype(np.intp, copy=False).reshape(-1, 2)
+
+    def _long(self) -> BoolArray:
+        """Return which edges have a length: more than rounding makes of a point so far from the generator."""
+        (x, y), (u, v) = self.start.T, self.end.T
+        return np.asarray(np.hypot(u - x, v - y) > 1e-12 * (np.hypot(x, y) + np.hypot(u, v)))

@@ -86,7 +86,7 @@ def mass_and_centroid(cells: list[ClippedCell], generators: Array) -> tuple[Arra
         else:
             mass.append(0.0)
             offset.append((0.0, 0.0))
-    return np.array(mass), generators + offset
+    return np.array(mass), generators + np.array(offset).reshape(-1, 2)
 
 
 def edges_of(cells: list[ClippedCell]) -> CellEdges:
@@ -94,10 +94,10 @@ def edges_of(cells: list[ClippedCell]) -> CellEdges:
     x = np.array(list(chain.from_iterable(cell.x for cell in cells)))
     y = np.array(list(chain.from_iterable(cell.y for cell in cells)))
     start = np.column_stack([x, y])
-    counts = [len(cell.x) for cell in cells]
+    counts = np.array([len(cell.x) for cell in cells], dtype=np.intp)
     following = np.arange(1, len(start) + 1)
     last = np.cumsum(counts)
-    filled = np.array(counts) > 0
+    filled = counts > 0
     following[last[filled] - 1] = (last - counts)[filled]
     return CellEdges(
         start=start,

@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, IntArray
 from robocov.cell_edges import CellEdges
 from robocov.clipped_cells import clip_cells, edges_of, mass_and_centroid
+from robocov.delaunay_cells import delaunay_cells
 from robocov.errors import InputError, shown
 from robocov.observation import Neighbours
 from robocov.region import Region
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+_TRIANGULATE_FROM = 6
+"""Size of team from which triangulating all at once beats clipping one cell after the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +101,27 @@ def partition(generators: Array, region: Region, neighbours: Neighbours | None =
     >>> halves.adjacency
     array([[0, 1]])
     """
-    points = np.array(generators, dtype=np.float64)
+    points = np.array(generators, dtype=np.float64, order="C")
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"generators: an array of shape {points.shape}, but (n, 2) was wanted")
-    if not np.isfinite(points).all():
-        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
-    points.setflags(write=False)
+    if len(points) >= _TRIANGULATE_FROM and (neighbours is None or neighbours.complete):
+        cells = delaunay_cells(points, region)
+        if cells is not None:
+            find_edges = partial(cells.edges, points)
+            return VoronoiPartition(_fixed(points), _fixed(cells.mass), _fixed(cells.centroid), find_edges)
     return _clipped(points, region, neighbours if neighbours is not None else Neighbours(len(points)))
 
 
 def _clipped(points: Array, region: Region, neighbours: Neighbours) -> VoronoiPartition:
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        bad = int(np.argmin(finite))
+        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
     cells = clip_cells(points, region, neighbours)
     mass, centroid = mass_and_centroid(cells, points)
-    return VoronoiPartition(points, frozen(mass), frozen(centroid), partial(edges_of, cells))
+    return VoronoiPartition(_fixed(points), _fixed(mass), _fixed(centroid), partial(edges_of, cells))
+
+
+def _fixed(values: Array) -> Array:
+    values.setflags(write=False)
+    return values
