@@ -115,7 +115,7 @@ class Record:
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
         with written(folder / "record.npz") as part, part.open("wb") as file:
-            np.savez_compressed(file, **arrays)
+            np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
         with written(folder / "run.json") as part:
             text = json.dumps(self.to_json(summary), indent=1, allow_nan=False)
             part.write_text(text + "\n", encoding="utf-8")
@@ -149,7 +149,9 @@ class Record:
                 **arrays,
             )
         except FileNotFoundError as error:
-            raise InputError(f"{folder}: not the folder of a run (there is no {Path(error.filename).name})") from error
+            raise InputError(
+                f"{folder}: not the folder of a run (there is no {Path(error.filename).name})"
+            ) from error
         except InputError:
             raise
         except Exception as error:
@@ -157,7 +159,9 @@ class Record:
         shape = (len(record.time), len(record.team), 2)
         for name in ARRAYS[1:]:
             if arrays[name].shape != shape:
-                raise InputError(f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted")
+                raise InputError(
+                    f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted"
+                )
         return record
 
 

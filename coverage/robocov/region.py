@@ -95,4 +95,4 @@ def _without_collinear(ring: Array) -> Array:
     after = np.roll(ring, -1, axis=0) - ring
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     size = np.hypot(*before.T) * np.hypot(*after.T)
-    return ring[cross > 1e-9 * size]
+    return np.asarray(ring[cross > 1e-9 * size])

@@ -105,7 +105,9 @@ def make_controller(name: str, gains: Mapping[str, object] | None = None) -> Con
 def _kind_in_file(name: str) -> type[Any]:
     file, _, class_name = name.rpartition(":")
     if not class_name or not file.endswith(".py"):
-        raise ParameterError(f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted")
+        raise ParameterError(
+            f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted"
+        )
     path = Path(file).resolve()
     if not path.is_file():
         raise ParameterError(f"controller {shown(name)}: there is no file {file}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
     from robocov.observation import Decision, Observations
@@ -16,21 +16,24 @@ class Controller(Protocol):
 
     Row i of a decision may depend only on what robot i knows (see `robocov.observation`).
     Whatever the robots remember goes through `Decision.memory`; a run can therefore be copied,
-    rewound and branched.
-
-    Attributes
-    ----------
-    name : str
-        As it is given on the command line.
-    label : str
-        As it is shown to people: "RAPF".
-    summary : str
-        One line.
+    rewound and branched. A class that states `name`, `label` and `summary` as class variables
+    satisfies the protocol.
     """
 
-    name: ClassVar[str]
-    label: ClassVar[str]
-    summary: ClassVar[str]
+    @property
+    def name(self) -> str:
+        """As it is given on the command line."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """As it is shown to people."""
+        ...
+
+    @property
+    def summary(self) -> str:
+        """One line."""
+        ...
 
     def begin(self, region: Region, team: Team) -> Any:
         """Return what the robots remember before the first decision."""

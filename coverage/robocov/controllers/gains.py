@@ -54,7 +54,13 @@ class Gain:
 
 
 def gain(
-    default: float | None, unit: str, meaning: str, *, low: float = 0.0, high: float = 1e6, optional: bool = False
+    default: float | None,
+    unit: str,
+    meaning: str,
+    *,
+    low: float = 0.0,
+    high: float = 1e6,
+    optional: bool = False,
 ) -> Any:
     """Declare a gain as a dataclass field.
 

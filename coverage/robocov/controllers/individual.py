@@ -48,7 +48,7 @@ class OwnView:
     @property
     def centroid(self) -> Array:
         """Centroid of the robot's Voronoi cell, (2,) m."""
-        return self._cells.centroid[self.number]
+        return np.asarray(self._cells.centroid[self.number])
 
     @property
     def cell(self) -> Array:

@@ -28,7 +28,9 @@ class Lloyd:
     summary: ClassVar[str] = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
 
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
-    response_time: float = gain(0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0)
+    response_time: float = gain(
+        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
+    )
 
     def __post_init__(self) -> None:
         validate_gains(self)
@@ -47,4 +49,6 @@ class Lloyd:
         wanted = offset * speed_per_metre[:, None]
         drive = (wanted - seen.velocities) * (team.mass / self.response_time)[:, None]
         forces = drive + seen.velocities * team.viscosity[:, None]
-        return Decision(forces=forces, goals=cells.centroid, terms={"attraction": forces}, cells=cells, memory=team)
+        return Decision(
+            forces=forces, goals=cells.centroid, terms={"attraction": forces}, cells=cells, memory=team
+        )

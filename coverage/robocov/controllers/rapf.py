@@ -28,7 +28,9 @@ class Rapf:
 
     name: ClassVar[str] = "rapf"
     label: ClassVar[str] = "RAPF"
-    summary: ClassVar[str] = "the paper's law: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
+    summary: ClassVar[str] = (
+        "the paper's law: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
+    )
 
     k_rep: float = gain(0.1, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(2.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)

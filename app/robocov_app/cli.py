@@ -1,0 +1,109 @@
+"""The command `robocov`: finds the subcommand, and turns errors into one line and an exit status.
+
+Each command lives in a module of `robocov_app.commands` with one function `command`. Its options
+are the function's signature or, where there are many, a dataclass `Arguments` that it takes. Only
+the module of the command that is called gets imported: asking for help must not pay for plotting.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from difflib import get_close_matches
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+COMMANDS = {
+    # name: (module, one line)
+    "run": ("run", "one headless run, everything saved in a folder: record, cost, pictures, film"),
+    "compare": ("compare", "several controllers from the same starts, side by side"),
+    "check": ("check", "validate maps; area, free area, components, narrowest gap"),
+    "maps": ("maps", "list the bundled maps"),
+    "controllers": ("controllers", "list the controllers and their gains"),
+    "cost": ("cost", "the exact coverage cost (22) of given positions"),
+    "import": ("import_map", "turn a foreign map file into a map JSON"),
+    "schema": ("schema", "print the JSON Schema of map files"),
+}
+
+_EXAMPLES = (
+    ("robocov run rooms --video --out first-run", "six robots cover four rooms; pictures and a film"),
+    ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
+    ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),
+)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run `robocov` with the given arguments and return its exit status."""
+    given = sys.argv[1:] if arguments is None else arguments
+    if not given or given[0] in ("-h", "--help", "help"):
+        print(_overview())
+        return OK if given else BAD_INPUT
+    if given[0] == "--version":
+        from robocov import __version__
+
+        print(f"robocov {__version__}")
+        return OK
+    name, rest = given[0], given[1:]
+    if name not in COMMANDS:
+        near = get_close_matches(name, COMMANDS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(COMMANDS)}"
+        return _complain(f"unknown command {name!r}: {hint}")
+    return _guarded(name, rest)
+
+
+def _guarded(name: str, rest: list[str]) -> int:
+    """Call the command; every way to end is an exit status."""
+    from robocov.errors import RobocovError
+
+    try:
+        # pygame greets on stdout, which belongs to answers
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
+        import tyro
+
+        options = {"prog": f"robocov {name}", "args": rest, "config": (tyro.conf.FlagCreatePairsOff,)}
+        if hasattr(module, "Arguments"):
+            status = module.command(tyro.cli(module.Arguments, **options))
+        else:
+            status = tyro.cli(module.command, **options)
+        sys.stdout.flush()
+    except RobocovError as error:
+        return _complain(str(error))
+    except KeyboardInterrupt:
+        print("robocov: stopped", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # the reader (head, say) has had enough; keep the interpreter from complaining at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    except SystemExit as ending:
+        return ending.code if isinstance(ending.code, int) else BAD_INPUT
+    except Exception:
+        traceback.print_exc()
+        print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
+        return FAILED
+    return int(status or OK)
+
+
+def _complain(message: str) -> int:
+    print(f"robocov: error: {message}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _overview() -> str:
+    width = max(map(len, COMMANDS))
+    commands = "\n".join(f"  {name:<{width}}  {line}" for name, (_, line) in COMMANDS.items())
+    examples = "\n".join(f"  {call}\n      {line}" for call, line in _EXAMPLES)
+    return (
+        "usage: robocov COMMAND [options]\n\n"
+        "Multi-robot coverage control among unknown obstacles.\n\n"
+        f"commands:\n{commands}\n\n"
+        f"examples:\n{examples}\n\n"
+        "robocov COMMAND -h explains a command; robocov --version"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

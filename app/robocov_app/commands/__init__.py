@@ -1,0 +1,1 @@
+"""The subcommands of `robocov`: parse, call, print; the work is done elsewhere."""

@@ -1,0 +1,92 @@
+"""`robocov compare`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocov.controllers import make_controller
+from robocov.cost import CoverageCost
+from robocov.errors import ParameterError
+from robocov.mapfile import load_map
+from robocov_app.compare import gains_for, rows_of, save_comparison, save_comparison_moving
+from robocov_app.console import console
+from robocov_app.interruption import Interruption
+from robocov_app.options import RunOptions, parsed_gains
+from robocov_app.output import finite, prepared
+from robocov_app.run import Run, evaluated, save_numbers, simulated, starts_of, team_of
+
+INTERRUPTED = 130
+
+
+@dataclass
+class Arguments(RunOptions):
+    """Several controllers from the same starts, under the same limits.
+
+    The folder holds a run's folder for each controller, trajectories and cost curves side by side
+    as PNG and SVG, comparison.csv and comparison.json, and on request frames and a film.
+    --set k_rep=1 goes to every controller with such a gain, --set rapf.k_rep=1 to one.
+
+    Example: robocov compare office --controllers rapf rpf lloyd --video --out office
+    """
+
+    controllers: tuple[str, ...] = ("rapf", "rpf", "lloyd")
+    """Controllers by name, or mine.py:MyController."""
+
+
+def command(options: Arguments) -> int:
+    """Run every controller, then draw them together."""
+    names = options.controllers
+    if not names:
+        raise ParameterError("--controllers: none given, but at least one was wanted")
+    if len(set(names)) < len(names):
+        raise ParameterError(f"--controllers: {' '.join(names)}: each once was wanted")
+    gains = gains_for(names, parsed_gains(options.gains))
+    environment = load_map(options.map)
+    # everything that the user gave is checked before a folder is made
+    folders = [make_controller(name, chosen).name for name, chosen in zip(names, gains, strict=True)]
+    starts_of(environment, options)
+    team_of(options)
+    out = prepared(options.out or Path(f"{Path(options.map).stem}-comparison"), overwrite=options.overwrite)
+    cost = CoverageCost(environment, lattice=options.lattice)
+    runs: dict[str, Run] = {}
+    with Interruption() as stop:
+        for name, chosen, folder in zip(names, gains, folders, strict=True):
+            run = evaluated(simulated(environment, name, chosen, options, stop), cost, quiet=options.json)
+            save_numbers(run, prepared(out / folder, overwrite=True))
+            runs[folder] = run
+            if stop.requested:
+                break
+        save_comparison(runs, out, options)
+        save_comparison_moving(runs, out, options, stop)
+    if options.json:
+        print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, "runs": rows_of(runs)})))
+    else:
+        print_table(runs)
+        done = "stopped; what was done is in" if stop.requested else "saved in"
+        print(f"{done} {out}/: {', '.join(sorted(path.name for path in out.iterdir()))}")
+    return INTERRUPTED if stop.requested else 0
+
+
+def print_table(runs: dict[str, Run]) -> None:
+    """Print the comparison for people."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", style="bold", no_wrap=True)
+    for title in ("mean distance", "above best", "cost", "settled", "contacts", "clearance", "path"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in rows_of(runs):
+        settled = row["settled_at_s"]
+        table.add_row(
+            row["label"],
+            f"{row['mean_distance_m']:.3f} m",
+            f"{row['above_best']:.1%}",
+            f"{row['cost_m3']:.2f} m³",
+            "not yet" if settled is None else f"{settled:.1f} s",
+            str(row["contacts"]),
+            f"{row['min_clearance_m']:.3f} m",
+            f"{row['mean_path_length_m']:.2f} m",
+        )
+    console().print(table)

@@ -1,0 +1,61 @@
+"""`robocov controllers`."""
+
+from __future__ import annotations
+
+import json as jsonlib
+
+from robocov.controllers import FLAGSHIP, controller_kinds, gains_of
+from robocov_app.console import console
+
+
+def command(json: bool = False) -> None:
+    """List the controllers: one line each, and their gains with units, defaults and ranges.
+
+    Example: robocov controllers --json
+
+    Args:
+        json: Print one JSON object; the recommended controller has "flagship": true.
+    """
+    kinds = controller_kinds()
+    if json:
+        rows = [
+            {
+                "name": name,
+                "label": getattr(kind, "label", name),
+                "summary": getattr(kind, "summary", ""),
+                "flagship": name == FLAGSHIP,
+                "gains": [
+                    {
+                        "name": gain.name,
+                        "default": gain.default,
+                        "unit": gain.unit,
+                        "low": gain.low,
+                        "high": gain.high,
+                        "nullable": gain.optional,
+                        "meaning": gain.meaning,
+                    }
+                    for gain in gains_of(kind).values()
+                ],
+            }
+            for name, kind in kinds.items()
+        ]
+        print(jsonlib.dumps({"controllers": rows}, indent=1))
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    for name, kind in kinds.items():
+        mark = "   (recommended)" if name == FLAGSHIP else ""
+        out.print(Text.assemble((name, "bold"), f"   {getattr(kind, 'label', name)}{mark}"))
+        out.print(Text(f"  {getattr(kind, 'summary', '')}"))
+        table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+        for gain in gains_of(kind).values():
+            default = "null" if gain.default is None else f"{gain.default:g}"
+            also = ", or null" if gain.optional else ""
+            value = f"{default} {gain.unit}"
+            table.add_row("   ", gain.name, value, f"{gain.low:g} to {gain.high:g}{also}", gain.meaning)
+        out.print(table)
+    out.print(
+        Text("A law of your own: robocov run rooms --controller mine.py:MyController (see the README).")
+    )

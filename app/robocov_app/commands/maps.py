@@ -1,0 +1,48 @@
+"""`robocov maps`."""
+
+from __future__ import annotations
+
+import json as jsonlib
+
+from robocov.mapfile import bundled_maps, load_map
+from robocov_app.console import console
+
+
+def command(json: bool = False) -> None:
+    """List the bundled maps: name, size, starts, and a sentence each.
+
+    Example: robocov maps
+
+    Args:
+        json: Print one JSON object.
+    """
+    maps = {name: load_map(name) for name in bundled_maps()}
+    if json:
+        rows = []
+        for name, environment in maps.items():
+            low_x, low_y, high_x, high_y = environment.region.bounds
+            rows.append(
+                {
+                    "name": name,
+                    "title": environment.name,
+                    "description": environment.description,
+                    "width_m": high_x - low_x,
+                    "height_m": high_y - low_y,
+                    "free_area_m2": environment.free_area,
+                    "starts": list(environment.starts),
+                }
+            )
+        print(jsonlib.dumps({"maps": rows}, indent=1))
+        return
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("map", no_wrap=True, style="bold")
+    table.add_column("size in m", no_wrap=True)
+    table.add_column("starts, the default first")
+    table.add_column("what it is")
+    for name, environment in maps.items():
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        size = f"{high_x - low_x:.3g} x {high_y - low_y:.3g}"
+        table.add_row(name, size, ", ".join(environment.starts), environment.description)
+    console().print(table)

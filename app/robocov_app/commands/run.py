@@ -1,0 +1,82 @@
+"""`robocov run`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocov.controllers import FLAGSHIP, make_controller
+from robocov.cost import CoverageCost
+from robocov.mapfile import load_map
+from robocov_app.interruption import Interruption
+from robocov_app.options import RunOptions, parsed_gains
+from robocov_app.output import finite, prepared
+from robocov_app.run import (
+    Run,
+    evaluated,
+    save_numbers,
+    save_pictures,
+    save_run_moving,
+    simulated,
+    starts_of,
+    team_of,
+)
+
+INTERRUPTED = 130
+
+
+@dataclass
+class Arguments(RunOptions):
+    """One headless run: a team under one controller, everything saved in a folder.
+
+    The folder holds run.json and record.npz (all of the run), cost.csv, trajectories and cost as
+    PNG and SVG, and on request frames and a film.
+
+    Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
+    """
+
+    controller: str = FLAGSHIP
+    """A controller by name, or mine.py:MyController."""
+
+
+def command(options: Arguments) -> int:
+    """Simulate, evaluate, save and draw."""
+    gains = parsed_gains(options.gains)
+    environment = load_map(options.map)
+    # everything that the user gave is checked before a folder is made
+    controller = make_controller(options.controller, gains)
+    starts_of(environment, options)
+    team_of(options)
+    folder = prepared(
+        options.out or Path(f"{Path(options.map).stem}-{controller.name}"), overwrite=options.overwrite
+    )
+    with Interruption() as stop:
+        record = simulated(environment, options.controller, gains, options, stop)
+        run = evaluated(record, CoverageCost(environment, lattice=options.lattice), quiet=options.json)
+        save_numbers(run, folder)
+        save_pictures(run, folder, options)
+        save_run_moving(run, folder, options, stop)
+    if options.json:
+        print(json.dumps(finite({"out": str(folder), "interrupted": stop.requested, **run.summary})))
+    else:
+        print_summary(run)
+        stopped = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stop.requested else "saved in"
+        print(f"{stopped} {folder}/: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+    return INTERRUPTED if stop.requested else 0
+
+
+def print_summary(run: Run) -> None:
+    """Print what is worth knowing of a run."""
+    summary, record = run.summary, run.record
+    settled = summary["settled_at_s"]
+    first = run.history.mean_distance[0]
+    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
+    print(f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s")
+    print(f"  mean distance   {summary['mean_distance_m']:.3f} m   (at the start {first:.3f} m)")
+    print(f"  coverage cost   {summary['cost_m3']:.2f} m³")
+    if summary["uncovered_area_m2"] > 0:
+        print(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
+    print(f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}")
+    print(f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)")
+    print(f"  path length     {path:.2f} m per robot")

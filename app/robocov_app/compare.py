@@ -1,0 +1,122 @@
+"""Several controllers from the same starts: curves, pictures and a film side by side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from robocov.controllers import controller_kind, gains_of
+from robocov.errors import ParameterError, unknown_name
+from robocov_app.output import finite, write_csv, write_json
+from robocov_app.run import FILM_HOLD, Run, frames_of, save_figures, save_moving
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from robocov_app.interruption import Interruption
+    from robocov_app.options import RunOptions
+
+PANE_WIDTH = 640
+"""Width in pixels of one controller's picture in a film, where no size is asked for."""
+
+_AROUND = 100
+"""Pixels of a pane's height for legend, scale bar and status."""
+
+_FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
+
+
+def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the gains of each controller out of those given for the comparison.
+
+    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone.
+
+    Raises
+    ------
+    ParameterError
+        When a gain belongs to none of the controllers.
+    """
+    known = {name: gains_of(controller_kind(name)) for name in names}
+    chosen: list[dict[str, Any]] = [{} for _ in names]
+    # what is said of one controller alone counts for more than what is said of all
+    for key, value in sorted(given.items(), key=lambda item: "." in item[0]):
+        owner, dot, gain = key.rpartition(".")
+        if dot and owner not in known:
+            raise ParameterError(f"--set {key}: {unknown_name('controller', owner, known)}")
+        takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
+        if not takers:
+            every = {gain for name in names for gain in known[name]}
+            raise ParameterError(f"--set {key}: {unknown_name('gain', gain, every)}")
+        for k in takers:
+            chosen[k][gain] = value
+    return chosen
+
+
+def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
+    """Return one row for each run: its figures, and the excess of its mean distance over the best."""
+    best = min(run.summary["mean_distance_m"] for run in runs.values())
+    return [
+        {
+            "controller": name,
+            "label": run.record.label,
+            "gains": dict(run.record.gains),
+            **{figure: run.summary[figure] for figure in _FIGURES},
+            "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
+            "above_best": run.summary["mean_distance_m"] / best - 1.0,
+        }
+        for name, run in runs.items()
+    ]
+
+
+def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) -> None:
+    """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
+    from robocov_app.plots import plot_comparison, plot_cost
+    from robocov_app.view.theme import theme_named
+
+    rows = rows_of(runs)
+    write_json(folder / "comparison.json", finite({"format": "robocov-comparison", "version": 1, "runs": rows}))
+    columns = [name for name in rows[0] if name not in ("label", "gains")]
+    write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
+
+    theme, size = theme_named(options.theme), options.picture_size()
+    finals = [run.summary["mean_distance_m"] for run in runs.values()]
+    records = [run.record for run in runs.values()]
+    curves = [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance)
+        for run in runs.values()
+    ]
+    save_figures(
+        folder,
+        {
+            "trajectories": lambda: plot_comparison(
+                records, theme=theme, colours=options.colours, size=size, mean_distances=finals
+            ),
+            "cost": lambda: plot_cost(curves, theme=theme, **({} if size is None else {"size": size})),
+        },
+        quiet=options.json,
+    )
+
+
+def save_comparison_moving(
+    runs: Mapping[str, Run], folder: Path, options: RunOptions, stop: Interruption
+) -> None:
+    """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
+    from robocov_app.recording import frame_rows, side_by_side
+
+    first = next(iter(runs.values())).record
+    asked = options.picture_size()
+    if asked is None:
+        low_x, low_y, high_x, high_y = first.environment.region.bounds
+        tall = PANE_WIDTH * (high_y - low_y) / (high_x - low_x) + _AROUND
+        pane = (PANE_WIDTH, 2 * round(min(max(tall, 320), 960) / 2))
+    else:
+        pane = (max(asked[0] // len(runs), 240), asked[1])
+    total = len(frame_rows(first.time, options.fps, options.film_speed, FILM_HOLD))
+
+    save_moving(
+        folder,
+        "comparison.mp4",
+        lambda: side_by_side([frames_of(run, options, pane) for run in runs.values()]),
+        total,
+        options,
+        stop,
+    )

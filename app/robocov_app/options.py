@@ -1,0 +1,125 @@
+"""The options that `run` and `compare` share, and how their texts become values."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from robocov.errors import ParameterError, shown
+
+
+@dataclass
+class RunOptions:
+    """What a run is made of, and what is made of it."""
+
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
+    """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
+    gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
+    """Gains, as in --set k_rep=0.3 attraction_limit=null (see `robocov controllers`)."""
+    robots: int = 6
+    """Number of robots."""
+    start: str | None = None
+    """Named start of the map; the map's first by default."""
+    seed: int = 0
+    """Seed of the starting positions; every controller gets the same."""
+    duration: float = 60.0
+    """Simulated seconds."""
+    dt: float = 1 / 60
+    """Control period in seconds."""
+    radius: float = 0.1
+    """Radius of a robot in metres."""
+    max_speed: float = 1.0
+    """Largest speed in m/s."""
+    max_acceleration: float = 2.0
+    """Largest acceleration in m/s²."""
+    viscosity: float = 2.0
+    """Viscosity nu of (28) in N s/m; a robot has 1 kg."""
+    sensing_range: float = 3.0
+    """How far the range sensor reaches, in metres from the robot's centre."""
+    communication_range: float | None = None
+    """How far robots hear each other, in metres; without limit by default."""
+    lattice: int = 64
+    """The coverage cost is evaluated on a lattice of N x N sites over the map."""
+    out: Path | None = None
+    """Folder for the results."""
+    overwrite: bool = False
+    """Replace an earlier result in that folder."""
+    frames: bool = False
+    """Save every film frame as a PNG too."""
+    video: bool = False
+    """Save a film (H.264, MP4)."""
+    fps: int = 30
+    """Film frames per second."""
+    film_speed: float = 4.0
+    """Simulated seconds per second of film."""
+    theme: Literal["light", "dark"] = "light"
+    """Colours of pictures and films."""
+    colours: Literal["paper", "robots"] = "paper"
+    """Trajectories in the paper's red, or a colour for each robot."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size of pictures and films in pixels; by default 1280x720 for films, and what suits the map for pictures."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+    def __post_init__(self) -> None:
+        _in_range("--robots", self.robots, 1, 10_000)
+        _in_range("--seed", self.seed, 0, 2**63 - 1)
+        _in_range("--duration", self.duration, 0.0, 1e6, "s")
+        _in_range("--lattice", self.lattice, 2, 2048)
+        _in_range("--fps", self.fps, 1, 240)
+        _in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        self.picture_size()
+
+    def picture_size(self) -> tuple[int, int] | None:
+        """Return the size that was asked for (width, height), None when none was."""
+        if self.size is None:
+            return None
+        match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", self.size)
+        if not match:
+            raise ParameterError(f"--size: {shown(self.size)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted")
+        width, height = int(match[1]), int(match[2])
+        _in_range("--size", width, 320, 7680, "pixels wide")
+        _in_range("--size", height, 240, 4320, "pixels high")
+        return width, height
+
+    def film_size(self) -> tuple[int, int]:
+        """Return the size of film frames (width, height)."""
+        return self.picture_size() or (1280, 720)
+
+
+def _in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
+    if not low <= value <= high:
+        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
+
+
+def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit.
+
+    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null"))
+    {'k_rep': 0.3, 'attraction_limit': None}
+
+    Raises
+    ------
+    ParameterError
+        When a text is not NAME=VALUE, a value is not a number, or a gain is given twice.
+    """
+    gains: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
+        if name in gains:
+            raise ParameterError(f"--set: {name} is given twice")
+        try:
+            gains[name] = json.loads(value)
+        except json.JSONDecodeError as error:
+            raise ParameterError(
+                f"--set {name}: {shown(value)}, but a number (or null) was wanted"
+            ) from error
+    return gains

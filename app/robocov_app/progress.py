@@ -1,0 +1,53 @@
+"""Progress of long work on stderr: a bar in a terminal, one plain line elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Show how far `label` is; the value is a function to be called with the number done so far.
+
+    Parameters
+    ----------
+    label : str
+        What is being done: "simulating".
+    total : int
+    quiet : bool
+        Show nothing.
+    """
+    if quiet:
+        yield lambda done: None
+    elif sys.stderr.isatty():
+        with _bar(label, total) as update:
+            yield update
+    else:
+        began = time.perf_counter()
+        reached = 0
+
+        def note(done: int) -> None:
+            nonlocal reached
+            reached = done
+
+        yield note
+        print(f"{label}: {reached} of {total} in {time.perf_counter() - began:.1f} s", file=sys.stderr)
+
+
+@contextmanager
+def _bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn(f"{label:<12}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.update(task, completed=done)

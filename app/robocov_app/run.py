@@ -1,0 +1,200 @@
+"""One headless run: simulate, evaluate, save, draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.controllers import make_controller
+from robocov.cost import CoverageCost
+from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
+from robocov.record import Record, Recorder
+from robocov.robots import Team
+from robocov.simulation import Simulation
+from robocov_app.interruption import Interruption
+from robocov_app.output import write_csv
+from robocov_app.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from matplotlib.figure import Figure
+
+    from robocov.arrays import Array
+    from robocov.environment import Environment
+    from robocov_app.options import RunOptions
+    from robocov_app.recording import Frame
+
+FILM_HOLD = 1.0
+"""Seconds for which a film stays on its last moment."""
+
+COST_RATE = 10.0
+"""Samples of the coverage cost per simulated second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished (or stopped) run with its evaluation."""
+
+    record: Record
+    history: CostHistory
+    summary: dict[str, Any]
+
+
+def team_of(options: RunOptions) -> Team:
+    """Return the homogeneous team that the options describe."""
+    return Team.homogeneous(
+        options.robots,
+        radius=options.radius,
+        max_speed=options.max_speed,
+        max_acceleration=options.max_acceleration,
+        viscosity=options.viscosity,
+        sensing_range=options.sensing_range,
+        communication_range=np.inf
+        if options.communication_range is None or unlimited
+        else options.communication_range,
+    )
+
+
+def starts_of(environment: Environment, options: RunOptions) -> tuple[str, Array]:
+    """Return the name of the start and the positions drawn from it."""
+    start = environment.start(options.start)
+    return start.name, start.sample(options.robots, seed=options.seed, radius=options.radius)
+
+
+def simulated(
+    environment: Environment,
+    controller_name: str,
+    gains: Mapping[str, object],
+    options: RunOptions,
+    stop: Interruption,
+) -> Record:
+    """Simulate, and return the record up to the end or to Ctrl-C."""
+    controller = make_controller(controller_name, gains)
+    start, positions = starts_of(environment, options)
+    simulation = Simulation(environment, controller, positions, team_of(options), options.dt)
+    recorder = Recorder(environment, simulation.team, controller, options.dt, start=start, seed=options.seed)
+    total = round(options.duration / options.dt)
+    with progress(f"simulating {controller.label}", total, quiet=options.json) as update:
+        for step, snapshot in enumerate(simulation.snapshots(options.duration)):
+            recorder.add(snapshot)
+            if step % 10 == 0 or step == total:
+                update(step)
+            if stop.requested:
+                break
+    return recorder.record()
+
+
+def evaluated(record: Record, cost: CoverageCost, *, quiet: bool) -> Run:
+    """Evaluate the coverage cost along a record and sum the run up."""
+    total = len(sample_moments(record, COST_RATE))
+    with progress("coverage cost", total, quiet=quiet) as update:
+        done = 0
+
+        def count() -> None:
+            nonlocal done
+            done += 1
+            update(done)
+
+        history = cost_history(record, cost, COST_RATE, count)
+    return Run(record, history, summarise(record, history))
+
+
+def save_numbers(run: Run, folder: Path) -> None:
+    """Write ``record.npz``, ``run.json`` and ``cost.csv``."""
+    run.record.save(folder, run.summary)
+    history = run.history
+    rows = zip(
+        history.time.tolist(),
+        history.mean_distance.tolist(),
+        history.cost.tolist(),
+        history.uncovered_area.tolist(),
+        strict=True,
+    )
+    write_csv(folder / "cost.csv", "time_s,mean_distance_m,cost_m3,uncovered_area_m2", rows)
+
+
+def save_pictures(run: Run, folder: Path, options: RunOptions) -> None:
+    """Draw ``trajectories.png|svg`` and ``cost.png|svg``."""
+    from robocov_app.plots import plot_cost, plot_trajectories
+    from robocov_app.view.theme import theme_named
+
+    record, history = run.record, run.history
+    theme, size = theme_named(options.theme), options.picture_size()
+    final = float(history.mean_distance[-1])
+    curve = (record.label, record.controller, history.time, history.mean_distance)
+    save_figures(
+        folder,
+        {
+            "trajectories": lambda: plot_trajectories(
+                record, theme=theme, colours=options.colours, size=size, mean_distance=final
+            ),
+            "cost": lambda: plot_cost([curve], theme=theme, **({} if size is None else {"size": size})),
+        },
+        quiet=options.json,
+    )
+
+
+def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
+    """Draw each figure and write it as PNG and SVG under its name."""
+    from robocov_app.plots import save_figure
+
+    with progress("pictures", 2 * len(figures), quiet=quiet) as update:
+        done = 0
+        for stem, draw in figures.items():
+            figure = draw()
+            for suffix in (".png", ".svg"):
+                save_figure(figure, folder / (stem + suffix))
+                done += 1
+                update(done)
+
+
+def save_moving(
+    folder: Path,
+    film: str,
+    frames: Callable[[], Iterator[Frame]],
+    total: int,
+    options: RunOptions,
+    stop: Interruption,
+) -> None:
+    """Write the frames as PNGs, as a film, or both, as the options say; Ctrl-C ends both early."""
+    from robocov_app.recording import save_film, save_frames
+
+    def until_stopped() -> Iterator[Frame]:
+        for frame in frames():
+            yield frame
+            if stop.requested:
+                return
+
+    if options.frames:
+        with progress("frames", total, quiet=options.json) as update:
+            save_frames(folder / "frames", until_stopped(), progress=lambda done, _: update(done))
+    if options.video and not stop.requested:
+        with progress("film", total, quiet=options.json) as update:
+            save_film(folder / film, until_stopped(), fps=options.fps, progress=lambda done, _: update(done))
+
+
+def save_run_moving(run: Run, folder: Path, options: RunOptions, stop: Interruption) -> None:
+    """Write ``frames/`` and ``run.mp4`` as the options say."""
+    from robocov_app.recording import frame_rows
+
+    total = len(frame_rows(run.record.time, options.fps, options.film_speed, FILM_HOLD))
+    save_moving(folder, "run.mp4", lambda: frames_of(run, options, options.film_size()), total, options, stop)
+
+
+def frames_of(run: Run, options: RunOptions, size: tuple[int, int]) -> Iterator[Frame]:
+    """Draw the film frames of a run."""
+    from robocov_app.recording import iter_frames
+
+    return iter_frames(
+        run.record,
+        size=size,
+        theme=options.theme,
+        fps=options.fps,
+        speed=options.film_speed,
+        hold=FILM_HOLD,
+        cost=(run.history.time, run.history.mean_distance),
+    )
