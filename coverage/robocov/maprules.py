@@ -53,8 +53,9 @@ def _ring_problems(at: str, ring: Ring) -> Iterator[str]:
     """Yield what is wrong with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
-    if len(np.unique(points, axis=0)) < 3:
-        yield f"{at}: {_count(points)} different points, but at least 3 were wanted"
+    count = len(np.unique(points, axis=0))
+    if count < 3:
+        yield f"{at}: {count} different point{'s' if count > 1 else ''}, but at least 3 were wanted"
         return
     size_problem = _size_problem(at, extent)
     if size_problem:
@@ -65,10 +66,6 @@ def _ring_problems(at: str, ring: Ring) -> Iterator[str]:
         yield f"{at}: area {polygon.area:g} m², but points that are not on one line were wanted"
     elif not polygon.is_valid:
         yield _crossing(at, points, polygon)
-
-
-def _count(points: Array) -> int:
-    return len(np.unique(points, axis=0))
 
 
 def _crosses(points: Array) -> bool:

@@ -1,0 +1,345 @@
+"""Errors of map files: one line with the place, the value and what was wanted, whatever is in the file."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
+from robocov.mapmodels import validate
+
+DELETED = object()
+
+DOCUMENT: dict[str, Any] = {
+    "$schema": "https://example.org/map.json",
+    "format": "robocov-map",
+    "version": 1,
+    "name": "Two rooms – süd",
+    "description": "A wall with a door.\nAnd a second line.",
+    "boundary": [[0, 0], [10, 0], [10, 6], [0, 6]],
+    "obstacles": [
+        {
+            "kind": "polygon",
+            "name": "desk",
+            "vertices": [[2, 2], [4, 2], [4, 4], [2, 4]],
+            "holes": [[[2.5, 2.5], [3, 2.5], [3, 3]]],
+        },
+        {"kind": "circle", "center": [7, 2], "radius": 0.5},
+        {"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1},
+    ],
+    "starts": {
+        "west side": {"kind": "disc", "center": [1, 1], "radius": 0.8},
+        "all": {"kind": "uniform"},
+        "given": {"kind": "points", "positions": [[1, 1], [1.5, 1.25]]},
+    },
+    "extra": {"author": {"name": "Ada"}, "tags": [1, 2.5, None, True, "é"]},
+}
+
+SCHEMA = jsonschema.Draft202012Validator(map_schema())
+
+
+def changed(*path: Any, document: dict[str, Any] = DOCUMENT) -> dict[str, Any]:
+    """Return the document with the value at a path (all but the last argument) replaced or deleted."""
+    *steps, value = path
+    result = copy.deepcopy(document)
+    place: Any = result
+    for step in steps[:-1]:
+        place = place[step]
+    if value is DELETED:
+        del place[steps[-1]]
+    else:
+        place[steps[-1]] = value
+    return result
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+# Errors: one line, with the place, the value and what was wanted
+
+STRUCTURAL = [
+    (changed("boundary", 0, 0, True), "boundary[0][0]: true, but a number"),
+    (changed("boundary", 0, 1, "1"), 'boundary[0][1]: "1", but a number'),
+    (changed("boundary", 1, [1, 2, 3]), "boundary[1]: [1, 2, 3], but a point [x, y]"),
+    (changed("boundary", [[0, 0], [1, 1]]), "boundary: [[0, 0], [1, 1]], but a list of at least 3 points"),
+    (changed("boundary", DELETED), "boundary: missing, but a list of at least 3"),
+    (changed("boundary", 0, 0, 1e8), "boundary[0][0]: 100000000.0, but a number from"),
+    (changed("name", DELETED), "name: missing"),
+    (changed("name", ""), 'name: "", but a text'),
+    (changed("name", "two\nlines"), 'name: "two\\nlines", but a text'),
+    (changed("description", 3), "description: 3, but a text"),
+    (changed("obstacles", None), "obstacles: null, but a list of obstacles"),
+    (changed("obstacles", 0, 3), "obstacles[0]: 3, but an object whose kind is one of polygon"),
+    (changed("obstacles", 0, "kind", "polygn"), "(did you mean 'polygon'?)"),
+    (changed("obstacles", 0, "kind", DELETED), "obstacles[0].kind: missing, but one of"),
+    (changed("obstacles", 0, "vertices", 0, 0, None), "obstacles[0].vertices[0][0]: null, but a number"),
+    (changed("obstacles", 0, "holes", 0, 2, []), "obstacles[0].holes[0][2]: [], but a point"),
+    (changed("obstacles", 0, "holes", 0, []), "obstacles[0].holes[0]: [], but a list of at least 3"),
+    (changed("obstacles", 0, "verts", []), "obstacles[0]: unknown key 'verts': did you mean 'vertices'?"),
+    (changed("obstacles", 1, "radius", -1), "obstacles[1].radius: -1, but a number from 0.001 to 10000 (m)"),
+    (changed("obstacles", 1, "radius", 0.0009), "obstacles[1].radius: 0.0009, but"),
+    (changed("obstacles", 1, "radius", 10001), "obstacles[1].radius: 10001, but"),
+    (changed("obstacles", 1, "center", DELETED), "obstacles[1].center: missing, but a point"),
+    (changed("obstacles", 2, "points", [[1, 1]]), "obstacles[2].points: [[1, 1]], but a list of at least 2"),
+    (changed("obstacles", 2, "width", 0), "obstacles[2].width: 0, but a number from 0.001"),
+    (changed("starts", []), "starts: [], but an object of named starts"),
+    (changed("starts", "all", None), "starts.all: null, but an object whose kind is one of disc"),
+    (changed("starts", "all", "kind", "unifrm"), 'starts.all.kind: "unifrm", but one of disc, uni'),
+    (changed("starts", "west side", "radius", "1"), 'starts["west side"].radius: "1", but a number'),
+    (changed("starts", "given", "positions", []), "starts.given.positions: [], but a list of at least 1"),
+    (changed("starts", "", {"kind": "uniform"}), 'starts: name "", but a text'),
+    (changed("extra", 3), "extra: 3, but an object"),
+    (changed("$schema", 3), "$schema: 3, but a text"),
+    (changed("boundry", 1), "unknown key 'boundry': did you mean 'boundary'?"),
+    (changed("format", "geojson"), 'format: "geojson", but "robocov-map" was wanted'),
+    (changed("format", DELETED), "format: missing"),
+    (changed("version", 2), "version: 2, but 1 was wanted; it needs a newer robocov"),
+    (changed("version", 0), "version: 0, but 1 was wanted"),
+    (changed("version", True), "version: true, but 1 was wanted"),
+    (changed("version", DELETED), "version: missing"),
+]
+
+GEOMETRIC = [
+    (
+        changed("boundary", [[0, 0], [10, 10], [10, 0], [0, 10]]),
+        "boundary[0]: the edge from here meets the edge from boundary[2] near [5, 5]",
+    ),
+    (
+        changed("obstacles", 0, {"kind": "polygon", "vertices": [[0, 0], [4, 4], [4, 0], [0, 4]]}),
+        "obstacles[0].vertices[0]: the edge from here meets the edge from obstacles[0].vertices[2]",
+    ),
+    (changed("boundary", [[0, 0], [10, 10], [5, 5]]), "boundary: area 0 m², but"),
+    (changed("boundary", [[0, 0], [10, 10], [0, 0]]), "boundary: 2 different points, but at least 3"),
+    (changed("boundary", [[0, 0], [10001, 0], [0, 10]]), "boundary: 10001 x 10 m, but at most 10 km"),
+    (changed("boundary", [[0, 0], [9, 0], [0, 0.0009]]), "boundary: 9 x 0.0009 m, but at least 1 mm"),
+    (
+        changed("obstacles", 0, "holes", 0, [[5, 5], [6, 5], [6, 6]]),
+        "obstacles[0].holes[0]: sticks out of obstacles[0].vertices",
+    ),
+    (
+        changed("obstacles", 0, "holes", [[[2.5, 2.5], [3, 2.5], [3, 3]], [[2.6, 2.4], [3, 2.5], [3, 3]]]),
+        "obstacles[0].holes[1]: meets the outline or another hole",
+    ),
+    (
+        changed("obstacles", 0, "holes", [[[2.2, 2.2], [3.8, 2.2], [3, 4]], [[3, 2.5], [3.1, 2.5], [3, 3]]]),
+        "obstacles[0].holes[1]: meets the outline or another hole",
+    ),
+    (changed("obstacles", 2, "points", [[1, 1], [1, 1]]), "obstacles[2].points: a wall 0 m long"),
+    (changed("obstacles", 2, "points", [[1, 1], [20000, 1]]), "obstacles[2].points: 19999 x 0 m, but"),
+    (
+        changed("obstacles", 0, {"kind": "circle", "center": [5, 3], "radius": 100}),
+        "obstacles: no free space is left",
+    ),
+    (changed("starts", "west side", "center", [30, 2]), 'starts["west side"]: the disc of radius 0.8'),
+    (
+        changed("starts", "west side", {"kind": "disc", "center": [3.5, 3.5], "radius": 0.2}),
+        'starts["west side"]: the disc of radius 0.2 m at [3.5, 3.5] has no room',
+    ),
+    (
+        changed("starts", "given", "positions", 1, [7, 2]),
+        "starts.given.positions[1]: [7, 2] is inside an obstacle or outside",
+    ),
+    (changed("starts", "given", "positions", 1, [70, 2]), "starts.given.positions[1]: [70, 2] is inside"),
+    (changed("starts", "given", "positions", 1, [1, 1]), "starts.given.positions: one place is given twice"),
+    (changed("boundary", [[0, 0], [0.15, 0], [0, 0.15]]) | {"obstacles": []}, "(and 3 more)"),
+]
+
+
+@pytest.mark.parametrize(("document", "wanted"), STRUCTURAL + GEOMETRIC, ids=lambda value: str(value)[-40:])
+def test_errors_name_the_place_the_value_and_what_was_wanted(document: dict[str, Any], wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        parse_map(json.dumps(document), "folder/m.json")
+    message = str(caught.value)
+    assert message.startswith("folder/m.json: ")
+    assert wanted in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (b"", "empty"),
+        (b" \n", "empty"),
+        (b"\xff\xfe{", "byte 0xff at offset 0: not UTF-8"),
+        (b'{"format":\n "robocov-map",\n}', "line 3, column 1: '}': not JSON"),
+        (b'{"a": ', "end of file: not JSON"),
+        (b"nul", "line 1, column 1: 'nul': not JSON"),
+        (b'{"a": {"b": 1, "c": 2, "b": 3}}', "a.b: given twice"),
+        (b"[[NaN]]", "[0][0]: nan, but a finite number"),
+        (b"[-Infinity]", "[0]: -inf, but a finite number"),
+        (b"[1e999]", "[0]: inf, but a finite number"),
+        (b"[" + b"9" * 5000 + b"]", "[0]: inf, but a finite number"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b"[" * 40 + b"]" * 40, "nested too deeply"),
+        (b'["\\ud800"]', "but text that UTF-8 can hold was wanted"),
+        (b"[]", "[], but a JSON object with a map was wanted"),
+    ],
+)
+def test_what_is_no_json_is_said_with_its_place(text: bytes, wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        parse_map(text, "m.json")
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [math.nan, 10**400, {1, 2}, np.float32(1), {3: 4}, "\ud800"])
+def test_what_json_cannot_hold_is_refused_in_documents_too(value: object) -> None:
+    with pytest.raises(MapError, match=r"m: extra\.a: "):
+        from_json(changed("extra", {"a": value}), "m")
+
+
+def test_several_errors_are_counted() -> None:
+    document = changed("boundary", 0, 0, "a", document=changed("obstacles", 1, "radius", -1))
+    with pytest.raises(MapError, match=r"boundary\[0\]\[0\].*\(and 1 more\)$"):
+        from_json(document)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(MapError, match="no such file"):
+        load_map(tmp_path / "none.json")
+    with pytest.raises(MapError, match="is a folder"):
+        load_map(tmp_path)
+    with pytest.raises(MapError, match="cannot be read"):
+        load_map("a\0b")
+    monkeypatch.setattr("robocov.strictjson.MAX_BYTES", 1_000_000)
+    large = tmp_path / "large.json"
+    large.write_bytes(b" " * 1_000_001)
+    with pytest.raises(MapError, match="larger than 1 MB"):
+        load_map(large)
+
+
+def test_names_of_bundled_maps() -> None:
+    assert load_map("rooms") == load_map(bundled_maps()["rooms"])
+    with pytest.raises(MapError, match=r"unknown map 'roms': did you mean 'rooms'\? \(known: .*rooms"):
+        load_map("roms")
+
+
+def test_a_file_without_suffix_in_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine").write_text(json.dumps(DOCUMENT))
+    assert load_map("mine") == from_json(DOCUMENT)
+
+
+# Whatever is done to a map file: it loads, or there is one MapError of one line
+
+PLAIN_JUNK: list[Any] = [None, True, "", "x", -1, 0, 1e-9, 1e9, [], {}, [[]], [0, 0], [[0, 0]] * 4]
+junk = st.sampled_from([*PLAIN_JUNK, 10**400, math.nan, math.inf]) | json_values
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [path] if path else []
+    if isinstance(value, dict):
+        found += [place for key in value for place in places(value[key], (*path, key))]
+    elif isinstance(value, list):
+        found += [place for k, item in enumerate(value) for place in places(item, (*path, k))]
+    return found
+
+
+@st.composite
+def mutants(draw: st.DrawFn, values: st.SearchStrategy[Any] = junk) -> dict[str, Any]:
+    document = DOCUMENT
+    for _ in range(draw(st.integers(1, 3))):
+        path = draw(st.sampled_from(places(document)))
+        if draw(st.integers(0, 3)) == 0:
+            document = changed(*path, DELETED, document=document)
+        elif draw(st.integers(0, 3)) == 0:
+            *parent, _ = path
+            document = copy.deepcopy(document)
+            holder: Any = document
+            for step in parent:
+                holder = holder[step]
+            if isinstance(holder, dict):
+                holder[draw(st.text(max_size=3))] = draw(values)
+            else:
+                holder.append(draw(values))
+        else:
+            document = changed(*path, draw(values), document=document)
+        if not document:
+            break
+    return document
+
+
+def loads_or_says_why(load: Any) -> None:
+    try:
+        environment = load()
+    except MapError as error:
+        message = str(error)
+        assert message.startswith("m.json: ")
+        assert message.isprintable()
+        assert any(words in message for words in ("was wanted", "were wanted", "not JSON", "known:")), message
+    else:
+        assert from_json(to_json(environment)) == environment
+
+
+@settings(deadline=None, max_examples=400)
+@given(mutants())
+def test_a_changed_document_loads_or_says_why(document: dict[str, Any]) -> None:
+    loads_or_says_why(lambda: from_json(document, "m.json"))
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_a_damaged_text_loads_or_says_why(data: st.DataObject) -> None:
+    text = bytearray(json.dumps(DOCUMENT).encode())
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text)))
+        cut = data.draw(st.integers(0, 3))
+        new = data.draw(st.binary(max_size=3) | st.sampled_from([b"-", b"9", b",", b"e5", b"[["]))
+        text[at : at + cut] = new
+    loads_or_says_why(lambda: parse_map(bytes(text), "m.json"))
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=8))
+def test_any_ring_on_a_grid_loads_or_says_why(ring: list[tuple[int, int]]) -> None:
+    document = changed("boundary", [list(point) for point in ring]) | {"obstacles": [], "starts": {}}
+    loads_or_says_why(lambda: from_json(document, "m.json"))
+    polygon = {"kind": "polygon", "vertices": [list(point) for point in ring]}
+    loads_or_says_why(lambda: from_json(changed("obstacles", [polygon]) | {"starts": {}}, "m.json"))
+
+
+# The schema says the same as the loader
+
+
+def test_the_schema_is_one_and_knows_every_key() -> None:
+    schema = map_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["$schema"].endswith("2020-12/schema")
+    assert set(schema["properties"]) == {*DOCUMENT}
+    for item in (schema, *schema["$defs"].values()):
+        assert item["description"]
+        assert item["additionalProperties"] is False
+        for key, value in item["properties"].items():
+            assert key == "kind" or value["description"], key
+    SCHEMA.validate(DOCUMENT)
+
+
+@pytest.mark.parametrize(("document", "wanted"), STRUCTURAL, ids=lambda value: str(value)[-40:])
+def test_the_schema_rejects_what_the_loader_rejects(document: dict[str, Any], wanted: str) -> None:
+    assert not SCHEMA.is_valid(document), wanted
+
+
+@settings(deadline=None, max_examples=200)
+@given(mutants(st.sampled_from(PLAIN_JUNK)))
+def test_schema_and_loader_agree_on_structure(document: dict[str, Any]) -> None:
+    try:
+        validate(document, "m")
+    except MapError:
+        good = False
+    else:
+        good = True
+    assert SCHEMA.is_valid(document) == good
