@@ -117,7 +117,7 @@ def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Co
     if paper:
         return [theme.trajectory] * n
     if n > ONE_HUE_EACH:
-        return [mix(theme.background, theme.ink, 0.6)] * n
+        return [mix(theme.trajectory, theme.background, 0.25)] * n
     return [mix(theme.robots[hue], theme.ink, 0.12) for hue in hues]
 
 

@@ -57,7 +57,7 @@ def plot_environment(
             return _figure_of(axes)
         page = Page(size or _size_for(environment), theme)
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        box = _arena_box(page, environment, rows=1)
+        box = _arena_box(page, environment)
         axes = _arena(page, box, environment)
         draw_map(axes, environment, theme)
         _titles(page, box, environment.name, facts)
@@ -101,7 +101,7 @@ def plot_trajectories(
             draw_run(axes, record, theme, colours)
             return _figure_of(axes)
         page = Page(size or _size_for(record.environment), theme)
-        box = _arena_box(page, record.environment, rows=2)
+        box = _arena_box(page, record.environment)
         axes = _arena(page, box, record.environment)
         draw_run(axes, record, theme, colours)
         _titles(page, box, f"{record.label}  ·  {record.environment.name}", _facts(record, mean_distance))
@@ -155,10 +155,10 @@ def plot_comparison(
         rows = -(-len(records) // columns)
         if size is None:
             tall = (1400 - 36) / columns / aspect + 62
-            size = (1400, int(np.clip(rows * tall + 110, 420, 2400)))
+            size = (1400, int(np.clip(rows * tall + 70, 320, 2400)))
         page = Page(size, theme)
         s, margin = page.scale, page.margin
-        below = 84 * s
+        below = 70 * s
         wide, high = (size[0] - margin) / columns - margin, (size[1] - below - margin / 2) / rows - 58 * s
         width = min(wide, high * aspect)
         height = width / aspect
@@ -174,7 +174,7 @@ def plot_comparison(
             axes.set_ylim(limits[1], limits[3])
             axes.set_axis_off()
             draw_run(axes, record, theme, colours)
-            _titles(page, box, record.label, _facts(record, cost, with_team=False))
+            _titles(page, box, record.label, _facts(record, cost, with_team=False), alone=False)
         bottom = (left, top, width, rows * block - 6 * s)
         _scale_bar(page, bottom, records[0].environment, zoom=width / (limits[2] - limits[0]))
         handles: dict[str, Artist] = {}
@@ -188,7 +188,7 @@ def plot_cost(
     curves: Sequence[Curve],
     axes: Axes | None = None,
     theme: Theme | str = LIGHT,
-    size: tuple[int, int] = (1000, 560),
+    size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
 ) -> Figure:
     """Plot mean distance against time, each curve named with its final value at its end.
@@ -200,7 +200,8 @@ def plot_cost(
     axes : matplotlib Axes or None
         Where to draw; the labels stand to the right of them. None makes a page.
     theme : Theme or {"light", "dark"}
-    size : (width, height), px
+    size : (width, height) or None, px
+        Of the page; by default 1000 x 560.
     title : str
 
     Returns
@@ -222,6 +223,7 @@ def plot_cost(
             )
     theme = _theme(theme)
     with plain_style():
+        size = size or (1000, 560)
         page = Page(size, theme) if axes is None else None
         if axes is None:
             assert page is not None
@@ -291,15 +293,15 @@ def _size_for(environment: Environment) -> tuple[int, int]:
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
     if aspect >= 1.0:
-        return 1400, int(np.clip(1364 / aspect + 170, 420, 1400))
+        return 1400, int(np.clip(1364 / aspect + 155, 290, 1400))
     return int(np.clip(1130 * aspect + 60, 800, 1300)), 1300
 
 
-def _arena_box(page: Page, environment: Environment, rows: int) -> Box:
+def _arena_box(page: Page, environment: Environment) -> Box:
     """Return the largest box for the map that leaves room for titles above, scale bar and legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
-    above, below = 60 * page.scale, (46 + 20 * rows) * page.scale
+    above, below = 58 * page.scale, 74 * page.scale
     room_x, room_y = page.size[0] - 2 * page.margin, page.size[1] - above - below
     width = min(room_x, room_y * aspect)
     height = width / aspect
@@ -317,14 +319,17 @@ def _arena(page: Page, box: Box, environment: Environment) -> Axes:
     return axes
 
 
-def _titles(page: Page, box: Box, title: str, facts: str) -> None:
-    """Write two lines above `box`."""
+def _titles(page: Page, box: Box, title: str, facts: str, alone: bool = True) -> None:
+    """Write two lines above `box`; above a lone narrow map they may be wider than it."""
     left, top, width, _ = box
-    # a narrow map must not cut its own title: the page is wider
-    left = min(left, page.margin) if width < 500 * page.scale and len(page.figure.axes) == 1 else left
-    room = max(width, page.size[0] - 2 * page.margin if len(page.figure.axes) == 1 else width)
-    page.text(title, left, top - 38 * page.scale, points=TITLE, bold=True, room=room)
-    page.text(facts, left, top - 16 * page.scale, points=TEXT, colour=page.theme.faint, room=room)
+    for text, up, points, bold, colour in (
+        (title, 38, TITLE, True, page.theme.ink),
+        (facts, 16, TEXT, False, page.theme.faint),
+    ):
+        wide = page.text_width(text, points=points, bold=bold)
+        room = page.size[0] - 2 * page.margin if alone else width
+        start = left if wide <= width or not alone else max(left + (width - min(wide, room)) / 2, page.margin)
+        page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
 
 
 def _facts(record: Record, mean_distance: float | None, with_team: bool = True) -> str:

@@ -67,7 +67,7 @@ def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -
     at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
     # half a microsecond forgives the rounding of sums of steps
     rows = np.searchsorted(time, at + 5e-7, side="right") - 1
-    return np.clip(rows, 0, len(time) - 1).astype(np.intp)
+    return np.asarray(np.clip(rows, 0, len(time) - 1), dtype=np.intp)
 
 
 def iter_frames(

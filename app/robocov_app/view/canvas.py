@@ -59,11 +59,11 @@ class Canvas:
     def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
         """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
         if len(corners) > 2:
-            pygame.draw.polygon(self.surface, fill, np.rint(_bounded(corners)).tolist())
+            pygame.draw.polygon(self.surface, fill, np.rint(bounded(corners)).tolist())
 
     def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
         """Draw the smooth line through the (k, 2) px points."""
-        points = _bounded(corners).tolist()
+        points = bounded(corners).tolist()
         if closed and points:
             points.append(points[0])
         for start, end in pairwise(points):
@@ -90,12 +90,12 @@ class Canvas:
         sides = int(min(max(radius, 24), 240)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
         points = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        corners = _bounded(points).tolist()
+        corners = bounded(points).tolist()
         width = self.width(1.0)
         for k in range(0, sides, 2 if dashed else 1):
             pygame.draw.aaline(self.surface, colour, corners[k], corners[k + 1], width)
 
-    def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: int, head: str = "full") -> None:
+    def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
         """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         length = float(np.hypot(*(b - a)))
@@ -103,21 +103,21 @@ class Canvas:
             return
         along = (b - a) / length
         across = np.array([-along[1], along[0]])
-        size = min(3.2 * width + 2 * self.scale, length)
-        if head == "dot":
-            self.line(a.tolist(), b.tolist(), colour, width)
-            self.stamp(lambda shift: sprites.dot(1.4 * width, colour, shift), b.tolist())
+        size = min(2.6 * width + 4 * self.scale, length)
+        left, right = b - size * along + 0.48 * size * across, b - size * along - 0.48 * size * across
+        shaft = [a, b - 0.7 * size * along] if head == "full" else [a, b]
+        barbs = np.array([left, b, right]).tolist()
+        sketch = sprites.Sketch.around([a.tolist(), *barbs], 2 * width)
+        if sketch is None:
             return
-        left, right = b - size * along + 0.5 * size * across, b - size * along - 0.5 * size * across
-        if head == "open":
-            self.line(a.tolist(), b.tolist(), colour, width)
-            self.line(left.tolist(), b.tolist(), colour, width)
-            self.line(right.tolist(), b.tolist(), colour, width)
-            return
-        self.line(a.tolist(), (b - 0.8 * size * along).tolist(), colour, width)
-        triangle = np.array([left, b, right])
-        self.polygon(triangle, colour)
-        self.outline(triangle, colour)
+        sketch.path(np.array(shaft).tolist(), colour, width)
+        if head == "full":
+            sketch.polygon(barbs, colour)
+        elif head == "open":
+            sketch.path(barbs, colour, width)
+        else:
+            sketch.dot(barbs[1], 1.5 * width, colour)
+        sketch.onto(self.surface)
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
         """Put a sprite where it belongs to a quarter of a pixel."""
@@ -153,6 +153,6 @@ class Canvas:
         return text_width(text, self.text_size(self.theme.text if size is None else size), bold)
 
 
-def _bounded(points: Array) -> Array:
+def bounded(points: Array) -> Array:
     """Keep pixels within what the drawing routines' integers hold, far outside any surface."""
     return np.clip(points, -20000.0, 20000.0)

@@ -26,7 +26,7 @@ _WORDS = {
 }
 
 
-def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width: int, head: str) -> None:
+def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width: float, head: str) -> None:
     """Draw (n, 2) px arrows that begin at the edges of the discs; those below 3 px are left out."""
     if scene.snapshot is None:
         return
@@ -51,8 +51,8 @@ class ForceTerm(Layer):
 
     def __init__(self, term: str) -> None:
         self.term = term
-        self.name = f"force_{term}"  # type: ignore[misc]
-        self.title = _WORDS.get(term, term.replace("_", " ")).capitalize()  # type: ignore[misc]
+        self.name = f"force_{term}"
+        self.title = _WORDS.get(term, term.replace("_", " ")).capitalize()
 
     def _vectors(self, scene: Scene) -> Array | None:
         if scene.snapshot is None:
@@ -60,12 +60,12 @@ class ForceTerm(Layer):
         decision = scene.snapshot.decision
         return decision.forces if self.term == "resultant" else decision.terms.get(self.term)
 
-    def _style(self, canvas: Canvas) -> tuple[Colour, int, str]:
+    def _style(self, canvas: Canvas) -> tuple[Colour, float, str]:
         wide = 3.0 if self.term == "resultant" else canvas.theme.arrow_line
         colour = canvas.theme.forces.get(self.term, canvas.theme.other)
-        return colour, canvas.width(wide), _HEADS.get(self.term, "full")
+        return colour, canvas.scale * wide, _HEADS.get(self.term, "full")
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         forces = self._vectors(scene)
         if forces is None:
             return
@@ -77,9 +77,9 @@ class ForceTerm(Layer):
         vectors = np.nan_to_num(direction * length[:, None]) * np.array([1.0, -1.0])
         _arrows(canvas, scene, vectors, *self._style(canvas))
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
-            half = 10 * canvas.scale
+            half = 9 * canvas.scale
             canvas.arrow((x - half, y), (x + half, y), *self._style(canvas))
 
         return [LegendEntry(self.title.lower(), glyph)] if self._vectors(scene) is not None else []
@@ -92,17 +92,17 @@ class Velocities(Layer):
     title = "Velocities"
     default = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
         part = scene.snapshot.velocities / scene.team.max_speed[:, None]
         vectors = part * np.array([1.0, -1.0]) * VELOCITY_LENGTH * canvas.scale
-        _arrows(canvas, scene, vectors, canvas.theme.velocity, canvas.width(1.6), "open")
+        _arrows(canvas, scene, vectors, canvas.theme.velocity, 1.6 * canvas.scale, "open")
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
-            half = 10 * canvas.scale
-            canvas.arrow((x - half, y), (x + half, y), canvas.theme.velocity, canvas.width(1.6), "open")
+            half = 9 * canvas.scale
+            canvas.arrow((x - half, y), (x + half, y), canvas.theme.velocity, 1.6 * canvas.scale, "open")
 
         return [LegendEntry("velocity", glyph)] if scene.snapshot is not None else []
 
@@ -114,7 +114,7 @@ class Goals(Layer):
     title = "Goals"
     default = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None or scene.snapshot.decision.goals is None:
             return
         goals = canvas.camera.to_pixels(scene.snapshot.decision.goals)
@@ -131,7 +131,7 @@ class Goals(Layer):
             lambda shift: sprites.cross(arm, theme.final, theme.background, width, True, shift), (x, y)
         )
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         known = scene.snapshot is not None and scene.snapshot.decision.goals is not None
         return [LegendEntry("goal", self._times)] if known else []
 
@@ -143,13 +143,13 @@ class Ranges(Layer):
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
-        self.name = kind  # type: ignore[misc]
-        self.title = f"{kind.capitalize()} range"  # type: ignore[misc]
+        self.name = kind
+        self.title = f"{kind.capitalize()} range"
 
     def _of(self, scene: Scene) -> Array:
         return scene.team.sensing_range if self.kind == "sensing" else scene.team.communication_range
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
         centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
@@ -158,7 +158,7 @@ class Ranges(Layer):
                 colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.15)
                 canvas.circle(center, reach * canvas.camera.zoom, colour, dashed=self.kind != "sensing")
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             canvas.circle((x, y), 6.5 * canvas.scale, canvas.theme.ink, dashed=self.kind != "sensing")
 
@@ -176,7 +176,7 @@ class Links(Layer):
     title = "Neighbours"
     default = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
         neighbours = scene.snapshot.seen.neighbours
@@ -193,7 +193,7 @@ class Links(Layer):
         for start, end in ends.tolist():
             canvas.line(start, end, colour, canvas.width(canvas.theme.line))
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             half = 9 * canvas.scale
             colour = mix(canvas.theme.background, canvas.theme.final, 0.7)
@@ -209,7 +209,7 @@ class ObstaclePoints(Layer):
     title = "Nearest obstacle points"
     default = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
         points = canvas.camera.to_pixels(scene.snapshot.seen.obstacle_points)
@@ -225,5 +225,5 @@ class ObstaclePoints(Layer):
         colour, radius = canvas.theme.forces["repulsion_obstacle"], 3.0 * canvas.scale
         canvas.stamp(lambda shift: sprites.dot(radius, colour, shift), (x, y))
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         return [LegendEntry("nearest obstacle point", self._dot)] if scene.snapshot is not None else []

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MARGIN = 14.0
 LEGEND_ROW = 22.0
 STRIP = 34.0
-_GLYPH = 26.0
+_GLYPH = 28.0
 _GAP = 18.0
 """Pixels at scale 1."""
 
@@ -30,7 +30,7 @@ class ScaleBar(Layer):
     title = "Scale bar"
     in_world = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         length = bar_length(canvas)
         pixels = length * canvas.camera.zoom
         left = MARGIN * canvas.scale
@@ -57,7 +57,7 @@ class Status(Layer):
     title = "Status line"
     in_world = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         bar = bar_length(canvas)
         taken = (
             (MARGIN + 8 + 16) * canvas.scale
@@ -87,13 +87,13 @@ class Legend(Layer):
     def __init__(self) -> None:
         self.entries: list[LegendEntry] = []
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         rows = legend_rows(canvas, self.entries)
         for number, row in enumerate(rows):
             x = MARGIN * canvas.scale
             y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale
             for entry in row:
-                entry.draw(canvas, x + 0.5 * (_GLYPH - 4) * canvas.scale, y)
+                entry.draw(canvas, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
                 x += _GLYPH * canvas.scale
                 x += canvas.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
 

@@ -8,15 +8,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pygame
 import shapely
 
+from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.camera import round_length
-from robocov_app.view.canvas import Canvas
+from robocov_app.view.canvas import Canvas, bounded
 from robocov_app.view.scene import Scene
 from robocov_app.view.theme import mix
 
@@ -52,8 +54,8 @@ class Layer(ABC):
         It stays inside the view of the camera.
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
+    name: str
+    title: str
     default: ClassVar[bool] = True
     static: ClassVar[bool] = False
     in_world: ClassVar[bool] = True
@@ -73,18 +75,23 @@ class Cells(Layer):
     name = "cells"
     title = "Voronoi cells"
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.cells is None:
             return
-        corners = [canvas.camera.to_pixels(cell) for cell in scene.cells]
-        for cell, hue in zip(corners, canvas.hues.tolist(), strict=True):
-            canvas.polygon(cell, canvas.theme.cell(hue))
+        sizes = np.array([len(cell) for cell in scene.cells])
+        corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
+        ends = np.cumsum(sizes)
+        whole = np.rint(bounded(corners)).tolist()
+        for size, end, hue in zip(sizes.tolist(), ends.tolist(), canvas.hues.tolist(), strict=True):
+            if size > 2:
+                pygame.draw.polygon(canvas.surface, canvas.theme.cell(hue), whole[end - size : end])
+        following = np.arange(1, len(corners) + 1)
+        following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         width = canvas.width(canvas.theme.line)
-        for cell in corners:
-            if len(cell) > 2:
-                canvas.outline(cell, canvas.theme.cell_edge, width)
+        for x1, y1, x2, y2 in _once(np.hstack([corners, corners[following]])).tolist():
+            canvas.line((x1, y1), (x2, y2), canvas.theme.cell_edge, width)
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             size = 11 * canvas.scale
             box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
@@ -94,6 +101,18 @@ class Cells(Layer):
         return [LegendEntry("Voronoi cell", glyph)] if scene.cells else []
 
 
+def _once(edges: Array) -> Array:
+    """Return (m, 4) px edges without those that are there already, from the other end too.
+
+    Neighbouring cells share edges; a smooth line that is drawn twice is not smooth any more.
+    """
+    edges = bounded(edges)
+    turned = (edges[:, 0] > edges[:, 2]) | ((edges[:, 0] == edges[:, 2]) & (edges[:, 1] > edges[:, 3]))
+    edges = np.where(turned[:, None], edges[:, [2, 3, 0, 1]], edges)
+    _, first = np.unique(np.rint(edges * 16.0), axis=0, return_index=True)
+    return np.asarray(edges[first])
+
+
 class Grid(Layer):
     """Lines at round distances of metres."""
 
@@ -101,23 +120,38 @@ class Grid(Layer):
     title = "Grid"
     static = True
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         step = grid_step(canvas.camera.zoom, canvas.scale)
         low_x, low_y, high_x, high_y = scene.environment.region.bounds
         seen_x, seen_y, end_x, end_y = canvas.camera.visible()
         colour = _premultiplied(canvas.theme.grid, 0.5)
         width = canvas.width(canvas.theme.line)
-        xs = np.arange(np.ceil(max(low_x, seen_x) / step), np.floor(min(high_x, end_x) / step) + 1) * step
-        ys = np.arange(np.ceil(max(low_y, seen_y) / step), np.floor(min(high_y, end_y) / step) + 1) * step
-        left, top = canvas.camera.to_pixels(np.array([low_x, high_y])).tolist()
-        right, bottom = canvas.camera.to_pixels(np.array([high_x, low_y])).tolist()
         clip = canvas.surface.get_clip()
-        for x in canvas.camera.to_pixels(np.column_stack([xs, np.zeros_like(xs)]))[:, 0]:
-            line = pygame.Rect(round(x - width / 2), round(top), width, round(bottom - top))
+        region = scene.environment.region.polygon
+        for x in (
+            np.arange(np.ceil(max(low_x, seen_x) / step), np.floor(min(high_x, end_x) / step) + 1) * step
+        ):
+            (left, top), (_, bottom) = _across(canvas, region, ((x, high_y), (x, low_y)))
+            line = pygame.Rect(round(left - width / 2), round(top), width, round(bottom) - round(top))
             canvas.surface.fill(colour, line.clip(clip))
-        for y in canvas.camera.to_pixels(np.column_stack([np.zeros_like(ys), ys]))[:, 1]:
-            line = pygame.Rect(round(left), round(y - width / 2), round(right - left), width)
+        for y in (
+            np.arange(np.ceil(max(low_y, seen_y) / step), np.floor(min(high_y, end_y) / step) + 1) * step
+        ):
+            (left, top), (right, _) = _across(canvas, region, ((low_x, y), (high_x, y)))
+            line = pygame.Rect(round(left), round(top - width / 2), round(right) - round(left), width)
             canvas.surface.fill(colour, line.clip(clip))
+
+
+def _across(
+    canvas: Canvas, region: shapely.Polygon, line: tuple[tuple[float, float], tuple[float, float]]
+) -> list[list[float]]:
+    """Return the ends, in pixels, of what of `line` lies in the convex `region`; no length where nothing."""
+    inside = shapely.get_coordinates(shapely.intersection(region, shapely.LineString(line)))
+    if len(inside) != 2:
+        return canvas.camera.to_pixels(np.array([line[0], line[0]])).tolist()  # type: ignore[no-any-return]
+    if np.hypot(*(inside[0] - line[0])) > np.hypot(*(inside[1] - line[0])):
+        inside = inside[::-1]
+    return canvas.camera.to_pixels(inside).tolist()  # type: ignore[no-any-return]
 
 
 def grid_step(zoom: float, scale: float) -> float:
@@ -134,7 +168,7 @@ class Obstacles(Layer):
     title = "Obstacles"
     static = True
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         # courtyards are cut out of a page of their own, so that what lies below shows in them
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         page.set_clip(canvas.surface.get_clip())
@@ -153,7 +187,7 @@ class Obstacles(Layer):
             own.outline(corners, canvas.theme.obstacle_edge, canvas.width(canvas.theme.line))
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             size = 11 * canvas.scale
             box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
@@ -171,7 +205,7 @@ class Boundary(Layer):
     title = "Boundary"
     static = True
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         corners = canvas.camera.to_pixels(scene.environment.region.vertices)
         canvas.outline(corners, canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))
 
@@ -182,7 +216,7 @@ class Starts(Layer):
     name = "starts"
     title = "Starts"
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.starts is None:
             return
         for center in canvas.camera.to_pixels(scene.starts).tolist():
@@ -194,7 +228,7 @@ class Starts(Layer):
         colour = canvas.theme.start
         canvas.stamp(lambda shift: sprites.ring(radius, colour, width, shift), (x, y))
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         return [LegendEntry("start", self._ring)] if scene.starts is not None else []
 
 
@@ -204,7 +238,7 @@ class Centroids(Layer):
     name = "centroids"
     title = "Centroids"
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.centroids is None:
             return
         for center in canvas.camera.to_pixels(scene.centroids).tolist():
@@ -217,7 +251,7 @@ class Centroids(Layer):
             lambda shift: sprites.cross(arm, theme.ink, theme.background, width, False, shift), (x, y)
         )
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         return [LegendEntry("cell centroid", self._plus)] if scene.centroids is not None else []
 
 
@@ -227,26 +261,20 @@ class Robots(Layer):
     name = "robots"
     title = "Robots"
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
         radii = drawn_radii(canvas, scene)
         ring = 1.6 * canvas.scale
         edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
         centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
-        for robot, (center, hue, radius) in enumerate(
-            zip(centers, canvas.hues.tolist(), radii, strict=True), start=1
-        ):
-            fill = canvas.theme.robots[hue]
-            text = str(robot) if radius >= 6.5 * canvas.scale else ""
-            canvas.stamp(
-                lambda shift, radius=radius, fill=fill, text=text: sprites.disc(  # type: ignore[misc]
-                    radius, fill, canvas.theme.robot_ring, ring, edge, text, shift
-                ),
-                center,
-            )
+        theme = canvas.theme
+        for robot, (center, radius) in enumerate(zip(centers, radii, strict=True)):
+            fill = theme.robots[canvas.hues[robot]]
+            text = str(robot + 1) if radius >= 6.5 * canvas.scale else ""
+            canvas.stamp(partial(sprites.disc, radius, fill, theme.robot_ring, ring, edge, text), center)
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             theme, scale = canvas.theme, canvas.scale
             edge = mix(theme.background, theme.ink, 0.55)

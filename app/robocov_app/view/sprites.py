@@ -1,12 +1,14 @@
-"""Small anti-aliased pictures: discs with numbers, rings, crosses. Drawn large once, shrunk, and kept.
+"""Anti-aliased strokes and small pictures: drawn large, and shrunk.
 
-Each is kept for a quarter of a pixel's shift, so that slow robots glide in films instead of hopping.
-All are premultiplied: blit them with ``BLEND_PREMULTIPLIED``.
+Discs with numbers, rings and crosses are kept, for each quarter of a pixel's shift, so that slow
+robots glide in films instead of hopping. All is premultiplied: blit with ``BLEND_PREMULTIPLIED``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import TypeAlias
 
 import pygame
 
@@ -15,6 +17,62 @@ from robocov_app.view.theme import Colour, readable_on
 
 FINE = 4
 """Each sprite is drawn so many times larger; also the number of shifts within a pixel."""
+
+STROKE_FINE = 3
+"""The same for strokes, which may span the whole picture."""
+
+Pixel: TypeAlias = Sequence[float]
+"""x to the right and y down from the surface's corner."""
+
+
+class Sketch:
+    """A part of a surface, drawn `STROKE_FINE` times larger and shrunk onto it.
+
+    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do.
+
+    Parameters
+    ----------
+    box : pygame.Rect
+        The part of the surface, in its pixels.
+    """
+
+    def __init__(self, box: pygame.Rect) -> None:
+        self._box = box
+        self._large = pygame.Surface((box.width * STROKE_FINE, box.height * STROKE_FINE), pygame.SRCALPHA, 32)
+
+    @classmethod
+    def around(cls, points: Sequence[Pixel], margin: float) -> Sketch | None:
+        """Return a sketch that holds `points` and `margin` pixels around; None where it would be huge."""
+        xs, ys = [point[0] for point in points], [point[1] for point in points]
+        left, top = int(min(xs) - margin) - 1, int(min(ys) - margin) - 1
+        width, height = int(max(xs) + margin) + 2 - left, int(max(ys) + margin) + 2 - top
+        return cls(pygame.Rect(left, top, width, height)) if max(width, height) <= 4000 else None
+
+    def _large_points(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
+        # pixels are squares around their whole numbers: their middle is not at a corner of the large ones
+        x, y = self._box.x - 0.5, self._box.y - 0.5
+        return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
+
+    def path(self, points: Sequence[Pixel], colour: Colour, width: float) -> None:
+        """Draw a line of `width` pixels with round joints and ends."""
+        wide = max(width * STROKE_FINE, 1.0)
+        large = self._large_points(points)
+        pygame.draw.lines(self._large, colour, False, large, round(wide))
+        for point in large:
+            pygame.draw.circle(self._large, colour, point, wide / 2)
+
+    def polygon(self, corners: Sequence[Pixel], colour: Colour) -> None:
+        """Fill a polygon."""
+        pygame.draw.polygon(self._large, colour, self._large_points(corners))
+
+    def dot(self, center: Pixel, radius: float, colour: Colour) -> None:
+        """Fill a circle."""
+        pygame.draw.circle(self._large, colour, self._large_points([center])[0], radius * STROKE_FINE)
+
+    def onto(self, surface: pygame.Surface) -> None:
+        """Blend the shrunk sketch onto `surface`."""
+        picture = pygame.transform.smoothscale(self._large, self._box.size)
+        surface.blit(picture, self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _blank(radius: float) -> tuple[pygame.Surface, int]:

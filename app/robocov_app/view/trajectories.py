@@ -9,10 +9,14 @@ from robocov.arrays import Array
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.layers import Layer, LegendEntry
 from robocov_app.view.scene import Scene
+from robocov_app.view.sprites import Sketch
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, mix
 
-PIECE = 2.5
-"""Pixels between the corners of a drawn trajectory: shorter pieces would look lumpy."""
+PIECE = 2.0
+"""Pixels between the corners of a drawn trajectory."""
+
+SECTION = 16.0
+"""Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
 
 
 class Trajectories(Layer):
@@ -21,7 +25,7 @@ class Trajectories(Layer):
     Parameters
     ----------
     colours : {"robots", "paper"}
-        Each in its robot's colour (teams too large for that: in one quiet colour), or all red.
+        Each in its robot's colour (large teams: all in a quiet red), or all red.
     fade : float or None, s
         Show the last so many seconds only, fading into the past; needs `Scene.trail_time`.
     """
@@ -37,49 +41,72 @@ class Trajectories(Layer):
         self._drawn = 0
         self._first = np.empty((0, 2))
         self._last_row = np.empty((0, 2))
-        self._corner = np.empty((0, 2))
+        self._open: list[list[list[float]]] = []
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:  # noqa: D102
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
         colours = self._of_robots(canvas)
-        width = canvas.width(canvas.theme.trajectory_line if trail.shape[1] <= ONE_HUE_EACH else 1.0)
+        width = canvas.scale * (canvas.theme.trajectory_line if trail.shape[1] <= ONE_HUE_EACH else 1.1)
         if self.fade is not None and scene.trail_time is not None:
-            self._faded(canvas, trail, scene.trail_time, colours, width)
+            self._faded(canvas, trail, scene.trail_time, colours, canvas.width(width / canvas.scale))
             return
-        page = self._page_for(canvas, trail)
-        fresh = canvas.camera.to_pixels(trail[self._drawn :])
-        for row in fresh:
-            far = np.hypot(*(row - self._corner).T) >= PIECE
-            for robot in np.nonzero(far)[0].tolist():
-                start, end = self._corner[robot].tolist(), row[robot].tolist()
-                pygame.draw.aaline(page, colours[robot], start, end, width)
-            self._corner = np.where(far[:, None], row, self._corner)
-        self._drawn = len(trail)
-        self._last_row = trail[-1].copy()
+        page, continues = self._page_for(canvas, trail)
+        self._lengthen(canvas.camera.to_pixels(trail[self._drawn :]))
+        self._drawn, self._last_row = len(trail), trail[-1].copy()
+        self._finish_sections(page, colours, width, together=not continues)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = canvas.camera.to_pixels(trail[-1]).tolist()
-        for corner, end, colour in zip(self._corner.tolist(), ends, colours, strict=True):
-            canvas.line(corner, end, colour, width)
+        for path, end, colour in zip(self._open, ends, colours, strict=True):
+            # mostly below the robot's disc, where seams do not show
+            canvas.outline(np.array([*path, end]), colour, canvas.width(width / canvas.scale), closed=False)
 
-    def _page_for(self, canvas: Canvas, trail: Array) -> pygame.Surface:
-        """Return the page of old pieces, a fresh one when `trail` does not continue what is on it."""
+    def _lengthen(self, rows: Array) -> None:
+        """Add the corners that lie far enough from the last of each path."""
+        last = np.array([path[-1] for path in self._open])
+        for row in rows:
+            delta = row - last
+            far = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= PIECE * PIECE
+            if far.any():
+                for robot in np.nonzero(far)[0].tolist():
+                    self._open[robot].append(row[robot].tolist())
+                last[far] = row[far]
+
+    def _finish_sections(
+        self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
+    ) -> None:
+        """Draw what is long enough on the page, and begin anew at its end."""
+        moved = any(len(path) > 1 for path in self._open)
+        whole = Sketch(page.get_rect()) if together and moved else None
+        for robot, path in enumerate(self._open):
+            if len(path) < 2 or (whole is None and PIECE * (len(path) - 1) < SECTION):
+                continue
+            sketch = whole if whole is not None else Sketch.around(path, width)
+            if sketch is not None:
+                sketch.path(path, colours[robot], width)
+                if sketch is not whole:
+                    sketch.onto(page)
+            self._open[robot] = path[-1:]
+        if whole is not None:
+            whole.onto(page)
+
+    def _page_for(self, canvas: Canvas, trail: Array) -> tuple[pygame.Surface, bool]:
+        """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
         size = canvas.surface.get_size()
         key = (canvas.camera, canvas.theme.name, canvas.scale, size, self.colours, trail.shape[1])
         continues = (
-            self._page is not None
-            and key == self._key
+            key == self._key
             and 0 < self._drawn <= len(trail)
             and np.array_equal(trail[0], self._first)
             and np.array_equal(trail[self._drawn - 1], self._last_row)
         )
-        if not continues or self._page is None:
+        if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
             self._key, self._drawn, self._first = key, 0, trail[0].copy()
-            self._corner = canvas.camera.to_pixels(trail[0])
+            self._open = [[point] for point in canvas.camera.to_pixels(trail[0]).tolist()]
         self._page.set_clip(canvas.surface.get_clip())
-        return self._page
+        return self._page, continues
 
     def _faded(self, canvas: Canvas, trail: Array, time: Array, colours: list[Colour], width: int) -> None:
         fade = self.fade or 0.0
@@ -98,13 +125,17 @@ class Trajectories(Layer):
         if self.colours == "paper":
             return [theme.trajectory] * n
         if n > ONE_HUE_EACH:
-            return [mix(theme.background, theme.ink, 0.6)] * n
+            return [mix(theme.trajectory, theme.background, 0.25)] * n
         return [mix(theme.robots[hue], theme.ink, 0.12) for hue in canvas.hues.tolist()]
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:  # noqa: D102
+    def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             angle = np.linspace(-np.pi, np.pi, 24)
-            wave = np.column_stack([x + angle * 3.2 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
-            canvas.outline(wave, self._of_robots(canvas)[0], canvas.width(1.6), closed=False)
+            wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
+            sketch = Sketch.around(wave.tolist(), 3.0)
+            if sketch is not None:
+                width = canvas.theme.trajectory_line * canvas.scale
+                sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
+                sketch.onto(canvas.surface)
 
         return [LegendEntry("trajectory", glyph)] if scene.trail is not None else []
