@@ -23,7 +23,8 @@ class Walls:
 
     A vertex where walls touch (a pinch) has several sectors: wedges of free space, each between an
     outgoing edge and the next incoming edge counter-clockwise. A *corner* is a sector wider than a
-    half turn; only there a shortest path can bend. A vertex has at most one.
+    half turn; only there a shortest path can bend. A sector of exactly a half turn is a corner too if
+    other sectors share its vertex. A vertex has at most one corner.
 
     Attributes
     ----------
@@ -38,9 +39,9 @@ class Walls:
     sector_vertex, sector_before, sector_after : (s,)
         Vertices: free space lies right of vertex → before, and left of vertex → after.
     sector_wide : (s,)
-        True where the sector is wider than a half turn.
+        True where the sector is a corner.
     corner_vertex, corner_before, corner_after : (k,)
-        The wide sectors again.
+        The corners, each like its sector.
     """
 
     grid: Grid
@@ -74,7 +75,8 @@ class Walls:
 
         vertex, before, after = _sectors(x, y, start, end)
         turn = cross(x[vertex] - x[before], y[vertex] - y[before], x[after] - x[vertex], y[after] - y[vertex])
-        wide = turn < 0.0
+        # a straight wall counts where another sector ends on it: that one's walls would hide what is ahead
+        wide = (turn < 0.0) | ((turn == 0.0) & (np.bincount(vertex)[vertex] > 1))
         inner = ~_on_hull(x, y, start, end)
         return cls(
             grid=grid,

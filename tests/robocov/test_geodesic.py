@@ -1,0 +1,271 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, PolygonObstacle
+from robocov.errors import InputError
+from robocov.geodesic import Geodesics
+from robocov.orientation import Grid, cross
+from robocov.visibility import Fans, pseudo_angle
+
+sys.path.insert(0, str(Path(__file__).parent))
+import brute_force_geodesic as brute
+
+SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+BAY = ((0, 0), (8, 0), (8, 4), (4, 4), (4, 6), (8, 6), (8, 8), (0, 8), (2, 4))
+
+
+def environment(*obstacles, boundary=SQUARE):
+    return Environment(
+        "test", boundary, tuple(PolygonObstacle(tuple(map(tuple, ring))) for ring in obstacles)
+    )
+
+
+def box(x0, y0, x1, y1):
+    return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+
+
+PILLAR = environment(box(3 / 8, 3 / 8, 5 / 8, 5 / 8))
+PILLAR_WITH_COLLINEAR_VERTICES = environment(
+    [
+        (3 / 8, 3 / 8),
+        (1 / 2, 3 / 8),
+        (5 / 8, 3 / 8),
+        (5 / 8, 7 / 16),
+        (5 / 8, 5 / 8),
+        (7 / 16, 5 / 8),
+        (3 / 8, 5 / 8),
+    ]
+)
+CUP = environment(
+    [
+        *((1 / 4, 1 / 4), (3 / 4, 1 / 4), (3 / 4, 3 / 4), (5 / 8, 3 / 4)),
+        *((5 / 8, 3 / 8), (3 / 8, 3 / 8), (3 / 8, 3 / 4), (1 / 4, 3 / 4)),
+    ]
+)
+PINCH = environment(box(1 / 4, 1 / 4, 1 / 2, 1 / 2), box(1 / 2, 1 / 2, 3 / 4, 3 / 4))
+SHARED_EDGE = environment(box(1 / 4, 1 / 4, 1 / 2, 3 / 4), box(1 / 2, 1 / 4, 3 / 4, 3 / 4))
+MAZE = environment(
+    *[box(x, 1 if k % 2 else 0, x + 1, 8 if k % 2 else 7) for k, x in enumerate((1, 3, 5))],
+    boundary=((0, 0), (8, 0), (8, 8), (0, 8)),
+)
+
+
+@pytest.mark.parametrize(
+    ("where", "source", "target", "expected"),
+    [
+        (PILLAR, (1 / 8, 1 / 2), (7 / 8, 1 / 2), 0.809016994375),
+        (PILLAR_WITH_COLLINEAR_VERTICES, (1 / 8, 1 / 2), (7 / 8, 1 / 2), 0.809016994375),
+        (PILLAR, (3 / 8, 1 / 2), (7 / 8, 1 / 2), 0.654508497187),
+        (PILLAR, (3 / 8, 5 / 8), (7 / 8, 1 / 2), 0.529508497187),
+        (PILLAR, (3 / 8, 3 / 8), (3 / 8, 3 / 8), 0.0),
+        (CUP, (1 / 2, 1 / 2), (1 / 2, 1 / 8), 1.184016994375),
+        (PINCH, (3 / 8, 5 / 8), (5 / 8, 3 / 8), 0.853553390593),
+        (SHARED_EDGE, (1 / 2, 1 / 8), (1 / 2, 7 / 8), 1.059016994375),
+        # over the first wall, under the second, over the third and straight on
+        (MAZE, (0.5, 0.5), (7.5, 7.5), np.hypot(0.5, 6.5) + 2 + 2 * np.hypot(1, 6) + np.hypot(2.5, 0.5)),
+    ],
+)
+def test_distances_known_in_closed_form(where, source, target, expected):
+    distances = Geodesics(where)
+    assert distances.distances([source], [target])[0, 0] == pytest.approx(expected, abs=1e-12)
+    assert distances.distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_wall_with_a_touching_obstacle_in_line_is_passed():
+    # the bottoms of both obstacles lie on one line and touch in a point; below it the way is free
+    where = environment([(1, 1), (3, 1), (2, 3)], box(3, 1, 6, 4), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    assert Geodesics(where).distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(6.5, abs=1e-12)
+    # above, the pinch blocks: round the triangle's top or the box
+    above = Geodesics(where).distances([[2.75, 2]], [[2.5, 0.5]])[0, 0]
+    expected = brute.distances(where.free, [(2.75, 2.0)], [(2.5, 0.5)])[0, 0]
+    assert above == pytest.approx(expected, abs=1e-12)
+    assert above > 3.0
+
+
+def test_a_robot_on_a_pinch_sees_both_sides():
+    distances = Geodesics(PINCH).distances([[1 / 2, 1 / 2]], [[3 / 8, 5 / 8], [5 / 8, 3 / 8]])
+    assert distances[0] == pytest.approx([np.hypot(1 / 8, 1 / 8)] * 2, abs=1e-12)
+
+
+def test_sealed_rooms_are_infinitely_far():
+    where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    assert len(where.free.geoms) == 2
+    distances = Geodesics(where).distances([[1, 1], [7, 7]], [[2, 2], [6, 6]])
+    assert np.isinf(distances).tolist() == [[False, True], [True, False]]
+    assert Geodesics(where).path(np.array([1.0, 1.0]), np.array([7.0, 7.0])).shape == (0, 2)
+
+
+cell = st.integers(0, 16).map(lambda k: k / 2)
+boxes = st.tuples(cell, cell, cell, cell).filter(lambda b: b[0] < b[2] and b[1] < b[3]).map(lambda b: box(*b))
+triangles = st.tuples(*[st.tuples(cell, cell)] * 3).filter(lambda t: shapely.Polygon(t).area > 0.1)
+diamonds = st.tuples(cell, cell, st.sampled_from([0.5, 1.0, 2.0])).map(
+    lambda d: ((d[0] + d[2], d[1]), (d[0], d[1] + d[2]), (d[0] - d[2], d[1]), (d[0], d[1] - d[2]))
+)
+maps = st.builds(
+    lambda obstacles, boundary: environment(*obstacles, boundary=boundary),
+    st.lists(boxes | boxes | triangles | diamonds, max_size=6),
+    st.sampled_from([box(0, 0, 8, 8), BAY]),
+).filter(lambda where: where.free_area > 6.0)
+
+
+def draw_points(data, where, count):
+    """Points of the closed free space: vertices, points on walls or in line with them, any points."""
+    vertices = np.unique(shapely.get_coordinates(where.free), axis=0)
+    on_grid = st.tuples(st.integers(0, 32), st.integers(0, 32)).map(lambda p: (p[0] / 4, p[1] / 4))
+    anywhere = st.tuples(st.floats(0, 8), st.floats(0, 8))
+    at_vertex = st.integers(0, len(vertices) - 1).map(lambda k: tuple(vertices[k].tolist()))
+    points = data.draw(st.lists(on_grid | anywhere | at_vertex, min_size=count, max_size=count + 4))
+    keep = [
+        p for p in points if shapely.intersects_xy(where.free, *p) and brute.well_placed(where.free, p, 8.0)
+    ]
+    assume(keep)
+    return keep
+
+
+@settings(max_examples=250, deadline=None)
+@given(maps, st.data())
+def test_distances_agree_with_the_brute_force(where, data):
+    sources, targets = draw_points(data, where, 2), draw_points(data, where, 3)
+    expected = brute.distances(where.free, sources, targets)
+    np.testing.assert_allclose(Geodesics(where).distances(sources, targets), expected, rtol=0, atol=8e-12)
+
+
+@settings(max_examples=150, deadline=None)
+@given(maps, st.data())
+def test_cost_agrees_with_the_brute_force(where, data):
+    robots = draw_points(data, where, 3)
+    cost = CoverageCost(where, lattice=7)
+    result = cost(robots)
+    good = [brute.well_placed(where.free, p, 8.0) for p in cost.points]
+    expected = brute.distances(where.free, robots, cost.points).min(axis=0)
+    np.testing.assert_allclose(result.distances[good], expected[good], rtol=0, atol=8e-12)
+    assert ((result.owner >= 0) == np.isfinite(result.distances)).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(maps, st.data())
+def test_paths_are_as_long_as_the_distance_and_keep_to_free_space(where, data):
+    source, *others = draw_points(data, where, 4)
+    geodesics = Geodesics(where)
+    for target in others:
+        way = geodesics.path(np.array(source), np.array(target))
+        distance = geodesics.distances([source], [target])[0, 0]
+        if np.isinf(distance):
+            assert way.shape == (0, 2)
+            continue
+        assert np.hypot(*np.diff(way, axis=0).T).sum() == pytest.approx(distance, abs=8e-12)
+        assert shapely.LineString(way).difference(where.free.buffer(1e-9)).length < 1e-9
+        np.testing.assert_allclose(way[[0, -1]], [source, target], rtol=0, atol=1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(maps, st.data())
+def test_distances_are_a_metric_no_shorter_than_the_straight_line(where, data):
+    points = np.array(draw_points(data, where, 4))
+    vertices = shapely.get_coordinates(where.free)
+    inner = np.array([not (vertices == p).all(axis=1).any() for p in points])
+    distances = Geodesics(where).distances(points, points)
+    straight = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    assert (distances >= straight - 1e-11).all()
+    np.testing.assert_array_equal(np.diag(distances), 0.0)
+    finite = np.where(np.isinf(distances), 1e9, distances)
+    np.testing.assert_allclose(finite, finite.T, rtol=0, atol=1e-11)
+    # a point on a pinch lies on both sides at once, and would be a short cut
+    by_way_of = (distances[:, inner, None] + distances[None, inner]).min(axis=1, initial=np.inf)
+    assert (distances <= by_way_of + 1e-11).all()
+
+
+def test_without_obstacles_the_distance_is_euclidean():
+    rng = np.random.default_rng(5)
+    points = rng.uniform(size=(20, 2))
+    distances = Geodesics(environment()).distances(points, points)
+    np.testing.assert_allclose(
+        distances, np.hypot(*(points[:, None] - points).transpose(2, 0, 1)), atol=1e-15
+    )
+
+
+SLANTED = environment([(0.2, 0.31), (0.7, 0.17), (0.83, 0.59), (0.4, 0.77)])
+
+
+@pytest.mark.parametrize("depth", [-1e-9, -1e-15, 0.0, 1e-15, 1e-9, 1e-6])
+def test_points_a_hair_inside_an_obstacle_are_on_its_wall(depth):
+    geodesics = Geodesics(SLANTED)
+    a, b = np.array([0.2, 0.31]), np.array([0.7, 0.17])
+    inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
+    for part in np.linspace(0.01, 0.99, 30):
+        wall = a + part * (b - a)
+        target = [[0.6, 0.9]]
+        distance = geodesics.distances([wall + depth * inward], target)[0, 0]
+        outside = geodesics.distances([wall - 1e-8 * inward], target)[0, 0]
+        assert distance == pytest.approx(outside, abs=1.1e-6 if depth == 1e-6 else 3e-8)
+        assert distance > np.hypot(*(wall - target[0])) + 0.01
+
+
+@pytest.mark.parametrize("point", [(0.5, 0.4), (1.1, 0.5), (-1e-3, 0.2), (1e9, 0.0)])
+def test_points_outside_the_free_space_are_named(point):
+    with pytest.raises(
+        InputError, match=r"positions\[1\] = \[.*\] is .* m outside the free space of map 'test'"
+    ):
+        Geodesics(SLANTED).place([[0.1, 0.1], point])
+
+
+def test_points_that_are_no_numbers_are_named():
+    with pytest.raises(InputError, match=r"positions\[0\] = \[nan, 1\]: finite numbers"):
+        Geodesics(SLANTED).place([[np.nan, 1.0]])
+    with pytest.raises(InputError, match=r"positions: an array of shape \(3,\)"):
+        Geodesics(SLANTED).place([1.0, 2.0, 3.0])
+
+
+whole = st.integers(-(2**49), 2**49)
+
+
+@settings(max_examples=300, deadline=None)
+@given(whole, whole, st.integers(-3, 3), st.integers(-3, 3), st.integers(1, 5), whole, whole)
+def test_the_side_of_a_line_is_exact(ux, uy, near_x, near_y, multiple, wx, wy):
+    pairs = [(ux // 5 * multiple + near_x, uy // 5 * multiple + near_y), (wx, wy)]
+    for vx, vy in pairs:
+        value = cross(*(np.array([float(c)]) for c in (ux, uy, vx, vy)))[0]
+        exact = ux * vy - uy * vx
+        assert np.sign(value) == (exact > 0) - (exact < 0)
+        assert value == pytest.approx(exact, rel=1e-12, abs=2.0**50)
+
+
+def test_the_grid_keeps_dyadic_numbers():
+    grid = Grid.over(np.array([-3.0, 5.0]), 10.0)
+    points = np.array([[-2.875, 5.5], [7.0, 14.99]])
+    assert grid.unit == 2.0**-44
+    np.testing.assert_allclose(grid.metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
+    np.testing.assert_array_equal(grid.metres(grid.snap(points))[0], points[0])
+
+
+def test_pseudo_angles_grow_with_the_angle():
+    angle = np.linspace(-np.pi / 2, 3 * np.pi / 2, 1000, endpoint=False)
+    values = pseudo_angle(np.cos(angle), np.sin(angle))
+    assert (np.diff(values) > 0.0).all()
+    assert values.min() >= 0.0
+    assert values.max() <= 4.0
+
+
+@pytest.mark.parametrize("bins", [1, 7, 64, 256])
+def test_the_view_does_not_depend_on_the_number_of_bins(bins):
+    rng = np.random.default_rng(2)
+    rings = [rng.uniform(0.1, 0.9, 2) + 0.07 * np.array([[1, 0], [0, 1], [-1, 0.3]]) for _ in range(12)]
+    geodesics = Geodesics(environment(*rings))
+    x, y = np.rint(rng.uniform(size=(2, 40)) * 2.0**48)
+    free = shapely.intersects_xy(geodesics.walls.free, x, y)
+    x, y = x[free], y[free]
+    source, target = np.indices((len(x), len(x))).reshape(2, -1)
+    lines = shapely.linestrings(np.stack([np.c_[x[source], y[source]], np.c_[x[target], y[target]]], axis=1))
+    expected = shapely.covers(geodesics.walls.free, lines) | (source == target)
+    np.testing.assert_array_equal(
+        Fans(geodesics.walls, x, y, bins).see(source, x[target], y[target]), expected
+    )
