@@ -175,7 +175,8 @@ def _room_warnings(environment: Environment, radius: float) -> Iterator[str]:
         spot = part.representative_point()
         yield f"sealed room of {part.area:.3g} m² around [{spot.x:.4g}, {spot.y:.4g}]"
     if slivers:
-        yield f"{len(slivers)} sealed pockets smaller than a robot, {sum(slivers):.2g} m² together"
+        plural = "s" if len(slivers) > 1 else ""
+        yield f"{len(slivers)} sealed pocket{plural} smaller than a robot, {sum(slivers):.2g} m² together"
 
 
 def _start_warnings(environment: Environment, radius: float) -> Iterator[str]:

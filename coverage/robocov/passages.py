@@ -1,4 +1,4 @@
-"""The narrowest passage of a free space, exactly.
+"""The narrowest passage of a free space, to a micrometre.
 
 A disc of growing radius can reach the same places, in the same ways, until its diameter
 passes the width of a gap. At such a gap the distance to the walls has a saddle: two wall points
@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from shapely import MultiPolygon
 
 from robocov.environment import SAGITTA
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
-    from shapely import MultiPolygon
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array, BoolArray, IntArray
@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
 
-_TOUCHING = 2 * SAGITTA
+_CRACK = 2 * SAGITTA
 """Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
+
+_DIGITS = 6
+"""Results are rounded to the grid of the derived geometry, a micrometre."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +94,10 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     Examples
     --------
     >>> room = shapely.box(0, 0, 6, 3) - shapely.box(2.9, 1, 3.1, 2.2)
-    >>> round(narrowest_gap(shapely.MultiPolygon([room])).width, 6)
+    >>> narrowest_gap(shapely.MultiPolygon([room])).width
     0.8
     """
+    free = _without_cracks(free)
     if free.is_empty:
         return None
     walls = _walls(free)
@@ -105,7 +109,7 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     shapely.prepare(free)
     low_x, low_y, high_x, high_y = free.bounds
     largest = math.hypot(high_x - low_x, high_y - low_y)
-    below, reach = _TOUCHING, largest / 256
+    below, reach = _CRACK / 2, largest / 256
     # most maps have a gap far narrower than the map is wide: look near first
     while len(corners) and below < largest:
         corner, edge = tree.query(shapely.points(corners), predicate="dwithin", distance=reach)
@@ -114,6 +118,17 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
             return found
         below, reach = reach, 2 * reach
     return None
+
+
+def _without_cracks(free: MultiPolygon) -> MultiPolygon:
+    """Return `free` without the parts that are narrower than `_CRACK`.
+
+    What touches there becomes one wall, and stays apart by a nanometre so that it does not touch
+    in a point again. Corners of less than a degree are cut, everything else comes back as it was.
+    """
+    for distance in (-_CRACK / 2, _CRACK / 2 - 1e-9):
+        free = free.buffer(distance, join_style="mitre", mitre_limit=100.0)
+    return MultiPolygon([shapely.orient_polygons(part) for part in shapely.get_parts(free)])
 
 
 def _walls(free: MultiPolygon) -> _Walls:
@@ -172,11 +187,13 @@ def _narrowest(
         empty[empty] = shapely.contains_properly(free, middle[empty])
         if empty.any():
             first = some[int(np.argmax(empty))]
-            ends = sorted(
-                [(float(p[first, 0]), float(p[first, 1])), (float(q[first, 0]), float(q[first, 1]))]
-            )
-            return Gap(float(width[first]), (ends[0], ends[1]))
+            ends = sorted(_rounded(point) for point in (p[first], q[first]))
+            return Gap(round(float(width[first]), _DIGITS), (ends[0], ends[1]))
     return None
+
+
+def _rounded(point: Array) -> tuple[float, float]:
+    return round(float(point[0]), _DIGITS), round(float(point[1]), _DIGITS)
 
 
 def _leads_on(walls: _Walls, corner: IntArray, edge: IntArray, p: Array, q: Array, width: Array) -> BoolArray:
