@@ -8,8 +8,8 @@ cell has about six vertices, and numpy's calls would cost more than the arithmet
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import chain, pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,24 +18,15 @@ from robocov.cell_edges import REGION, CellEdges
 from robocov.observation import Neighbours
 from robocov.region import Region
 
+Vertex: TypeAlias = tuple[float, float, int]
+"""x and y in metres relative to the generator, and what lies beyond the edge that begins here: the index
+of a robot or `REGION`."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ClippedCell:
-    """One cell: vertices relative to its generator, counter-clockwise; edge k goes from vertex k to k + 1.
-
-    Attributes
-    ----------
-    x, y : (k,) m
-    beyond : (k,)
-        What lies beyond edge k: the index of a robot or `REGION`.
-    """
-
-    x: list[float]
-    y: list[float]
-    beyond: list[int]
+Cell: TypeAlias = list[Vertex]
+"""The vertices of a cell, counter-clockwise; none when the cell is empty."""
 
 
-def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> list[ClippedCell]:
+def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> list[Cell]:
     """Return the cells V_i of equation (1) within `region`.
 
     Parameters
@@ -45,36 +36,36 @@ def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> lis
         Cell i is cut by the bisectors to the robots that i hears. Generators at the very same place
         do not cut each other: they get the same cell.
     """
-    corners_x, corners_y = region.vertices[:, 0].tolist(), region.vertices[:, 1].tolist()
-    x, y = generators[:, 0].tolist(), generators[:, 1].tolist()
+    corners = region.vertices.tolist()
+    places = generators.tolist()
     cells = []
-    for robot, others in enumerate(_by_distance(generators, neighbours)):
-        px, py = x[robot], y[robot]
-        cell = ClippedCell(
-            [u - px for u in corners_x], [v - py for v in corners_y], [REGION] * len(corners_x)
-        )
+    for (px, py), others in zip(places, _by_distance(generators, neighbours), strict=True):
+        cell = [(x - px, y - py, REGION) for x, y in corners]
         security = _security(cell)
         for other in others:
-            dx, dy = x[other] - px, y[other] - py
+            x, y = places[other]
+            dx, dy = x - px, y - py
             square = dx * dx + dy * dy
             if square > security:
                 break
-            if dx or dy:
-                cut = _cut(cell, dx, dy, 0.5 * square, other)
-                if cut is not cell:
-                    cell, security = cut, _security(cut)
+            level = 0.5 * square
+            for x, y, _ in cell:
+                if x * dx + y * dy > level:
+                    cell = _cut(cell, dx, dy, level, other)
+                    security = _security(cell)
+                    break
         cells.append(cell)
     return cells
 
 
-def mass_and_centroid(cells: list[ClippedCell], generators: Array) -> tuple[Array, Array]:
+def mass_and_centroid(cells: list[Cell], generators: Array) -> tuple[Array, Array]:
     """Return the areas (n,) m² and centroids (n, 2) m of the cells; an empty cell's is its generator."""
     mass, offset = [], []
     for cell in cells:
         area = moment_x = moment_y = 0.0
-        if cell.x:
-            u, v = cell.x[-1], cell.y[-1]
-            for x, y in zip(cell.x, cell.y, strict=True):
+        if cell:
+            u, v, _ = cell[-1]
+            for x, y, _ in cell:
                 cross = u * y - x * v
                 area += cross
                 moment_x += cross * (u + x)
@@ -89,21 +80,19 @@ def mass_and_centroid(cells: list[ClippedCell], generators: Array) -> tuple[Arra
     return np.array(mass), generators + np.array(offset).reshape(-1, 2)
 
 
-def edges_of(cells: list[ClippedCell]) -> CellEdges:
+def edges_of(cells: list[Cell]) -> CellEdges:
     """Return the edges of all cells as arrays."""
-    x = np.array(list(chain.from_iterable(cell.x for cell in cells)))
-    y = np.array(list(chain.from_iterable(cell.y for cell in cells)))
-    start = np.column_stack([x, y])
-    counts = np.array([len(cell.x) for cell in cells], dtype=np.intp)
-    following = np.arange(1, len(start) + 1)
+    vertices = np.array(list(chain.from_iterable(cells))).reshape(-1, 3)
+    counts = np.array([len(cell) for cell in cells], dtype=np.intp)
+    following = np.arange(1, len(vertices) + 1)
     last = np.cumsum(counts)
     filled = counts > 0
     following[last[filled] - 1] = (last - counts)[filled]
     return CellEdges(
-        start=start,
-        end=start[following],
+        start=vertices[:, :2],
+        end=vertices[following, :2],
         cell=np.repeat(np.arange(len(cells)), counts),
-        beyond=np.array(list(chain.from_iterable(cell.beyond for cell in cells)), dtype=np.intp),
+        beyond=vertices[:, 2].astype(np.intp),
     )
 
 
@@ -125,32 +114,27 @@ def _by_distance(generators: Array, neighbours: Neighbours) -> list[list[int]]:
     return [ordered[start:stop] for start, stop in pairwise(stops)]
 
 
-def _security(cell: ClippedCell) -> float:
+def _security(cell: Cell) -> float:
     """Return the square of the distance beyond which no generator can cut the cell.
 
     Twice the distance of the farthest vertex: a bisector lies half way to the other generator.
     """
-    return 4.0 * max([x * x + y * y for x, y in zip(cell.x, cell.y, strict=True)], default=-1.0)
+    return 4.0 * max([x * x + y * y for x, y, _ in cell], default=-1.0)
 
 
-def _cut(cell: ClippedCell, dx: float, dy: float, level: float, other: int) -> ClippedCell:
-    """Return the part of `cell` where x dx + y dy <= level: `cell` itself when all of it is."""
-    depth = [x * dx + y * dy - level for x, y in zip(cell.x, cell.y, strict=True)]
-    if max(depth, default=0.0) <= 0.0:
-        return cell
-    new_x: list[float] = []
-    new_y: list[float] = []
-    beyond: list[int] = []
-    following = zip([*cell.x[1:], cell.x[0]], [*cell.y[1:], cell.y[0]], [*depth[1:], depth[0]], strict=True)
-    for x, y, a, label, (u, v, b) in zip(cell.x, cell.y, depth, cell.beyond, following, strict=True):
+def _cut(cell: Cell, dx: float, dy: float, level: float, other: int) -> Cell:
+    """Return the part of `cell` where x dx + y dy <= level, the bisector to `other`."""
+    kept: Cell = []
+    x, y, beyond = vertex = cell[0]
+    a = x * dx + y * dy - level
+    for following in [*cell[1:], vertex]:
         # the edge from (x, y) to (u, v), whose ends lie a and b beyond the bisector
+        u, v, next_beyond = following
+        b = u * dx + v * dy - level
         if a <= 0.0:
-            new_x.append(x)
-            new_y.append(y)
-            beyond.append(other if a == 0.0 < b else label)
+            kept.append((x, y, other) if a == 0.0 < b else vertex)
         if a < 0.0 < b or b < 0.0 < a:
             part = a / (a - b)
-            new_x.append(x + part * (u - x))
-            new_y.append(y + part * (v - y))
-            beyond.append(other if b > 0.0 else label)
-    return ClippedCell(new_x, new_y, beyond)
+            kept.append((x + part * (u - x), y + part * (v - y), other if a < 0.0 else beyond))
+        vertex, x, y, beyond, a = following, u, v, next_beyond, b
+    return kept

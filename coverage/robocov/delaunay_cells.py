@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,11 @@ from robocov.arrays import Array, IntArray
 from robocov.cell_edges import REGION, CellEdges
 from robocov.region import Region
 
-ComplexArray = NDArray[np.complex128]
+ComplexArray: TypeAlias = NDArray[np.complex128]
 
-_QHULL_OPTIONS = "Qbb Qc"
-"""As scipy's, without the point at infinity (Qz), which only cocircular input needs, and without leave
-to return doubtful facets (Q12): both are for the other path."""
+_QHULL_OPTIONS = "Qbb"
+"""As scipy's, without the point at infinity (Qz), which only a team on one circle needs, without leave to
+return doubtful facets (Q12), and without the list of points left out (Qc): their cells have no mass."""
 
 _TOLERANCE = 1e-12
 """How far the masses may miss the region's area, relative to it."""
@@ -44,14 +45,11 @@ _SMALLEST_CROSS = 1e-200
 """Cross product of a flat triangle's sides: its circumcentre is far away, on the apex's side."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DelaunayCells:
-    """The cells of one partition.
+class Sides(NamedTuple):
+    """The Voronoi edges between two cells.
 
     Attributes
     ----------
-    mass : (n,) m²
-    centroid : (n, 2) m
     ends : (2, e)
         The robots i and j of each Delaunay edge.
     difference : (e,) m
@@ -60,32 +58,58 @@ class DelaunayCells:
         How far the Voronoi edge extends from the midpoint to the left of d and to the right, in |d| / 2.
     width : (e,)
         The sum of the two, zero where the Voronoi edge lies outside the region.
-    owner : (b,)
-        Whose cell each piece of the region's boundary belongs to.
-    piece_start, piece_end : (b,) m
-        Ends of the piece, relative to the owner's generator.
     """
 
-    mass: Array
-    centroid: Array
     ends: IntArray
     difference: ComplexArray
     reach: Array
     width: Array
+
+
+class Pieces(NamedTuple):
+    """The pieces of the region's boundary, counter-clockwise.
+
+    Attributes
+    ----------
+    owner : (b,)
+        Whose cell each belongs to.
+    start, end : (b,) m
+        Relative to the owner's generator.
+    """
+
     owner: IntArray
-    piece_start: ComplexArray
-    piece_end: ComplexArray
+    start: ComplexArray
+    end: ComplexArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DelaunayCells:
+    """The cells of one partition.
+
+    Attributes
+    ----------
+    mass : (n,) m²
+    centroid : (n, 2) m
+    sides : Sides
+    pieces : Pieces
+    """
+
+    mass: Array
+    centroid: Array
+    sides: Sides
+    pieces: Pieces
 
     def edges(self, generators: Array) -> CellEdges:
         """Return the edges of the cells, in order round each cell's centroid."""
-        live = self.width > 0.0
-        i, j = self.ends[:, live]
-        half = 0.5 * self.difference[live]
-        left, right = 1j * half * self.reach[0, live], -1j * half * self.reach[1, live]
-        start = np.concatenate([half + right, left - half, self.piece_start])
-        end = np.concatenate([half + left, right - half, self.piece_end])
-        cell = np.concatenate([i, j, self.owner])
-        beyond = np.concatenate([j, i, np.full(len(self.owner), REGION)])
+        live = self.sides.width > 0.0
+        i, j = self.sides.ends[:, live]
+        half = 0.5 * self.sides.difference[live]
+        left, right = 1j * half * self.sides.reach[0, live], -1j * half * self.sides.reach[1, live]
+        owner, piece_start, piece_end = self.pieces
+        start = np.concatenate([half + right, left - half, piece_start])
+        end = np.concatenate([half + left, right - half, piece_end])
+        cell = np.concatenate([i, j, owner])
+        beyond = np.concatenate([j, i, np.full(len(owner), REGION)])
         # about the centroid, which lies well inside even when the generator is on the cell's boundary
         middle = 0.5 * (start + end) - _complex(self.centroid - generators)[cell]
         order = np.lexsort((np.arctan2(middle.imag, middle.real), cell))
@@ -101,7 +125,7 @@ def delaunay_cells(generators: Array, region: Region) -> DelaunayCells | None:
     Parameters
     ----------
     generators : (n, 2) m
-        C-contiguous, n at least 3.
+        C-contiguous. Fewer than four cannot be triangulated here.
     """
     frame = _frame(region)
     z = _complex(generators) - frame.origin
@@ -126,44 +150,14 @@ def delaunay_cells(generators: Array, region: Region) -> DelaunayCells | None:
     pieces = _boundary_pieces(z, ends.ravel(), limits.ravel(), cut.ravel().nonzero()[0], frame)
     if pieces is None:
         return None
-    owner, piece_start, piece_end = pieces
-
-    # four times the triangles' areas, and twelve times their first moments
     squares = difference.view(np.float64)
     squares = squares * squares
-    area = squares[::2] + squares[1::2]
-    if np.minimum.reduce(area) < frame.closest:
+    square = squares[::2] + squares[1::2]
+    if np.minimum.reduce(square) < frame.closest:
         return None
-    area *= width
-    area *= 0.5
-    piece_area = (np.conjugate(piece_start) * piece_end).imag
-    piece_area *= 2.0
-    size = area.size
-    moment = np.empty(2 * size + owner.size, dtype=np.complex128)
-    factor = moment[: 2 * size].reshape(2, size)
-    along, across = factor.real, factor.imag
-    along[0] = area
-    np.negative(area, out=along[1])
-    skew = reach[0] - reach[1]
-    skew *= 0.5
-    np.multiply(skew, area, out=across)
-    factor *= difference
-    np.multiply(piece_start + piece_end, piece_area, out=moment[2 * size :])
-
-    cell = np.concatenate([ends.ravel(), owner])
-    n = len(generators)
-    mass = np.asarray(np.bincount(cell, np.concatenate([area, area, piece_area]), n), dtype=np.float64)
-    if not (
-        abs(np.add.reduce(mass) - frame.area4) <= _TOLERANCE * frame.area4 and np.minimum.reduce(mass) > 0.0
-    ):
-        return None
-    centroid = np.empty((n, 2))
-    divisor = 3.0 * mass
-    np.divide(np.bincount(cell, moment.real, n), divisor, out=centroid[:, 0])
-    np.divide(np.bincount(cell, moment.imag, n), divisor, out=centroid[:, 1])
-    centroid += generators
-    mass *= 0.25
-    return DelaunayCells(mass, centroid, ends, difference, reach, width, owner, piece_start, piece_end)
+    sides = Sides(ends, difference, reach, width)
+    sums = _mass_and_centroid(sides, square, pieces, generators, frame)
+    return None if sums is None else DelaunayCells(*sums, sides, pieces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,8 +168,7 @@ class _Frame:
     ----------
     origin : complex, m
         The centroid: coordinates about it are as small as they can be.
-    area4 : float, m²
-        Four times the area.
+    area : float, m²
     closest : float, m²
         Square of the distance below which two generators are left to the other path.
     corners : (k,) m and angles : (k,) rad
@@ -187,7 +180,7 @@ class _Frame:
     """
 
     origin: complex
-    area4: float
+    area: float
     closest: float
     corners: ComplexArray
     angles: Array
@@ -225,7 +218,7 @@ def _frame(region: Region) -> _Frame:
     normals = region.normals
     return _Frame(
         origin=complex(*region.centroid),
-        area4=4.0 * region.area,
+        area=region.area,
         closest=(_CLOSEST * region.diameter) ** 2,
         corners=corners[order],
         angles=angles[order],
@@ -284,7 +277,7 @@ def _cotangents(p: ComplexArray, apexes: ComplexArray) -> Array:
 
 def _boundary_pieces(
     z: ComplexArray, ends: IntArray, limits: Array, cut: IntArray, frame: _Frame
-) -> tuple[IntArray, ComplexArray, ComplexArray] | None:
+) -> Pieces | None:
     """Return owners, starts and ends (relative to their owners) of the boundary's pieces.
 
     `cut` numbers the half edges that end on the boundary. Counter-clockwise along it, the cell of the
@@ -306,7 +299,7 @@ def _boundary_pieces(
     if not cut.size or after[-1] != before[0] or np.count_nonzero(after[:-1] != before[1:]):
         return None
     # the corners in between belong to the owner of the last crossing; before the first crossing, index -1
-    owner = np.concatenate([after, after.take(angles.searchsorted(frame.angles) - 1)])
+    owner = np.concatenate([after, after.take(angles.searchsorted(frame.angles, "right") - 1)])
     stops = np.concatenate([at.take(order), frame.corners])
     order = np.concatenate([angles, frame.angles]).argsort()
     owner = owner.take(order)
@@ -315,7 +308,46 @@ def _boundary_pieces(
     end = np.concatenate([start[1:], start[:1]])
     start -= p
     end -= p
-    return owner, start, end
+    return Pieces(owner, start, end)
+
+
+def _mass_and_centroid(
+    sides: Sides, square: Array, pieces: Pieces, generators: Array, frame: _Frame
+) -> tuple[Array, Array] | None:
+    """Return the areas (n,) m² and centroids (n, 2) m; None when the cells do not tile the region.
+
+    `square` is |d|². Of the triangle that an edge spans with p_i, eight times the area is |d|² width,
+    and the centroid is p_i + (d + i d skew / 2) / 3, where skew is the left reach less the right one;
+    seen from p_j, d changes its sign in the first term alone.
+    """
+    ends, difference, reach, width = sides
+    owner, start, end = pieces
+    n, count = len(generators), square.size
+    area = square * width
+    piece_area = (np.conjugate(start) * end).imag
+    piece_area *= 4.0
+    moment = np.empty(2 * count + owner.size, dtype=np.complex128)
+    edge_moment = moment[: 2 * count].reshape(2, count)
+    along, across = edge_moment.real, edge_moment.imag
+    along[0] = area
+    np.negative(area, out=along[1])
+    skew = reach[0] - reach[1]
+    skew *= 0.5
+    np.multiply(skew, area, out=across)
+    edge_moment *= difference
+    np.multiply(start + end, piece_area, out=moment[2 * count :])
+
+    cell = np.concatenate([ends.ravel(), owner])
+    mass = np.asarray(np.bincount(cell, np.concatenate([area, area, piece_area]), n), dtype=np.float64)
+    mass *= 0.125
+    if abs(np.add.reduce(mass) - frame.area) > _TOLERANCE * frame.area or np.count_nonzero(mass) < n:
+        return None
+    centroid = np.empty((n, 2))
+    divisor = mass * 24.0
+    np.divide(np.bincount(cell, moment.real, n), divisor, out=centroid[:, 0])
+    np.divide(np.bincount(cell, moment.imag, n), divisor, out=centroid[:, 1])
+    centroid += generators
+    return mass, centroid
 
 
 def _complex(points: Array) -> ComplexArray:

@@ -19,7 +19,7 @@ from robocov.region import Region
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_TRIANGULATE_FROM = 6
+_TRIANGULATE_FROM = 9
 """Size of team from which triangulating all at once beats clipping one cell after the other."""
 
 

@@ -221,6 +221,19 @@ def test_both_paths_agree(n: int, name: str) -> None:
         assert_same_ring(a, b, 1e-9 * region.diameter)
 
 
+@pytest.mark.parametrize("name", REGIONS)
+@pytest.mark.parametrize("side", [3, 4, 7, 12])
+def test_lattices_do_not_need_the_slow_path(side: int, name: str) -> None:
+    """All cocircular by fours, hulls collinear, and in the square and the round rays that end in corners."""
+    region = REGIONS[name]
+    points = 0.75 * region.centroid + 0.25 * lattice(region, side * side, np.random.default_rng(side))
+    assert delaunay_cells(points, region) is not None
+    eighth = region.centroid + (points - region.centroid) @ np.array([[1.0, 1.0], [-1.0, 1.0]])
+    cells = delaunay_cells(eighth, region)
+    assert cells is not None
+    assert cells.mass == pytest.approx(clipped(eighth, region).mass, abs=1e-12 * region.area)
+
+
 def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:
     assert len(a) == len(b)
     first = int(np.argmin(np.hypot(*(b - a[0]).T)))
