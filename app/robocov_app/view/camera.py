@@ -8,8 +8,8 @@ import numpy as np
 
 from robocov.arrays import Array
 
-SMALLEST, LARGEST = 1e-4, 1e5
-"""Limits of the zoom in pixels per metre: 10 km on a page, or 10 µm a pixel."""
+SMALLEST, LARGEST = 1e-4, 1e7
+"""Limits of the zoom in pixels per metre: from a hundred times the largest map to a tenth of the smallest."""
 
 
 @dataclass(frozen=True)

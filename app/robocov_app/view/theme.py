@@ -234,15 +234,27 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
         neighbours[second].append(first)
     if previous is None or len(previous) != n:
         return np.array(_dsatur(neighbours), dtype=np.intp)
-    hues = previous.tolist()
-    for robot in range(n):
-        if any(hues[other] == hues[robot] for other in neighbours[robot] if other < robot):
-            taken = {hues[other] for other in neighbours[robot]}
-            free = [hue for hue in range(MAP_COLOURS) if hue not in taken]
-            if not free:
-                return np.array(_dsatur(neighbours), dtype=np.intp)
-            hues[robot] = free[robot % len(free)]
-    return np.array(hues, dtype=np.intp)
+    hues = _repaired(previous.tolist(), neighbours)
+    return np.array(hues if hues is not None else _dsatur(neighbours), dtype=np.intp)
+
+
+def _repaired(hues: list[int], neighbours: list[list[int]]) -> list[int] | None:
+    """Recolour the vertices that conflict, and few others; None when that goes round in circles."""
+    n = len(hues)
+    visits = [0] * n
+    waiting = [v for v in range(n) if any(hues[w] == hues[v] for w in neighbours[v])]
+    while waiting:
+        vertex = waiting.pop()
+        around = [hues[other] for other in neighbours[vertex]]
+        if hues[vertex] not in around:
+            continue
+        visits[vertex] += 1
+        if visits[vertex] > MAP_COLOURS:
+            return None
+        turn = vertex + visits[vertex]
+        hues[vertex] = min(range(MAP_COLOURS), key=lambda h: (around.count(h), (h + turn) % MAP_COLOURS))
+        waiting += [other for other in neighbours[vertex] if hues[other] == hues[vertex]]
+    return hues
 
 
 def _dsatur(neighbours: list[list[int]]) -> list[int]:

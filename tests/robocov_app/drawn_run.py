@@ -1,0 +1,105 @@
+"""Maps and made-up runs for the tests of all that draws."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.record import Record
+from robocov.robots import Team
+from robocov.starts import DiscStart, UniformStart
+from robocov_app.view.scene import Scene
+
+ROOMS = Environment(
+    "rooms",
+    ((0, 0), (16, 0), (16, 10), (0, 10)),
+    (
+        PolygonObstacle(((4, 2.4), (7.2, 2.4), (7.2, 3.2), (4.8, 3.2), (4.8, 6.4), (4, 6.4))),
+        CircleObstacle((11, 2.8), 0.95),
+        PolygonObstacle(
+            ((1, 7), (4, 7), (4, 9.4), (1, 9.4)), (((1.6, 7.6), (3.4, 7.6), (3.4, 8.8), (1.6, 8.8)),)
+        ),
+        WallObstacle(((8, 0), (8, 2), (9, 2)), 0.2),
+    ),
+    {"spread": UniformStart(), "corner": DiscStart((2, 2), 1.4)},
+)
+HALL = Environment(
+    "hall", ((0, 0), (14, 0), (14, 4), (6, 4), (6, 11), (0, 11)), (), {"spread": UniformStart()}
+)
+SQUARE = Environment("square", ((0, 0), (8, 0), (8, 8), (0, 8)), (), {"spread": UniformStart()})
+CORRIDOR = Environment("corridor", ((0, 0), (40, 0), (40, 4), (0, 4)), (), {"spread": UniformStart()})
+SHAFT = Environment("shaft", ((0, 0), (4, 0), (4, 40), (0, 40)), (), {"spread": UniformStart()})
+
+
+def run_of(
+    environment: Environment, n: int, steps: int = 40, seed: int = 0, controller: str = "rapf"
+) -> Record:
+    """Return a record in which every robot walks from its start to another free place."""
+    begin = environment.start("spread").sample(n, seed)
+    end = environment.start("spread").sample(n, seed + 1000)
+    part = np.linspace(0.0, 1.0, steps)[:, None, None]
+    side = np.random.default_rng(seed).normal(size=(1, n, 2)) * 0.3
+    positions = begin + (end - begin) * part + side * np.sin(np.pi * part)
+    low, high = environment.region.vertices.min(axis=0), environment.region.vertices.max(axis=0)
+    positions = np.clip(positions, low + 0.1, high - 0.1)
+    time = np.arange(steps) * 0.1
+    nothing = np.full_like(positions, np.nan)
+    return Record(
+        environment=environment,
+        team=Team.homogeneous(n),
+        controller=controller,
+        label=controller.upper(),
+        gains={},
+        start="spread",
+        seed=seed,
+        dt=0.1,
+        time=time,
+        positions=positions,
+        velocities=np.gradient(positions, time, axis=0),
+        forces=np.ones_like(positions),
+        goals=nothing,
+        obstacle_points=nothing,
+    )
+
+
+def scene_of(record: Record, row: int = -1, cost: str = "mean distance 1.234 m") -> Scene:
+    """Return the scene of one row of a record."""
+    row %= len(record)
+    return Scene.of(
+        record.environment,
+        record.team,
+        record.snapshot(row),
+        starts=record.positions[0],
+        trail=record.positions[: row + 1],
+        trail_time=record.time[: row + 1],
+        label=record.label,
+        cost=cost,
+    )
+
+
+def explained(
+    positions: np.ndarray,
+    *,
+    forces: np.ndarray | None = None,
+    velocities: np.ndarray | None = None,
+    goals: np.ndarray | None = None,
+    obstacle_points: np.ndarray | None = None,
+    sensing_range: float = 3.0,
+    communication_range: float = np.inf,
+) -> Scene:
+    """Return a scene in the square with all that explains a decision."""
+    n = len(positions)
+    zero = np.zeros_like(positions)
+    forces = zero if forces is None else forces
+    team = Team.homogeneous(n, sensing_range=sensing_range, communication_range=communication_range)
+    seen = Observations(
+        positions,
+        zero if velocities is None else velocities,
+        Neighbours.within(positions, team.communication_range),
+        np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points,
+        SQUARE.region,
+        1.5,
+    )
+    terms = {"attraction": forces, "repulsion_robots": forces, "repulsion_obstacle": forces}
+    return Scene.of(SQUARE, team, Snapshot(seen, Decision(forces, goals, terms)), label="RAPF")

@@ -1,0 +1,405 @@
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.robots import Team
+from robocov_app.view.picture import Painter, standard_layers
+from robocov_app.view.theme import DARK, LIGHT, readable_on
+from robocov_app.view.trajectories import Trajectories
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+
+SIZE = (640, 480)
+ONE = np.array([[4.0, 4.0]])
+TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
+
+
+def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):
+    """Return the frame that shows these layers alone, and its painter."""
+    painter = Painter(scene.environment, size, theme, layers)
+    painter.show(names)
+    return painter.frame(scene).astype(int), painter
+
+
+def changed(scene, *names, size=SIZE):
+    """Return the (x, y) pixels that these layers draw, and the painter."""
+    frame, painter = drawn(scene, *names, size=size)
+    rows, columns = np.nonzero((frame != np.array(LIGHT.background)).any(axis=2))
+    return np.column_stack([columns, rows]), painter
+
+
+def distance(frame, pixel, colour):
+    """Return the largest difference of a channel at a pixel from a colour."""
+    x, y = np.rint(pixel).astype(int)
+    return int(np.abs(frame[y, x] - np.array(colour)).max())
+
+
+def nearest(frame, pixel, colour, reach=1):
+    """Return the least such difference in the pixels around."""
+    x, y = np.rint(pixel).astype(int)
+    return min(
+        distance(frame, (x + dx, y + dy), colour)
+        for dx in range(-reach, reach + 1)
+        for dy in range(-reach, reach + 1)
+    )
+
+
+def inside(geometry, count, seed=0):
+    """Return random points in a geometry."""
+    low_x, low_y, high_x, high_y = geometry.bounds
+    points = np.random.default_rng(seed).uniform((low_x, low_y), (high_x, high_y), size=(20 * count, 2))
+    return points[shapely.contains_xy(geometry, points)][:count]
+
+
+def test_every_layer_has_a_name_of_its_own_and_words():
+    layers = standard_layers()
+    assert len({layer.name for layer in layers}) == len(layers)
+    assert all(layer.title for layer in layers)
+
+
+def test_nothing_is_drawn_when_nothing_is_shown():
+    pixels, _ = changed(scene_of(run_of(ROOMS, 6)))
+    assert len(pixels) == 0
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+@pytest.mark.parametrize("n", [6, 30])
+def test_a_cell_has_the_tint_of_the_nearest_robot(n, theme):
+    record = run_of(SQUARE, n)
+    scene = scene_of(record)
+    frame, painter = drawn(scene, "cells", theme=theme)
+    points = inside(SQUARE.boundary_polygon.buffer(-0.1), 400)
+    distances = np.linalg.norm(points[:, None] - record.positions[-1][None], axis=2)
+    two = np.sort(distances, axis=1)[:, :2]
+    clear = two[:, 1] - two[:, 0] > 0.12  # away from edges
+    assert clear.sum() > 100
+    pixels = painter.camera.to_pixels(points[clear])
+    for pixel, robot in zip(pixels, distances[clear].argmin(axis=1), strict=True):
+        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+
+
+def test_edges_of_cells_are_drawn_between_robots():
+    scene = explained(TWO)
+    frame, painter = drawn(scene, "cells")
+    for point in ((4.0, 4.0), (3.0, 5.0), (6.0, 2.0)):
+        assert nearest(frame, painter.camera.to_pixels(np.array(point)), LIGHT.cell_edge) < 70
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
+def test_obstacles_are_where_the_robots_cannot_be(environment):
+    frame, painter = drawn(scene_of(run_of(environment, 4)), "obstacles")
+    solid = inside(environment.blocked.buffer(-0.08), 150)
+    free = inside(environment.free.buffer(-0.08), 300)
+    assert len(solid) > 50
+    for pixel in painter.camera.to_pixels(solid):
+        assert distance(frame, pixel, LIGHT.obstacle) == 0
+    for pixel in painter.camera.to_pixels(free):  # the courtyard of ROOMS is free
+        assert distance(frame, pixel, LIGHT.background) == 0
+
+
+def test_the_boundary_is_the_convex_hull():
+    frame, painter = drawn(scene_of(run_of(HALL, 4)), "boundary")
+    corners = HALL.region.vertices
+    for middle in (corners + np.roll(corners, -1, axis=0)) / 2:
+        assert nearest(frame, painter.camera.to_pixels(middle), LIGHT.boundary) < 40
+    assert distance(frame, painter.camera.to_pixels(np.array([6.0, 7.0])), LIGHT.background) == 0
+
+
+def test_the_grid_has_lines_at_round_metres_inside_the_region_only():
+    pixels, painter = changed(scene_of(run_of(HALL, 4)), "grid")
+    points = painter.camera.to_world(pixels.astype(float))
+    off = np.abs(points - np.rint(points)).min(axis=1)
+    assert off.max() * painter.camera.zoom < 1.1
+    assert shapely.contains_xy(HALL.region.polygon.buffer(1.5 / painter.camera.zoom), points).all()
+    assert len({round(x) for x in points[:, 0]}) > 10
+
+
+def test_starts_are_green_rings():
+    record = run_of(SQUARE, 5)
+    frame, painter = drawn(scene_of(record), "starts")
+    for center in painter.camera.to_pixels(record.positions[0]):
+        for side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            on_ring = center + 4.5 * painter.scale * np.array(side)
+            assert nearest(frame, on_ring, LIGHT.start) < 60
+        assert distance(frame, center, LIGHT.background) == 0
+
+
+def test_centroids_are_plus_signs():
+    scene = explained(TWO)
+    frame, painter = drawn(scene, "centroids")
+    for center in painter.camera.to_pixels(scene.centroids):
+        assert nearest(frame, center, LIGHT.ink) < 60
+        assert nearest(frame, center + np.array([3.0, 0.0]), LIGHT.ink) < 60
+        assert nearest(frame, center + np.array([0.0, 3.0]), LIGHT.ink) < 60
+
+
+class TestRobots:
+    def ink_of_numbers(self, frame, painter, scene):
+        """Return how many pixels within each disc are nearly of its number's colour."""
+        counts = []
+        for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
+            x, y = np.rint(pixel).astype(int)
+            patch = frame[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3)
+            colour = np.array(readable_on(LIGHT.robots[hue]))
+            counts.append(int((np.abs(patch - colour).max(axis=1) < 70).sum()))
+        return counts
+
+    def test_each_has_a_disc_of_its_hue_and_a_number(self):
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
+            rim = pixel + np.array([0.0, -5.0])
+            assert nearest(frame, rim, LIGHT.robots[hue]) < 30
+        assert min(self.ink_of_numbers(frame, painter, scene)) >= 4
+
+    def test_the_test_for_numbers_sees_their_absence(self, monkeypatch):
+        from robocov_app.view import sprites
+
+        with_numbers = sprites.disc
+        monkeypatch.setattr(sprites, "disc", lambda *given: with_numbers(*given[:5], "", given[6]))
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        assert max(self.ink_of_numbers(frame, painter, scene)) == 0
+
+    def test_numbers_differ(self):
+        """Robots 1 and 7 at one place look different, in the middle of the disc."""
+        one, painter = drawn(explained(np.array([[4.0, 4.0]])), "robots")
+        several = np.column_stack([np.full(7, 1.0), np.arange(7.0) + 0.5])
+        several[6] = 4.0
+        seven, _ = drawn(explained(several), "robots")
+        x, y = np.rint(painter.camera.to_pixels(np.array([4.0, 4.0]))).astype(int)
+        light = [frame[y - 5 : y + 6, x - 5 : x + 6].min(axis=2) for frame in (one, seven)]
+        assert (np.abs(light[0] - light[1]) > 60).sum() > 5
+
+    def test_a_large_robot_is_drawn_in_true_size(self):
+        scene = replace(explained(ONE), team=Team.homogeneous(1, radius=1.5))
+        pixels, painter = changed(scene, "robots")
+        width, height = np.ptp(pixels, axis=0) + 1
+        assert width == pytest.approx(3.0 * painter.camera.zoom, abs=4)
+        assert height == pytest.approx(width, abs=1)
+
+    def test_slow_robots_glide(self):
+        """A shift by a quarter of a pixel changes the picture."""
+        _, painter = drawn(explained(ONE), "robots")
+        frames = [
+            drawn(explained(ONE + np.array([[k / 4 / painter.camera.zoom, 0.0]])), "robots")[0]
+            for k in range(5)
+        ]
+        for first, second in pairwise(frames):
+            assert (first != second).any()
+        assert np.roll(frames[0], 1, axis=1).tolist() == frames[4].tolist()
+
+
+class TestTrajectories:
+    @pytest.mark.parametrize("colours", ["robots", "paper"])
+    def test_run_along_the_positions(self, colours):
+        record = run_of(SQUARE, 4)
+        frame, painter = drawn(
+            scene_of(record), "trajectories", layers=[Trajectories(colours)], size=(800, 800)
+        )
+        for robot in range(4):
+            colour = LIGHT.trajectory if colours == "paper" else LIGHT.robots[robot]
+            for pixel in painter.camera.to_pixels(record.positions[5:35:4, robot]):
+                assert nearest(frame, pixel, colour) < 110
+
+    def test_frame_by_frame_looks_like_all_at_once(self):
+        record = run_of(SQUARE, 5, steps=60)
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"trajectories"})
+        for row in range(60):
+            stepwise = painter.frame(scene_of(record, row)).astype(int)
+        at_once, _ = drawn(scene_of(record), "trajectories")
+        drawn_pixels = (at_once != 255).any(axis=2)
+        assert drawn_pixels.sum() > 500
+        assert np.abs(stepwise - at_once)[drawn_pixels].mean() < 12
+        far = ~shapely.contains_xy(
+            shapely.union_all(
+                [
+                    shapely.LineString(painter.camera.to_pixels(path))
+                    for path in record.positions.swapaxes(0, 1)
+                ]
+            ).buffer(3.0),
+            *np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1])),
+        )
+        assert (stepwise[far] == 255).all()
+
+    def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
+        first, second = run_of(SQUARE, 5, seed=1), run_of(SQUARE, 5, seed=2)
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"trajectories"})
+        painter.frame(scene_of(first))
+        for scene in (scene_of(second), scene_of(second, 20), scene_of(first, 3)):
+            fresh, _ = drawn(scene, "trajectories")
+            assert (painter.frame(scene) == fresh).all()
+
+    def test_fading_forgets_the_past(self):
+        record = run_of(SQUARE, 1, steps=80)
+        frame, painter = drawn(scene_of(record), "trajectories", layers=[Trajectories(fade=1.0)])
+        old, new = painter.camera.to_pixels(record.positions[[20, 78], 0])
+        assert nearest(frame, old, LIGHT.background, reach=2) == 0
+        assert (frame[int(old[1]) - 2 : int(old[1]) + 3, int(old[0]) - 2 : int(old[0]) + 3] == 255).all()
+        assert nearest(frame, new, LIGHT.robots[0]) < 110
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.floats(0, 2 * np.pi), st.sampled_from(["velocities", "force_attraction", "force_resultant"]))
+def test_arrows_point_the_right_way(angle, name):
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    scene = explained(ONE, forces=1.5 * direction[None], velocities=0.9 * direction[None])
+    pixels, painter = changed(scene, name)
+    away = painter.camera.to_world(pixels.astype(float)) - ONE[0]
+    middle = away.mean(axis=0) / np.linalg.norm(away.mean(axis=0))
+    assert middle @ direction > 0.98
+    assert (away @ direction).min() > 0  # it begins at the disc, not behind it
+
+
+@pytest.mark.parametrize("term", ["attraction", "repulsion_robots", "repulsion_obstacle", "resultant"])
+def test_stronger_forces_have_longer_arrows_within_limits(term):
+    reach = []
+    for force in (0.0, 0.5, 2.0, 1e3, 1e9):
+        pixels, painter = changed(explained(ONE, forces=np.array([[force, 0.0]])), f"force_{term}")
+        center = painter.camera.to_pixels(ONE)[0]
+        reach.append((pixels[:, 0] - center[0]).max() if len(pixels) else 0.0)
+    assert reach[0] == 0.0
+    assert reach[0] < reach[1] < reach[2] < reach[3]
+    assert reach[3] == pytest.approx(reach[4], abs=1.01)
+    assert reach[4] < 75
+
+
+def test_terms_differ_by_more_than_hue():
+    shapes = set()
+    for term in ("attraction", "repulsion_robots", "repulsion_obstacle"):
+        pixels, _ = changed(explained(ONE, forces=np.array([[1.0, 0.0]])), f"force_{term}")
+        shapes.add(tuple(map(tuple, pixels.tolist())))
+    assert len(shapes) == 3
+
+
+@pytest.mark.parametrize("kind", ["sensing", "communication"])
+def test_ranges_are_circles_of_their_radius(kind):
+    scene = explained(ONE, sensing_range=2.5, communication_range=2.5)
+    pixels, painter = changed(scene, kind)
+    radius = np.linalg.norm(pixels - painter.camera.to_pixels(ONE)[0], axis=1)
+    assert np.abs(radius - 2.5 * painter.camera.zoom).max() < 2.5
+    angle = np.arctan2(*(pixels - painter.camera.to_pixels(ONE)[0]).T)
+    assert len(np.unique(np.round(angle, 1))) > 50
+
+
+def test_unlimited_ranges_are_not_drawn():
+    scene = explained(ONE, communication_range=np.inf)
+    pixels, painter = changed(scene, "communication")
+    assert len(pixels) == 0
+    assert painter.legend(scene) == []
+
+
+def test_links_are_those_of_the_graph():
+    three = np.array([[1.0, 4.0], [3.0, 4.0], [7.0, 4.0]])
+    near = explained(three, communication_range=2.5)
+    frame, painter = drawn(near, "links")
+    link, none = painter.camera.to_pixels(np.array([[2.0, 4.0], [5.0, 4.0]]))
+    assert nearest(frame, link, LIGHT.final) < 120
+    assert nearest(frame, none, LIGHT.background) == 0
+    frame, _ = drawn(explained(three), "links")  # all hear all: cells that share an edge
+    assert nearest(frame, none, LIGHT.final) < 120
+
+
+def test_goals_and_obstacle_points_are_marked_where_there_are_any():
+    goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
+    points = np.array([[np.nan, np.nan], [7.0, 1.0]])
+    scene = explained(TWO, goals=goals, obstacle_points=points)
+    frame, painter = drawn(scene, "goals")
+    assert nearest(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 60
+    pixels, _ = changed(scene, "goals")
+    assert (painter.camera.to_world(pixels.astype(float))[:, 0] < 4.0).all()  # robot 2 has none
+    frame, painter = drawn(scene, "obstacle_points")
+    assert nearest(frame, painter.camera.to_pixels(points[1]), LIGHT.forces["repulsion_obstacle"]) < 30
+    pixels, _ = changed(scene, "obstacle_points")
+    assert (painter.camera.to_world(pixels.astype(float))[:, 0] > 5.0).all()  # robot 1 senses none
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
+@pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
+def test_the_scale_bar_is_as_long_as_it_says(environment, size):
+    from robocov_app.view.camera import round_length
+
+    pixels, painter = changed(scene_of(run_of(environment, 2)), "scale_bar", size=size)
+    rows, counts = np.unique(pixels[:, 1], return_counts=True)
+    bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
+    run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
+    metres = (len(run) - 1) / painter.camera.zoom
+    assert metres == pytest.approx(round_length(metres * 1.02), rel=0.03)
+
+
+def test_the_status_line_says_what_it_is_given():
+    record = run_of(SQUARE, 3)
+    frames = [drawn(scene_of(record, cost=cost), "status")[0] for cost in ("mean 1.23 m", "mean 1.24 m")]
+    rows, columns = np.nonzero((frames[0] != frames[1]).any(axis=2))
+    assert len(rows) > 3
+    assert rows.min() > SIZE[1] - 34
+    assert np.ptp(columns) < 12  # one digit
+
+
+def test_a_long_status_is_cut_before_the_scale_bar():
+    scene = scene_of(run_of(SQUARE, 3), cost="word " * 60)
+    pixels, _ = changed(scene, "status", "scale_bar")
+    alone, _ = changed(scene, "scale_bar")
+    assert pixels[:, 0].max() < SIZE[0]
+    status = np.array(sorted({tuple(p) for p in pixels.tolist()} - {tuple(p) for p in alone.tolist()}))
+    assert status[:, 0].min() > alone[:, 0].max() + 8
+
+
+def test_the_legend_lists_exactly_what_is_shown():
+    scene = explained(
+        TWO,
+        forces=np.ones((2, 2)),
+        goals=TWO + 1,
+        obstacle_points=TWO - 1,
+        communication_range=5.0,
+    )
+    painter = Painter(SQUARE, SIZE)
+    words = {
+        "cells": "Voronoi cell",
+        "centroids": "cell centroid",
+        "robots": "robot",
+        "goals": "goal",
+        "velocities": "velocity",
+        "links": "neighbours",
+        "sensing": "sensing range",
+        "communication": "communication range",
+        "obstacle_points": "nearest obstacle point",
+        "force_attraction": "attraction",
+        "force_repulsion_robots": "repulsion from robots",
+        "force_repulsion_obstacle": "repulsion from obstacle",
+        "force_resultant": "resultant force",
+    }
+    for name, word in words.items():
+        painter.show({name})
+        assert painter.legend(scene) == [word]
+    painter.show({layer.name for layer in standard_layers()})
+    assert sorted(painter.legend(scene)) == sorted(words.values())  # no obstacles, starts or trail here
+    painter.show({"obstacles", "starts", "trajectories"})
+    rooms = scene_of(run_of(ROOMS, 2))
+    assert painter.legend(rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
+
+
+def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
+    scene = scene_of(run_of(ROOMS, 6))
+    names = [layer.name for layer in standard_layers()]
+    for size in (SIZE, (1920, 1080)):
+        painter = Painter(ROOMS, size)
+        painter.show(names)
+        painter.frame(scene)
+        top = painter.camera.to_pixels(ROOMS.region.vertices)[:, 1].min()
+        frame = painter.frame(scene).astype(int)
+        strip = (frame[: int(top) - 4] != np.array(LIGHT.background)).any(axis=2)
+        assert strip.any()
+        assert not strip[:, -3:].any()  # nothing is cut at the right
