@@ -73,7 +73,9 @@ def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) 
     from robocov_app.view.theme import theme_named
 
     rows = rows_of(runs)
-    write_json(folder / "comparison.json", finite({"format": "robocov-comparison", "version": 1, "runs": rows}))
+    write_json(
+        folder / "comparison.json", finite({"format": "robocov-comparison", "version": 1, "runs": rows})
+    )
     columns = [name for name in rows[0] if name not in ("label", "gains")]
     write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
 

@@ -81,7 +81,9 @@ class RunOptions:
             return None
         match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", self.size)
         if not match:
-            raise ParameterError(f"--size: {shown(self.size)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted")
+            raise ParameterError(
+                f"--size: {shown(self.size)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
+            )
         width, height = int(match[1]), int(match[2])
         _in_range("--size", width, 320, 7680, "pixels wide")
         _in_range("--size", height, 240, 4320, "pixels high")

@@ -13,10 +13,7 @@ from typing import Any
 from robocov.atomic import written
 from robocov.errors import InputError, OutputError
 
-_OURS = (
-    "run.json record.npz cost.csv trajectories.png trajectories.svg cost.png cost.svg run.mp4 "
-    "comparison.json comparison.csv comparison.mp4"
-).split()
+_OURS = ["run.json", "record.npz", "cost.csv", "trajectories.png", "trajectories.svg", "cost.png", "cost.svg", "run.mp4", "comparison.json", "comparison.csv", "comparison.mp4"]
 """Files that an earlier result in the same folder may have left; `--overwrite` removes these."""
 
 

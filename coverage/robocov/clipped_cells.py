@@ -102,8 +102,7 @@ def _by_distance(generators: Array, neighbours: Neighbours) -> list[list[int]]:
     x, y = generators[:, 0], generators[:, 1]
     if neighbours.indptr is None or neighbours.indices is None:
         square = np.square(x[:, None] - x) + np.square(y[:, None] - y)
-        # a robot comes first in its own row, even when another is at the same place
-        square.ravel()[:: n + 1] = -1.0
+        # each row begins with the robot itself, or with one at the same place, which does not cut it either
         rows: list[list[int]] = square.argsort(axis=1, kind="stable")[:, 1:].tolist()
         return rows
     first = np.repeat(np.arange(n), np.diff(neighbours.indptr))

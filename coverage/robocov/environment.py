@@ -163,7 +163,9 @@ class Environment:
         """
         if name is None:
             if not self.starts:
-                raise StartError(f"map {self.name!r} has no starts; positions or a start in the map was wanted")
+                raise StartError(
+                    f"map {self.name!r} has no starts; positions or a start in the map was wanted"
+                )
             name = next(iter(self.starts))
         if name not in self.starts:
             raise StartError(f"map {self.name!r}: {unknown_name('start', name, self.starts)}")

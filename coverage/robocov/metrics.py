@@ -109,11 +109,21 @@ def path_lengths(positions: Array) -> Array:
 
 
 def clearances(record: Record) -> Array:
-    """Return the gap between each robot's rim and the nearest wall at each moment, (T, n) m."""
-    sensor = RangeSensor(solid_pieces(record.environment))
-    everywhere = record.positions.reshape(-1, 2)
-    nearest = sensor.nearest(everywhere, np.full(len(everywhere), np.inf))
-    gap = np.sqrt(((everywhere - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
+    """Return the gap between each robot's rim and the nearest wall at each moment, (T, n) m.
+
+    What the robots sensed is used where they sensed something; the rest is asked for here.
+    """
+    positions = record.positions.reshape(-1, 2)
+    nearest = record.obstacle_points.reshape(-1, 2).copy()
+    left = np.flatnonzero(np.isnan(nearest[:, 0]))
+    if len(left):
+        sensor = RangeSensor(solid_pieces(record.environment))
+        reach = 1.0  # a query costs the more the farther it reaches
+        while len(left):
+            nearest[left] = sensor.nearest(positions[left], np.full(len(left), reach))
+            left = left[np.isnan(nearest[left, 0])]
+            reach *= 4.0
+    gap = np.sqrt(((positions - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
     return np.asarray(gap - record.team.radius)
 
 

@@ -134,7 +134,8 @@ class Record:
         path = folder / "run.json"
         try:
             run = json.loads(path.read_text(encoding="utf-8"))
-            with np.load(folder / "record.npz", allow_pickle=False) as saved:
+            # opened here: numpy leaves a file that is no archive open
+            with (folder / "record.npz").open("rb") as file, np.load(file, allow_pickle=False) as saved:
                 arrays = {name: np.asarray(saved[name], dtype=float) for name in ARRAYS}
             name = run["controller"]["name"]
             record = cls(

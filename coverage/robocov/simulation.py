@@ -64,7 +64,9 @@ class Simulation:
     ) -> None:
         positions = np.array(starts, dtype=float)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
-            raise StartError(f"starts: an array of shape {positions.shape}, but (n, 2) with n of at least 1 was wanted")
+            raise StartError(
+                f"starts: an array of shape {positions.shape}, but (n, 2) with n of at least 1 was wanted"
+            )
         self.team = Team.homogeneous(len(positions)) if team is None else team
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
@@ -191,21 +193,27 @@ class Simulation:
 
 
 def _check_starts(environment: Environment, positions: Array, team: Team) -> None:
+    for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
+        raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
     points = shapely.points(positions)
     inside = shapely.contains_properly(environment.free, points)
     wall = shapely.distance(environment.free.boundary, points)
     for i in range(len(positions)):
         place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
-        if not np.isfinite(positions[i]).all():
-            raise StartError(f"{place}: finite numbers were wanted")
         if not inside[i]:
-            raise StartError(f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}")
+            raise StartError(
+                f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}"
+            )
         if wall[i] < team.radius[i] - 1e-6:
             raise StartError(
                 f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
             )
-    first, second, distance = Neighbours(len(positions)).closer_than(positions, 2.0 * float(team.radius.max()))
+    first, second, distance = Neighbours(len(positions)).closer_than(
+        positions, 2.0 * float(team.radius.max())
+    )
     clash = distance < team.radius[first] + team.radius[second] - 1e-6
     if clash.any():
         k = int(np.flatnonzero(clash)[0])
-        raise StartError(f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap")
+        raise StartError(
+            f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
+        )

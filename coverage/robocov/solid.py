@@ -60,7 +60,9 @@ def _merged(loops: list[Loop]) -> list[Loop]:
     """Remove the diagonals between convex loops as long as what remains is convex."""
     pieces: dict[int, Loop] = dict(enumerate(loops))
     owner = {
-        (loop[k], loop[(k + 1) % len(loop)]): number for number, loop in pieces.items() for k in range(len(loop))
+        (loop[k], loop[(k + 1) % len(loop)]): number
+        for number, loop in pieces.items()
+        for k in range(len(loop))
     }
     for a, b in list(owner):
         first, second = owner.get((a, b)), owner.get((b, a))

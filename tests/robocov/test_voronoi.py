@@ -12,6 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov.cell_edges import REGION
 from robocov.clipped_cells import clip_cells, mass_and_centroid
 from robocov.delaunay_cells import delaunay_cells
 from robocov.errors import InputError
@@ -192,13 +193,45 @@ def test_no_robots_no_cells() -> None:
 
 def test_nine_robots_on_a_lattice_have_the_ninths_of_a_square() -> None:
     x, y = np.meshgrid([1.0, 3.0, 5.0], [1.0, 3.0, 5.0])
-    cells = partition(np.column_stack([x.ravel(), y.ravel()]), SQUARE)
-    assert cells.mass == pytest.approx(np.full(9, 4.0), rel=1e-13)
-    assert cells.centroid == pytest.approx(cells.generators, rel=1e-13)
-    assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
+    points = np.column_stack([x.ravel(), y.ravel()])
     across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
-    assert cells.adjacency.tolist() == [list(pair) for pair in across]
-    assert [len(polygon) for polygon in cells.polygons] == [4] * 9
+    for cells in (partition(points, SQUARE), clipped(points, SQUARE)):
+        assert cells.mass == pytest.approx(np.full(9, 4.0), rel=1e-13)
+        assert cells.centroid == pytest.approx(points, rel=1e-13)
+        assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
+        assert cells.adjacency.tolist() == [list(pair) for pair in across]
+        assert [len(polygon) for polygon in cells.polygons] == [4] * 9
+
+
+def test_three_cells_that_meet_on_the_boundary() -> None:
+    cells = partition(np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 0.0]]), SQUARE)
+    assert cells.mass == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
+    assert cells.adjacency.tolist() == [[0, 1], [1, 2]]
+    assert sorted(cells.edges.beyond[cells.edges.cell == 1].tolist()) == [REGION, REGION, REGION, 0, 2]
+    assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
+
+
+def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:
+    rng = np.random.default_rng(5)
+    inner = scattered(SQUARE, 30, rng) * 0.8 + 0.6
+    points = np.concatenate([inner, [[3.0, -0.05], [6.0, 2.5], [0.0, 1.0]]])
+    assert delaunay_cells(points, SQUARE) is not None
+    for a, b in zip(partition(points, SQUARE).polygons, clipped(points, SQUARE).polygons, strict=True):
+        assert_same_ring(a, b, 1e-9)
+
+
+def test_a_triangulation_that_is_not_delaunay_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.array([[1.0, 3.0], [3.0, 2.0], [5.0, 3.0], [3.0, 4.0]])
+    assert delaunay_cells(points, SQUARE) is not None
+
+    class LongDiagonal:
+        simplices = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+        neighbors = np.array([[-1, 1, -1], [-1, -1, 0]], dtype=np.int32)
+
+        def __init__(self, *_: object, **__: object) -> None: ...
+
+    monkeypatch.setattr("robocov.delaunay_cells.Delaunay", LongDiagonal)
+    assert delaunay_cells(points, SQUARE) is None
 
 
 @pytest.mark.parametrize("name", REGIONS)
@@ -228,6 +261,10 @@ def test_lattices_do_not_need_the_slow_path(side: int, name: str) -> None:
     region = REGIONS[name]
     points = 0.75 * region.centroid + 0.25 * lattice(region, side * side, np.random.default_rng(side))
     assert delaunay_cells(points, region) is not None
+    if name != "far away":  # rounding of the coordinates there makes edges between the cocircular
+        links = 2 * side * (side - 1)
+        assert len(partition(points, region).adjacency) == links
+        assert len(clipped(points, region).adjacency) == links
     eighth = region.centroid + (points - region.centroid) @ np.array([[1.0, 1.0], [-1.0, 1.0]])
     cells = delaunay_cells(eighth, region)
     assert cells is not None

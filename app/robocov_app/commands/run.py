@@ -78,5 +78,7 @@ def print_summary(run: Run) -> None:
     if summary["uncovered_area_m2"] > 0:
         print(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
     print(f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}")
-    print(f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)")
+    print(
+        f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)"
+    )
     print(f"  path length     {path:.2f} m per robot")

@@ -17,15 +17,18 @@ class Rpf:
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
     Every robot is pushed away from the neighbours within `rho_0` and from the single closest
-    obstacle point; viscosity brings the team to rest.
+    obstacle point; viscosity brings the team to rest. The default gains are among its best over the
+    bundled maps; stronger repulsion spreads hardly better and trembles, because the single nearest
+    obstacle point jumps. For the paper's protocol, which gives RPF and RAPF the same potential
+    parameters, set `k_rep` and `rho_0` for both.
     """
 
     name: ClassVar[str] = "rpf"
     label: ClassVar[str] = "RPF"
     summary: ClassVar[str] = "repulsion from robots and the nearest obstacle only, (23)-(25)"
 
-    k_rep: float = gain(1.0, "N m³", "strength of the repulsion, (24)")
-    rho_0: float = gain(6.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
+    k_rep: float = gain(3.0, "N m³", "strength of the repulsion, (24)")
+    rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def __post_init__(self) -> None:
         validate_gains(self)

@@ -1,0 +1,36 @@
+"""Environments that many tests share, drawn here so that the bundled maps may change."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.starts import DiscStart, UniformStart
+
+# examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
+settings.register_profile("robocov", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("robocov")
+
+SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+
+
+@pytest.fixture(scope="session")
+def empty() -> Environment:
+    """A convex square without obstacles."""
+    return Environment("empty", SQUARE, (), {"corner": DiscStart((1.5, 1.5), 1.0), "uniform": UniformStart()})
+
+
+@pytest.fixture(scope="session")
+def cluttered() -> Environment:
+    """An L-shaped hall with a pillar, a bent wall and a concave block."""
+    return Environment(
+        "cluttered",
+        ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (5.0, 10.0), (5.0, 5.0), (0.0, 5.0)),
+        (
+            CircleObstacle((3.0, 2.0), 0.5),
+            WallObstacle(((5.0, 0.0), (5.0, 2.4), (7.0, 2.4)), 0.1),
+            PolygonObstacle(((7.0, 5.0), (9.0, 5.0), (9.0, 8.0), (8.5, 8.0), (8.5, 5.5), (7.0, 5.5))),
+        ),
+        {"corner": DiscStart((1.0, 1.0), 0.8), "uniform": UniformStart()},
+    )

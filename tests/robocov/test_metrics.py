@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from robocov.controllers import Lloyd, Rapf
+from robocov.cost import CoverageCost
+from robocov.environment import Environment
+from robocov.metrics import (
+    clearances,
+    contacts,
+    cost_history,
+    path_lengths,
+    sample_moments,
+    settled_at,
+    summarise,
+)
+from robocov.record import Record
+from robocov.simulation import Simulation
+
+DT = 0.1
+
+
+def times(seconds: float) -> np.ndarray:
+    return np.arange(round(seconds / DT) + 1) * DT
+
+
+def track(x: np.ndarray) -> np.ndarray:
+    """Positions (T, 1, 2) of one robot that moves along x."""
+    return np.stack([x, np.zeros_like(x)], axis=-1)[:, None, :]
+
+
+@pytest.fixture(scope="module")
+def record(cluttered: Environment) -> Record:
+    return Simulation(cluttered, Lloyd(), cluttered.start().sample(6), dt=0.02).run(12.0)
+
+
+def test_a_robot_that_stops_settles_when_it_stops() -> None:
+    time = times(20)
+    moving = track(np.minimum(time * 0.5, 3.0))  # stops at 6 s
+    # in the last window that begins before the stop it still gets 0.05 m
+    assert settled_at(time, moving) == pytest.approx(5.9, abs=0.11)
+
+
+def test_a_robot_that_trembles_has_settled_and_one_that_creeps_has_not() -> None:
+    time = times(30)
+    assert settled_at(time, track(0.01 * np.sin(40 * time))) == 0.0
+    assert settled_at(time, track(0.02 * time)) is None
+
+
+def test_a_late_move_counts() -> None:
+    time = times(30)
+    late = track(np.where(time > 15, np.minimum(time - 15, 1.0), 0.0))
+    assert settled_at(time, late) == pytest.approx(16.0, abs=0.11)
+    assert settled_at(time, track(np.where(time > 29, 1.0, 0.0))) is None
+
+
+def test_a_run_shorter_than_the_window_cannot_settle() -> None:
+    assert settled_at(times(3), track(np.zeros(31))) is None
+    assert settled_at(np.array([0.0]), np.zeros((1, 1, 2))) is None
+
+
+def test_path_length_of_a_known_path() -> None:
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None, :]
+    np.testing.assert_allclose(path_lengths(circle), [2 * np.pi], rtol=1e-5)
+
+
+def test_clearance_agrees_with_shapely_also_beyond_the_sensing_range(record: Record) -> None:
+    boundary = record.environment.free.boundary
+    expected = shapely.distance(boundary, shapely.points(record.positions)) - 0.1
+    np.testing.assert_allclose(clearances(record), expected, atol=1e-9)
+    blind = replace(record, obstacle_points=np.full_like(record.obstacle_points, np.nan))
+    np.testing.assert_allclose(clearances(blind), expected, atol=1e-9)
+
+
+def test_contacts_are_counted_when_they_begin(record: Record) -> None:
+    steps = 5
+    gap = np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.3], [0.2, 0.0], [0.0, 0.2]])
+    apart = np.zeros((steps, 2, 2))
+    apart[:, 1, 0] = [1.0, 0.2, 0.2, 0.5, 0.2]  # two robots of radius 0.1 meet, part and meet again
+    team = replace(record.team, **{name: getattr(record.team, name)[:2] for name in record.team.__slots__})
+    made = replace(record, team=team, positions=apart, time=np.arange(steps) * 0.1)
+    # walls: robot 0 at steps 1 and 4, robot 1 at step 0 (it starts so) and 3; robots: at steps 1 and 4
+    assert contacts(made, gap) == 4 + 2
+
+
+def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None:
+    cost = CoverageCost(record.environment, lattice=24)
+    history = cost_history(record, cost, rate=10.0)
+    np.testing.assert_allclose(history.time, np.arange(121) / 10, atol=1e-9)
+    assert history.mean_distance[-1] == cost(record.positions[-1]).mean_distance
+    odd = replace(record, time=record.time[:-7], positions=record.positions[:-7])
+    assert sample_moments(odd, 10.0)[-1] == len(odd) - 1
+
+
+def test_summary_says_what_happened(record: Record) -> None:
+    history = cost_history(record, CoverageCost(record.environment, lattice=24))
+    summary = summarise(record, history)
+    assert set(summary) == {
+        "mean_distance_m",
+        "cost_m3",
+        "uncovered_area_m2",
+        "settled_at_s",
+        "contacts",
+        "min_clearance_m",
+        "path_length_m",
+    }
+    assert summary["contacts"] > 0, "Lloyd's robots slide along walls here"
+    assert -2e-3 < summary["min_clearance_m"] < 1e-3
+    assert len(summary["path_length_m"]) == 6
+    assert summary["cost_m3"] == pytest.approx(summary["mean_distance_m"] * record.environment.free_area)
+    assert summary["uncovered_area_m2"] == 0.0
+
+
+def test_rapf_keeps_clear(cluttered: Environment) -> None:
+    quiet = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
+    assert contacts(quiet, clearances(quiet)) == 0

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.potential import (
+    CONTACT_DISTANCE,
+    attractive_force,
+    attractive_potential,
+    repulsive_force,
+    repulsive_potential,
+    separation,
+)
+
+coordinate = st.floats(-5, 5)
+strength = st.floats(0.01, 100)
+
+
+def gradient(energy, x: float, y: float, h: float = 1e-6) -> np.ndarray:
+    def at(a: float, b: float) -> float:
+        return float(energy(np.array([np.hypot(a, b)]))[0])
+
+    return np.array([(at(x + h, y) - at(x - h, y)), (at(x, y + h) - at(x, y - h))]) / (2 * h)
+
+
+@given(x=coordinate, y=coordinate, k_rep=strength, rho_0=st.floats(0.2, 6))
+def test_repulsion_is_minus_the_gradient_of_its_potential(
+    x: float, y: float, k_rep: float, rho_0: float
+) -> None:
+    distance = float(np.hypot(x, y))
+    if distance < 0.05 or abs(distance - rho_0) < 1e-4:
+        return
+    force = repulsive_force(np.array([[x, y]]), np.array([distance]), k_rep, rho_0)[0]
+    expected = -gradient(lambda d: repulsive_potential(d, k_rep, rho_0), x, y)
+    np.testing.assert_allclose(force, expected, rtol=2e-4, atol=1e-5 * k_rep)
+
+
+@given(x=coordinate, y=coordinate, k_att=strength, limit=st.one_of(st.none(), st.floats(0.1, 50)))
+def test_attraction_is_minus_the_gradient_of_its_potential(
+    x: float, y: float, k_att: float, limit: float | None
+) -> None:
+    if np.hypot(x, y) < 1e-3:
+        return
+    # the goal is the origin, the robot at (x, y)
+    force = attractive_force(np.array([[-x, -y]]), k_att, limit)[0]
+    expected = -gradient(lambda d: attractive_potential(d, k_att, limit), x, y)
+    np.testing.assert_allclose(force, expected, rtol=1e-3, atol=1e-4 * k_att)
+
+
+def test_equation_24_at_a_hand_computed_place() -> None:
+    force = repulsive_force(np.array([[0.5, 0.0]]), np.array([0.5]), k_rep=1.0, rho_0=2.0)
+    np.testing.assert_allclose(force, [[(2.0 - 0.5) / 0.25, 0.0]])
+    np.testing.assert_allclose(repulsive_potential(np.array([0.5]), 1.0, 2.0), [0.5 * 1.5**2])
+
+
+def test_equation_27_at_a_hand_computed_place() -> None:
+    np.testing.assert_allclose(attractive_force(np.array([[0.0, 2.0]]), 3.0), [[0.0, 24.0]])
+    np.testing.assert_allclose(attractive_potential(np.array([2.0]), 3.0), [12.0])
+
+
+def test_repulsion_is_zero_beyond_its_range_and_continuous_there() -> None:
+    distance = np.array([1.999999, 2.0, 2.5, 1e9])
+    force = repulsive_force(np.column_stack([distance, 0 * distance]), distance, 1.0, 2.0)
+    assert force[0, 0] == pytest.approx(0.0, abs=1e-6)
+    assert (force[1:] == 0.0).all()
+    assert (repulsive_potential(distance[1:], 1.0, 2.0) == 0.0).all()
+
+
+@given(distance=st.one_of(st.just(0.0), st.floats(1e-12, CONTACT_DISTANCE)))
+def test_contact_is_not_singular(distance: float) -> None:
+    at = repulsive_force(np.array([[CONTACT_DISTANCE, 0.0]]), np.array([CONTACT_DISTANCE]), 1.0, 2.0)
+    near = repulsive_force(np.array([[distance, 0.0]]), np.array([distance]), 1.0, 2.0)
+    assert np.isfinite(near).all()
+    if distance > 0:
+        np.testing.assert_allclose(near, at, rtol=1e-9)
+
+
+@given(offset=st.tuples(coordinate, coordinate), k_att=strength, limit=st.floats(0.01, 100))
+def test_the_limit_caps_the_attraction_and_keeps_its_direction(
+    offset: tuple[float, float], k_att: float, limit: float
+) -> None:
+    free = attractive_force(np.array([offset]), k_att)[0]
+    capped = attractive_force(np.array([offset]), k_att, limit)[0]
+    size = np.hypot(*free)
+    assert np.hypot(*capped) <= limit * (1 + 1e-12)
+    if size <= limit:
+        np.testing.assert_allclose(capped, free, rtol=1e-12)
+    else:
+        np.testing.assert_allclose(capped, free * limit / size, rtol=1e-9)
+
+
+@given(st.lists(st.integers(0, 500), min_size=2, max_size=2, unique=True))
+def test_robots_in_one_place_are_pushed_apart_in_opposite_directions(pair: list[int]) -> None:
+    i, j = np.array([pair[0]]), np.array([pair[1]])
+    np.testing.assert_array_equal(separation(i, j), -separation(j, i))
+    np.testing.assert_allclose(np.hypot(*separation(i, j)[0]), 1.0)

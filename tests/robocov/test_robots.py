@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.errors import ParameterError
+from robocov.robots import Team
+
+
+def test_a_homogeneous_team_has_the_papers_limits() -> None:
+    team = Team.homogeneous(6)
+    assert len(team) == 6
+    assert (team.mass == 1.0).all()
+    assert (team.max_speed == 1.0).all()
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.01, 1), st.one_of(st.just(np.inf), st.floats(0, 50))), min_size=1, max_size=9
+    )
+)
+def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
+    n = len(robots)
+    team = Team(
+        radius=np.array([r for r, _ in robots]),
+        mass=np.ones(n),
+        max_speed=np.ones(n),
+        max_acceleration=np.full(n, 2.0),
+        viscosity=np.full(n, 2.0),
+        sensing_range=np.full(n, 3.0),
+        communication_range=np.array([c for _, c in robots]),
+    )
+    again = Team.from_dict(team.to_dict())
+    for name in Team.__slots__:
+        np.testing.assert_array_equal(getattr(again, name), getattr(team, name))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"radius": 0.0}, r"team.radius: 0.0 m, but a number from 0.001 to 1000 was wanted"),
+        ({"max_speed": -1.0}, r"team.max_speed: -1.0 m/s"),
+        ({"max_speed": float("inf")}, r"team.max_speed: inf m/s"),
+        ({"viscosity": float("nan")}, r"team.viscosity: nan N s/m"),
+        ({"communication_range": -2.0}, r"or null for no limit was wanted"),
+    ],
+)
+def test_limits_out_of_range_are_refused(wrong: dict[str, float], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        Team.homogeneous(3, **wrong)
+
+
+def test_teams_have_robots_and_one_value_for_each() -> None:
+    with pytest.raises(ParameterError, match="robots: 0"):
+        Team.homogeneous(0)
+    ones = np.ones(2)
+    with pytest.raises(ParameterError, match=r"team.mass: \(3,\) values"):
+        Team(ones, np.ones(3), ones, ones, ones, ones, ones)
+    with pytest.raises(ParameterError, match="team: cannot be read"):
+        Team.from_dict({"robots": 2})

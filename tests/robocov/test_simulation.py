@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.controllers import Controller, Lloyd, Rapf, Rpf
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, PolygonObstacle
+from robocov.errors import ParameterError, StartError
+from robocov.mapfile import load_map
+from robocov.metrics import clearances, contacts
+from robocov.observation import Decision, Observations
+from robocov.record import ARRAYS, Record
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+CONTROLLERS = [Rapf(), Rapf(k_rep=1.0, k_att=3.0, attraction_limit=None), Rpf(), Lloyd()]
+
+
+def digest(record: Record) -> str:
+    together = hashlib.sha256()
+    for name in ARRAYS:
+        together.update(np.ascontiguousarray(getattr(record, name)).tobytes())
+    return together.hexdigest()
+
+
+_PROCESS = """
+import sys
+sys.path[:0] = {path!r}
+import test_simulation as t
+from robocov.mapfile import load_map
+room = load_map("rooms")
+for controller in t.CONTROLLERS:
+    print(t.digest(t.Simulation(room, controller, room.start().sample(6, seed=3)).run(8.0)))
+"""
+
+
+def test_the_same_run_in_another_process_has_the_same_bits() -> None:
+    room = load_map("rooms")
+    here = [digest(Simulation(room, each, room.start().sample(6, seed=3)).run(8.0)) for each in CONTROLLERS]
+    for hash_seed in ("0", "1"):
+        script = _PROCESS.format(path=[os.path.dirname(__file__)])
+        there = subprocess.run(
+            [sys.executable, "-c", script],
+            env={**os.environ, "PYTHONHASHSEED": hash_seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert there.stdout.split() == here
+    assert len(set(here)) == len(here)
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=["rapf", "paper", "rpf", "lloyd"])
+@settings(max_examples=5)
+@given(branch=st.integers(0, 400), seed=st.integers(0, 100))
+def test_a_copy_goes_on_identically(
+    cluttered: Environment, controller: Controller, branch: int, seed: int
+) -> None:
+    simulation = Simulation(cluttered, controller, cluttered.start().sample(6, seed=seed))
+    for _ in range(branch):
+        simulation.step()
+    twin = simulation.copy()
+    assert twin.time == simulation.time
+    for _ in range(200):
+        simulation.step()
+    before = twin.positions.copy()
+    assert (branch == 0) or not np.array_equal(before, simulation.positions)
+    for _ in range(200):
+        twin.step()
+    assert (twin.positions == simulation.positions).all()
+    assert (twin.velocities == simulation.velocities).all()
+
+
+def transformed(environment: Environment, turn: np.ndarray) -> Environment:
+    def moved(ring: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        return tuple(tuple(point) for point in (np.array(ring) @ turn.T).tolist())
+
+    return Environment(
+        environment.name,
+        moved(environment.boundary),
+        tuple(PolygonObstacle(moved(shape.vertices)) for shape in environment.obstacles),  # type: ignore[union-attr]
+    )
+
+
+@pytest.mark.parametrize("controller", [Rapf(), Rpf(), Lloyd()], ids=["rapf", "rpf", "lloyd"])
+@pytest.mark.parametrize(
+    "turn",
+    [np.diag([-1.0, 1.0]), np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([[0.6, -0.8], [0.8, 0.6]])],
+    ids=["mirror", "quarter turn", "turn"],
+)
+def test_whole_runs_turn_and_mirror_with_the_world(controller: Controller, turn: np.ndarray) -> None:
+    room = Environment(
+        "room",
+        ((0.0, 0.0), (9.0, 0.0), (10.0, 7.0), (1.0, 8.0)),
+        (
+            PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 3.5), (3.5, 3.5), (3.5, 5.0), (3.0, 5.0))),
+            PolygonObstacle(((6.5, 4.0), (7.5, 4.2), (7.0, 5.5))),
+        ),
+    )
+    starts = np.array([[1.0, 1.0], [1.6, 0.8], [1.2, 1.9], [2.2, 1.4], [0.8, 2.6]])
+    straight = Simulation(room, controller, starts).run(6.0)
+    turned = Simulation(transformed(room, turn), controller, starts @ turn.T).run(6.0)
+    # rounding differs, and repulsion amplifies it; 1e-5 m is far below anything that means something
+    np.testing.assert_allclose(turned.positions, straight.positions @ turn.T, atol=1e-5)
+    assert np.abs(straight.positions[-1] - starts).max() > 0.5
+
+
+def test_rapf_reaches_the_cost_of_lloyd_where_the_map_is_convex() -> None:
+    """The paper's figures 2 and 3, over starts: the ratio of final costs stays close to one."""
+    ratios = []
+    for name in ("square", "pentagon"):
+        environment = load_map(name)
+        cost = CoverageCost(environment, lattice=48)
+        for start in ("corner", "uniform"):
+            for seed in range(3):
+                starts = environment.start(start).sample(6, seed=seed)
+                final = [
+                    cost(
+                        Simulation(environment, each, starts, dt=1 / 30).run(60.0).positions[-1]
+                    ).mean_distance
+                    for each in (Rapf(), Lloyd())
+                ]
+                ratios.append(final[0] / final[1])
+    assert len(ratios) == 12
+    assert 0.98 < np.median(ratios) < 1.02
+    assert max(ratios) < 1.08
+
+
+def test_rapf_ends_below_rpf_among_obstacles_and_touches_nothing() -> None:
+    """The paper's figures 4 to 7, over maps and seeds."""
+    wins = 0
+    for name in ("blocks-a", "blocks-b", "rooms"):
+        environment = load_map(name)
+        cost = CoverageCost(environment, lattice=48)
+        for seed in range(4):
+            starts = environment.start().sample(6, seed=seed)
+            rapf, rpf = (
+                Simulation(environment, each, starts, dt=1 / 30).run(40.0) for each in (Rapf(), Rpf())
+            )
+            wins += cost(rapf.positions[-1]).mean_distance < 0.95 * cost(rpf.positions[-1]).mean_distance
+            assert contacts(rapf, clearances(rapf)) == 0
+    assert wins >= 10, f"RAPF ended at least 5 % below RPF in {wins} of 12 runs"
+
+
+def test_two_hundred_robots_on_the_large_map() -> None:
+    campus = load_map("campus")
+    record = Simulation(campus, Rapf(), campus.start().sample(200, seed=0)).run(15.0)
+    clearance = clearances(record)
+    assert clearance.min() > -2e-3
+    moved = np.hypot(*(record.positions[-1] - record.positions[0]).T)
+    assert np.median(moved) > 0.5
+    assert np.isfinite(record.positions).all()
+
+
+def test_limits_and_times_of_a_record(cluttered: Environment) -> None:
+    record = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(5.0)
+    assert len(record) == 251
+    np.testing.assert_allclose(record.time, np.arange(251) * 0.02)
+    assert np.hypot(*record.velocities.reshape(-1, 2).T).max() <= 1 + 1e-9
+    moved = np.hypot(*np.diff(record.positions, axis=0).reshape(-1, 2).T)
+    assert moved.max() <= 0.02 * (1 + 1e-6)
+
+
+class Wild:
+    """Returns whatever it was made with."""
+
+    name = label = "wild"
+    summary = ""
+
+    def __init__(self, forces: np.ndarray) -> None:
+        self.forces = forces
+
+    def begin(self, region: object, team: object) -> None:
+        return None
+
+    def decide(self, seen: Observations, memory: object) -> Decision:
+        return Decision(self.forces)
+
+
+@pytest.mark.parametrize(
+    ("forces", "message"),
+    [
+        (np.zeros((3, 2)), r"forces of shape \(3, 2\), but \(2, 2\) was wanted"),
+        (np.array([[0.0, 0.0], [np.nan, 1.0]]), r"force \[nan, 1.0\] on robot 2 at 0.000 s"),
+    ],
+)
+def test_a_controller_that_returns_nonsense_is_told_so(
+    empty: Environment, forces: np.ndarray, message: str
+) -> None:
+    simulation = Simulation(empty, Wild(forces), [[2.0, 2.0], [4.0, 4.0]])
+    with pytest.raises(ParameterError, match=message):
+        simulation.step()
+
+
+@pytest.mark.parametrize(
+    ("starts", "message"),
+    [
+        ([[3.0, 2.0]], r"starts\[0\] = \[3, 2\] is inside an obstacle"),
+        ([[1.0, 1.0], [2.0, 8.0]], r"starts\[1\] = \[2, 8\] is inside an obstacle or outside the boundary"),
+        ([[1.0, 0.05]], r"starts\[0\] = \[1, 0.05\] is 0.05 m from a wall"),
+        ([[1.0, 1.0], [1.1, 1.0]], r"starts\[0\] and starts\[1\] are 0.1 m apart"),
+        ([[np.nan, 1.0]], r"starts\[0\]"),
+        ([1.0, 2.0], r"starts: an array of shape \(2,\)"),
+    ],
+)
+def test_impossible_starts_are_refused(
+    cluttered: Environment, starts: list[list[float]], message: str
+) -> None:
+    with pytest.raises(StartError, match=message):
+        Simulation(cluttered, Rapf(), starts)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, 2.0, float("nan"), float("inf")])
+def test_impossible_control_periods_are_refused(empty: Environment, dt: float) -> None:
+    with pytest.raises(ParameterError, match="dt: "):
+        Simulation(empty, Rapf(), [[1.0, 1.0]], dt=dt)
+
+
+def test_team_and_starts_must_agree(empty: Environment) -> None:
+    with pytest.raises(ParameterError, match="team: 3 robots, but 1 starts"):
+        Simulation(empty, Rapf(), [[1.0, 1.0]], Team.homogeneous(3))

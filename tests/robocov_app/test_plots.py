@@ -1,0 +1,311 @@
+from __future__ import annotations
+
+import errno
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pygame
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from robocov.errors import OutputError, ParameterError
+from robocov.voronoi import partition
+from robocov_app.page import tone
+from robocov_app.plot_curves import spread
+from robocov_app.plots import (
+    plot_comparison,
+    plot_cost,
+    plot_environment,
+    plot_trajectories,
+    save_figure,
+)
+from robocov_app.view.theme import DARK, LIGHT
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+
+SIZES = [(900, 600), (1400, 901), (2560, 1440)]
+MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]
+T = np.linspace(0.0, 60.0, 121)
+
+
+def curves(*finals):
+    names = ["rapf", "rpf", "lloyd", "other"]
+    return [
+        (name.upper(), name, T, final + 2 * np.exp(-T / 10))
+        for name, final in zip(names, finals, strict=False)
+    ]
+
+
+def boxes(figure):
+    """Return the extents of all that is written on the page outside the arenas, and of the arenas."""
+    renderer = figure.canvas.get_renderer()
+    texts = [text for text in figure.texts if text.get_text()]
+    parts = [*texts, *figure.legends]
+    return [part.get_window_extent(renderer) for part in parts], [
+        axes.get_window_extent(renderer) for axes in figure.axes
+    ]
+
+
+def overlap(first, second):
+    wide = min(first.x1, second.x1) - max(first.x0, second.x0)
+    high = min(first.y1, second.y1) - max(first.y0, second.y0)
+    return wide > 1.0 and high > 1.0
+
+
+def all_clear(figure):
+    """Nothing is cut at the page's edge, and no words lie on others or on an arena."""
+    words, arenas = boxes(figure)
+    page = figure.bbox
+    for box in [*words, *arenas]:
+        assert box.x0 >= -0.5 and box.y0 >= -0.5 and box.x1 <= page.x1 + 0.5 and box.y1 <= page.y1 + 0.5
+    everything = [*words, *arenas]
+    for k, box in enumerate(everything):
+        for other in everything[k + 1 :]:
+            assert not overlap(box, other)
+
+
+@pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
+@pytest.mark.parametrize("size", [None, *SIZES])
+def test_nothing_covers_or_cuts_anything(environment, size):
+    record = run_of(environment, 6)
+    all_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
+    all_clear(plot_environment(environment, size=size))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("size", [None, (900, 600), (2560, 1440)])
+@pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
+    records = [run_of(environment, 4, seed=k) for k in range(count)]
+    figure = plot_comparison(records, size=size, mean_distances=[1.0 + k for k in range(count)])
+    assert len(figure.axes) == count
+    all_clear(figure)
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}) == 1
+    sizes = np.array([axes.get_window_extent().size for axes in figure.axes])
+    assert np.ptp(sizes, axis=0).max() < 1e-6
+    words = [text.get_text() for text in figure.texts]
+    for k in range(count):
+        assert any(f"mean distance {1.0 + k:.3f} m" in text for text in words)
+
+
+def test_maps_of_different_sizes_are_compared_at_one_scale():
+    figure = plot_comparison([run_of(ROOMS, 3), run_of(HALL, 3)])
+    first, second = figure.axes
+    assert first.get_xlim() == second.get_xlim() == (0.0, 16.0)
+    assert first.get_ylim() == second.get_ylim() == (0.0, 11.0)
+
+
+@pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
+def test_the_arena_is_not_distorted(environment):
+    axes = plot_trajectories(run_of(environment, 3), size=(1000, 800)).axes[0]
+    box = axes.get_window_extent()
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    assert box.width / (right - left) == pytest.approx(box.height / (high - low))
+
+
+@pytest.mark.parametrize("size", [*SIZES, (641, 487)])
+def test_a_png_has_exactly_the_pixels_asked_for(tmp_path, size):
+    path = tmp_path / "a.png"
+    for figure in (plot_trajectories(run_of(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
+        save_figure(figure, path)
+        assert pygame.image.load(path).get_size() == size
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
+
+
+class TestTrajectories:
+    def test_the_papers_colours_and_the_records_positions(self):
+        record = run_of(ROOMS, 5)
+        axes = plot_trajectories(record).axes[0]
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        assert {to_rgb(c) for c in lines.get_colors()} == {tone(LIGHT.trajectory)}
+        for robot, segment in enumerate(lines.get_segments()):
+            assert segment == pytest.approx(record.positions[:, robot])
+        (finals,) = [
+            c for c in axes.collections if isinstance(c, PathCollection) and not isinstance(c, LineCollection)
+        ]
+        assert np.asarray(finals.get_offsets()) == pytest.approx(record.positions[-1])
+        assert {to_rgb(c) for c in finals.get_facecolors()} == {tone(LIGHT.final)}
+        starts = next(line for line in axes.lines if line.get_marker() == "o")
+        assert np.asarray(starts.get_xydata()) == pytest.approx(record.positions[0])
+        assert to_rgb(starts.get_markeredgecolor()) == tone(LIGHT.start)
+        assert starts.get_markerfacecolor() == "none"
+
+    def test_cells_and_centroids_are_the_final_ones(self):
+        record = run_of(ROOMS, 5)
+        axes = plot_trajectories(record).axes[0]
+        cells = partition(record.positions[-1], ROOMS.region)
+        (drawn,) = [c for c in axes.collections if isinstance(c, PolyCollection)]
+        assert len(drawn.get_paths()) == 5
+        assert drawn.get_paths()[2].vertices[:-1] == pytest.approx(cells.polygons[2])
+        marks = next(line for line in axes.lines if line.get_marker() == "+")
+        assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroid)
+
+    def test_every_robot_has_its_number(self):
+        record = run_of(ROOMS, 12)
+        texts = plot_trajectories(record).axes[0].texts
+        assert [text.get_text() for text in texts] == [str(k) for k in range(1, 13)]
+        assert [text.get_position() for text in texts] == [tuple(p) for p in record.positions[-1].tolist()]
+
+    @pytest.mark.parametrize("n", [5, 40])
+    def test_robots_colours(self, n):
+        axes = plot_trajectories(run_of(ROOMS, n), colours="robots", theme=DARK).axes[0]
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        assert len({to_rgb(c) for c in lines.get_colors()}) == (5 if n == 5 else 1)
+        with pytest.raises(ParameterError, match="colours"):
+            plot_trajectories(run_of(ROOMS, 2), colours="rainbow")
+
+    def test_title_and_legend(self):
+        figure = plot_trajectories(run_of(ROOMS, 6), mean_distance=1.23456)
+        words = [text.get_text() for text in figure.texts]
+        assert any("RAPF" in text and "rooms" in text for text in words)
+        assert any("t = 3.9 s" in t and "mean distance 1.235 m" in t and "6 robots" in t for t in words)
+        (legend,) = figure.legends
+        entries = [text.get_text() for text in legend.get_texts()]
+        assert entries[:3] == ["start", "trajectory", "final position"]
+        assert "obstacle (unknown to robots)" in entries
+        (legend,) = plot_trajectories(run_of(CORRIDOR, 3)).legends
+        assert "obstacle (unknown to robots)" not in [text.get_text() for text in legend.get_texts()]
+
+    def test_the_scale_bar_is_as_long_as_it_says(self):
+        figure = plot_trajectories(run_of(ROOMS, 3))
+        box = figure.axes[0].get_window_extent()
+        bar = max(figure.lines, key=lambda line: np.ptp(line.get_xdata()))
+        pixels = np.ptp(bar.get_xdata()) * figure.bbox.width
+        label = next(t.get_text() for t in figure.texts if re.fullmatch(r"[\d.]+ m", t.get_text()))
+        assert pixels / (box.width / 16.0) == pytest.approx(float(label.split()[0]))
+
+    def test_on_axes_of_somebody_else(self):
+        figure = Figure()
+        axes = figure.subplots()
+        assert plot_trajectories(run_of(ROOMS, 3), axes) is figure
+        assert axes.get_xlabel() == "x (m)" and axes.get_ylabel() == "y (m)"
+        assert axes.get_aspect() == 1.0
+        assert not figure.legends
+
+
+class TestCost:
+    def test_values_units_and_the_papers_colours(self):
+        given_curves = curves(1.0, 1.4)
+        figure = plot_cost(given_curves)
+        axes = figure.axes[0]
+        assert "(s)" in axes.get_xlabel() and "(m)" in axes.get_ylabel()
+        long = [line for line in axes.lines if len(line.get_xdata()) == len(T)]
+        for line, (_, name, time, values) in zip(long, given_curves, strict=True):
+            assert np.asarray(line.get_xdata()).tolist() == time.tolist()
+            assert np.asarray(line.get_ydata()).tolist() == values.tolist()
+            assert to_rgb(line.get_color()) == tone(LIGHT.controllers[name])
+        assert len({str(line.get_linestyle()) for line in long}) == 2
+        assert [text.get_text() for text in axes.texts] == ["RAPF  1.005 m", "RPF  1.405 m"]
+
+    @pytest.mark.parametrize("finals", [(1.0,), (1.0, 1.0, 1.0, 1.0), (1.0, 1.01, 3.0), (0.0, 0.001, 0.002)])
+    @pytest.mark.parametrize("size", [(900, 600), (2560, 1440), (500, 320)])
+    def test_labels_stand_apart_in_order_and_on_the_page(self, finals, size):
+        figure = plot_cost(curves(*finals), size=size)
+        renderer = figure.canvas.get_renderer()
+        axes = figure.axes[0]
+        words = [text.get_window_extent(renderer) for text in axes.texts if isinstance(text, Text)]
+        arena = axes.get_window_extent()
+        for k, box in enumerate(words):
+            assert box.x0 > arena.x1 and box.x1 <= size[0] and box.y0 >= 0 and box.y1 <= size[1]
+            assert not any(overlap(box, other) for other in words[k + 1 :])
+        heights = [box.y0 for box in words]
+        assert np.argsort(heights, kind="stable").tolist() == np.argsort(finals, kind="stable").tolist()
+        for text in [*axes.get_xticklabels(), *axes.get_yticklabels(), axes.xaxis.label, axes.yaxis.label]:
+            if text.get_text():
+                box = text.get_window_extent(renderer)
+                assert box.x0 >= 0 and box.y0 >= 0
+
+    def test_gaps_and_constant_curves(self):
+        values = np.full(len(T), 2.0)
+        values[-3:] = np.nan
+        figure = plot_cost([("A", "rapf", T, values)])
+        assert figure.axes[0].texts[0].get_text() == "A  2.000 m"
+        low, high = figure.axes[0].get_ylim()
+        assert low < 2.0 < high
+
+    @pytest.mark.parametrize(
+        "bad", [[], [("A", "rapf", T, T[:-1])], [("A", "rapf", T, np.full(len(T), np.nan))]]
+    )
+    def test_what_cannot_be_plotted_is_named(self, bad):
+        with pytest.raises(ParameterError, match="curve"):
+            plot_cost(bad)
+
+    @given(st.lists(st.floats(0, 100), min_size=1, max_size=8), st.floats(0.1, 10))
+    def test_spread_keeps_order_gap_and_limits(self, heights, gap):
+        given_heights = np.array(heights)
+        placed = spread(given_heights, gap, 0.0, 100.0)
+        order = np.argsort(given_heights, kind="stable")
+        assert (np.diff(placed[order]) >= gap * (1 - 1e-9)).all()
+        assert placed.min() >= -1e-9 and placed.max() <= 100 + 1e-9
+        if len(heights) == 1 or np.diff(np.sort(given_heights)).min() >= gap:
+            assert placed == pytest.approx(given_heights)
+
+
+class TestSaving:
+    def test_an_svg_is_the_same_every_time_and_everywhere(self, tmp_path):
+        for name in ("a.svg", "b.svg"):
+            save_figure(plot_trajectories(run_of(ROOMS, 4)), tmp_path / name)
+        text = (tmp_path / "a.svg").read_text()
+        assert text == (tmp_path / "b.svg").read_text()
+        assert "<text" not in text and "font-family" not in text
+        assert "<dc:date>" not in text
+
+    def test_a_png_is_the_same_every_time(self, tmp_path):
+        for name in ("a.png", "b.png"):
+            save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / name)
+        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+    def test_the_users_own_style_changes_nothing(self, tmp_path):
+        save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / "a.png")
+        with matplotlib.rc_context(
+            {"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.bbox": "tight"}
+        ):
+            save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / "b.png")
+        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+    def test_other_suffixes_are_refused(self, tmp_path):
+        with pytest.raises(ParameterError, match=r"'\.pdf', but \.png or \.svg was wanted"):
+            save_figure(plot_environment(HALL), tmp_path / "a.pdf")
+
+    def test_a_full_disk_is_named_and_leaves_the_older_file(self, tmp_path, monkeypatch):
+        path = tmp_path / "a.png"
+        path.write_bytes(b"older")
+        figure = plot_environment(HALL)
+
+        def full(part, **options):
+            Path(part).write_bytes(b"half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr(figure, "savefig", full)
+        with pytest.raises(OutputError, match=r"a\.png: cannot be written.*No space"):
+            save_figure(figure, path)
+        assert path.read_bytes() == b"older"
+        assert list(tmp_path.iterdir()) == [path]
+
+
+_LAZY = """
+import sys
+import robocov_app.plots
+assert "matplotlib" not in sys.modules
+sys.path.insert(0, sys.argv[1])
+from drawn_run import ROOMS, run_of
+robocov_app.plots.plot_trajectories(run_of(ROOMS, 3))
+assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
+"""
+
+
+def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
+    done = subprocess.run(
+        [sys.executable, "-c", _LAZY, str(Path(__file__).parent)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

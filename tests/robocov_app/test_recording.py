@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pygame
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from robocov.errors import OutputError, ParameterError
+from robocov_app.recording import (
+    frame_rows,
+    iter_frames,
+    png_bytes,
+    save_film,
+    save_frames,
+    side_by_side,
+)
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drawn_run import ROOMS, SQUARE, run_of
+
+
+def plain(count, width=64, height=48):
+    """Yield frames of one colour each, getting lighter."""
+    for k in range(count):
+        yield np.full((height, width, 3), 20 * k % 256, dtype=np.uint8)
+
+
+def read(path):
+    """Return the film's frames and what ffmpeg says of it."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    said = done.stderr.decode()
+    line = next(line for line in said.splitlines() if "Video:" in line)
+    width, height = map(int, re.search(r" (\d+)x(\d+)[, ]", line).groups())
+    return list(np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)), line
+
+
+class TestRows:
+    @given(st.integers(2, 200), st.floats(0.5, 60), st.floats(0.1, 20), st.floats(0.01, 0.5))
+    def test_film_time_times_speed_is_simulated_time(self, steps, fps, speed, dt):
+        time = np.arange(steps) * dt
+        rows = frame_rows(time, fps, speed)
+        wanted = np.minimum(np.arange(len(rows)) * speed / fps, time[-1])
+        assert rows[0] == 0 and rows[-1] == steps - 1
+        assert (np.diff(rows) >= 0).all()
+        assert (time[rows] <= wanted + 1e-6).all()
+        assert (time[rows[:-1]] > wanted[:-1] - dt - 1e-6).all()
+        assert len(rows) - 1 == pytest.approx(time[-1] * fps / speed, abs=1.0 + 1e-6)
+
+    def test_sums_of_steps_do_not_skip_a_row(self):
+        time = np.cumsum(np.full(601, 1 / 30)) - 1 / 30
+        assert frame_rows(time, 30).tolist() == list(range(601))
+
+    def test_the_end_is_held(self):
+        assert frame_rows(np.array([0.0, 1.0]), 2, hold=1.0).tolist() == [0, 0, 1, 1, 1]
+
+    @pytest.mark.parametrize("given", [{"fps": 0}, {"fps": 30, "speed": -1}, {"fps": float("nan")}])
+    def test_only_positive_rates(self, given):
+        with pytest.raises(ParameterError, match="positive"):
+            frame_rows(np.array([0.0, 1.0]), **given)
+
+
+class TestFrames:
+    def test_as_many_as_the_run_lasts_and_lazily(self):
+        record = run_of(ROOMS, 3, steps=31)  # 3 s
+        frames = iter_frames(record, size=(160, 120), fps=5, speed=2)
+        assert next(frames).shape == (120, 160, 3)
+        assert 1 + sum(1 for _ in frames) == 9
+
+    def test_each_shows_its_moment(self):
+        record = run_of(SQUARE, 3, steps=21)
+        frames = list(iter_frames(record, size=(320, 240), rows=np.array([0, 10, 20, 20])))
+        assert (frames[0] != frames[1]).any() and (frames[1] != frames[2]).any()
+        assert (frames[2] == frames[3]).all()
+
+    def test_the_cost_is_the_latest_known(self):
+        record = run_of(SQUARE, 3, steps=21)
+        rows = np.array([10])
+
+        def shown(times, values):
+            cost = (np.array(times), np.array(values)) if times else None
+            options = {"size": (480, 240), "rows": rows, "show": ["status"]}
+            return next(iter_frames(record, cost=cost, **options)).tobytes()
+
+        known = shown([0.0, 1.0, 1.5], [3.0, 2.0, 1.0])
+        assert known == shown([0.9], [2.0])
+        assert known != shown([0.9], [3.0])
+        assert shown([1.5], [1.0]) == shown([], []) == shown([0.0], [np.nan])
+
+    def test_options_are_checked(self):
+        record = run_of(SQUARE, 3, steps=5)
+        with pytest.raises(ParameterError, match="theme"):
+            next(iter_frames(record, theme="pink"))
+        with pytest.raises(ParameterError, match="layer"):
+            next(iter_frames(record, show=["robot"]))
+
+
+def test_side_by_side_waits_for_the_longest():
+    joined = list(side_by_side([plain(2), plain(4, width=32)], gap=3, grey=99))
+    assert [frame.shape for frame in joined] == [(48, 64 + 3 + 32, 3)] * 4
+    assert [int(frame[0, 0, 0]) for frame in joined] == [0, 20, 20, 20]
+    assert [int(frame[0, 80, 0]) for frame in joined] == [0, 20, 40, 60]
+    assert (joined[0][:, 64:67] == 99).all()
+
+
+@settings(deadline=None, max_examples=30)
+@given(arrays(np.uint8, st.tuples(st.integers(1, 20), st.integers(1, 20), st.just(3))))
+def test_png_holds_every_pixel(frame):
+    import io
+
+    surface = pygame.image.load(io.BytesIO(png_bytes(frame)), "frame.png")
+    back = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(frame.shape)
+    assert (back == frame).all()
+    assert png_bytes(frame) == png_bytes(frame.copy())
+
+
+class TestSaveFrames:
+    def test_names_and_progress(self, tmp_path):
+        told = []
+        folder = tmp_path / "new" / "frames"
+        count = save_frames(folder, plain(3), total=3, progress=lambda *given: told.append(given))
+        assert count == 3
+        assert sorted(path.name for path in folder.iterdir()) == ["000000.png", "000001.png", "000002.png"]
+        assert told == [(1, 3), (2, 3), (3, 3)]
+
+    def test_a_full_disk_is_named_and_leaves_whole_frames_only(self, tmp_path, monkeypatch):
+        write = Path.write_bytes
+
+        def full(self, data):
+            if "000002" in self.name:
+                write(self, data[:10])
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return write(self, data)
+
+        monkeypatch.setattr(Path, "write_bytes", full)
+        with pytest.raises(OutputError, match=r"000002\.png: cannot be written .*[Nn]o space"):
+            save_frames(tmp_path, plain(5))
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["000000.png", "000001.png"]
+
+    def test_a_file_in_the_way_is_named(self, tmp_path):
+        (tmp_path / "frames").write_text("")
+        with pytest.raises(OutputError, match="frames"):
+            save_frames(tmp_path / "frames", plain(1))
+
+
+class TestSaveFilm:
+    def test_it_can_be_read_back(self, tmp_path):
+        told = []
+        path = tmp_path / "new" / "run.mp4"
+        count = save_film(path, plain(10), fps=25, total=10, progress=lambda *given: told.append(given))
+        frames, about = read(path)
+        assert count == len(frames) == 10
+        assert frames[0].shape == (48, 64, 3)
+        assert "h264" in about and "yuv420p(" in about and "25 fps" in about
+        assert told[-1] == (10, 10) and len(told) == 10
+        for k, frame in enumerate(frames):
+            assert np.abs(frame.astype(int) - 20 * k).max() <= 6
+        assert [entry.name for entry in path.parent.iterdir()] == ["run.mp4"]
+
+    def test_colours_survive(self, tmp_path):
+        colours = [(214, 34, 34), (31, 95, 224), (30, 158, 54), (27, 35, 48)]
+        frames = [np.broadcast_to(np.array(c, dtype=np.uint8), (720, 1280, 3)) for c in colours]
+        save_film(tmp_path / "a.mp4", frames)
+        back, _ = read(tmp_path / "a.mp4")
+        for frame, colour in zip(back, colours, strict=True):
+            assert np.abs(frame[300, 600].astype(int) - colour).max() <= 12
+
+    @pytest.mark.parametrize(("width", "height"), [(63, 48), (64, 47), (63, 47)])
+    def test_odd_sizes_are_made_even_without_scaling(self, tmp_path, width, height):
+        frame = np.zeros((height, width, 3), dtype=np.uint8)
+        frame[:, ::8] = 255
+        save_film(tmp_path / "odd.mp4", [frame] * 3)
+        frames, _ = read(tmp_path / "odd.mp4")
+        assert frames[0].shape == (height + height % 2, width + width % 2, 3)
+        bright = frames[0][20, :, 1] > 128
+        assert np.nonzero(bright)[0].tolist() == list(range(0, width, 8))
+
+    def test_same_frames_same_bytes(self, tmp_path):
+        record = run_of(ROOMS, 5, steps=12)
+        for name in ("a.mp4", "b.mp4"):
+            save_film(tmp_path / name, iter_frames(record, size=(320, 180), fps=10))
+        assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+    def test_no_frames(self, tmp_path):
+        with pytest.raises(ParameterError, match="frames"):
+            save_film(tmp_path / "a.mp4", [])
+        assert list(tmp_path.iterdir()) == []
+
+    def test_frames_of_different_sizes(self, tmp_path):
+        with pytest.raises(ParameterError, match="one size"):
+            save_film(tmp_path / "a.mp4", [*plain(2), *plain(1, width=32)])
+        assert list(tmp_path.iterdir()) == []
+
+    @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
+    def test_an_interruption_leaves_the_older_film(self, tmp_path, stop):
+        path = tmp_path / "run.mp4"
+        path.write_bytes(b"older")
+
+        def frames():
+            yield from plain(5)
+            raise stop
+
+        with pytest.raises(stop):
+            save_film(path, frames())
+        assert path.read_bytes() == b"older"
+        assert list(tmp_path.iterdir()) == [path]
+
+    @pytest.mark.parametrize(
+        "script",
+        [
+            "echo 'av_interleaved_write_frame(): No space left on device' >&2; exit 1",
+            "cat > /dev/null; echo 'No space left on device' >&2; exit 1",
+        ],
+        ids=["at once", "at the end"],
+    )
+    @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the encoder")
+    def test_a_failing_encoder_leaves_nothing_and_is_quoted(self, tmp_path, monkeypatch, script):
+        fake = tmp_path / "ffmpeg"
+        fake.write_text(f"#!/bin/sh\n{script}\n")
+        fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
+        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(fake))
+        folder = tmp_path / "out"
+        with pytest.raises(OutputError, match=r"run\.mp4: the film's encoder failed .*No space left"):
+            save_film(folder / "run.mp4", plain(200, width=320, height=240))
+        assert list(folder.iterdir()) == []
+
+    def test_a_missing_encoder_is_named(self, tmp_path, monkeypatch):
+        def missing():
+            raise RuntimeError("No ffmpeg exe could be found.")
+
+        monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", missing)
+        with pytest.raises(OutputError, match="IMAGEIO_FFMPEG_EXE"):
+            save_film(tmp_path / "run.mp4", plain(2))
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_folder_that_cannot_be_made_is_named(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(OutputError, match="file"):
+            save_film(tmp_path / "file" / "run.mp4", plain(2))

@@ -1,0 +1,113 @@
+"""The rules of the house: layout, types, style, imports."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted([*(ROOT / "coverage").rglob("*.py"), *(ROOT / "app").rglob("*.py")])
+
+
+def passes(*command: str, cwd: Path = ROOT) -> None:
+    done = subprocess.run([sys.executable, *command], cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}\n{done.stderr}"
+
+
+def test_ruff_finds_nothing() -> None:
+    passes("-m", "ruff", "check", ".")
+
+
+def test_the_format_is_ruffs() -> None:
+    passes("-m", "ruff", "format", "--check", ".")
+
+
+def test_types_are_strict() -> None:
+    passes("-m", "mypy")
+
+
+def test_imports_go_down_only() -> None:
+    passes("-c", "import sys; from importlinter.cli import lint_imports_command; sys.argv = ['x']; lint_imports_command()")
+
+
+@pytest.mark.parametrize("root", ["coverage", "app"])
+def test_a_source_root_is_not_a_package(root: str) -> None:
+    """An import package called `coverage` would overwrite coverage.py in the user's environment."""
+    assert not (ROOT / root / "__init__.py").exists()
+
+
+def test_top_level() -> None:
+    names = {path.name for path in ROOT.iterdir() if not path.name.startswith(".")}
+    assert {"pyproject.toml", "app", "coverage", "maps", "tests", "README.md", "LICENSE", "CHANGELOG.md"} <= names
+
+
+def test_files_do_one_thing() -> None:
+    long = {path.name: n for path in SOURCES if (n := len(path.read_text().splitlines())) > 420}
+    assert not long
+
+
+def test_every_module_has_its_tests() -> None:
+    """One test file for each module; those named here are tested through the module beside them."""
+    through = {"__init__", "__main__", "arrays", "base"}
+    tested = {path.name for path in (ROOT / "tests").rglob("test_*.py")}
+    text = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    missing = [
+        path.stem
+        for path in SOURCES
+        if path.stem not in through and f"test_{path.stem}.py" not in tested and f".{path.stem} " not in text
+    ]
+    assert not missing, f"no test imports {missing}"
+
+
+def test_the_version_is_said_once_in_each_place() -> None:
+    import robocov
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == robocov.__version__
+    assert f"## {robocov.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_public_names_are_what_the_package_says() -> None:
+    import robocov
+
+    assert sorted(robocov._HOME) == sorted(robocov.__all__)
+    for name in robocov.__all__:
+        assert getattr(robocov, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        robocov.nothing
+    tree = ast.parse((ROOT / "coverage/robocov/__init__.py").read_text())
+    declared = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert set(robocov.__all__) <= declared, "a name that type checkers do not see"
+
+
+def loaded_by(statement: str) -> set[str]:
+    script = f"import sys\n{statement}\nprint(' '.join(sys.modules))"
+    environment = {**os.environ, "PYTHONPATH": ""}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
+    return set(done.stdout.split())
+
+
+def test_importing_the_package_loads_neither_pygame_nor_matplotlib() -> None:
+    loaded = loaded_by("import robocov")
+    assert not loaded & {"pygame", "matplotlib", "scipy", "shapely", "pydantic"}
+    everything = loaded_by("import robocov\nfor name in robocov.__all__: getattr(robocov, name)")
+    assert not everything & {"pygame", "matplotlib", "rich", "tyro"}
+
+
+def test_asking_for_help_loads_nothing_heavy() -> None:
+    loaded = loaded_by("from robocov_app.cli import main\nmain(['--help'])")
+    assert not loaded & {"numpy", "scipy", "shapely", "pydantic", "pygame", "matplotlib", "pymunk", "tyro", "rich"}
+
+
+def test_ci_runs_the_readmes_test_command_and_nothing_else() -> None:
+    readme = (ROOT / "README.md").read_text()
+    script = (ROOT / ".ci/run").read_text().splitlines()
+    command = script[-1]
+    assert command in readme.splitlines()
+    assert [line for line in script[:-1] if line and not line.startswith("#")] == ["set -eu", 'cd "$(dirname "$0")/.."']
