@@ -72,6 +72,34 @@ class Page:
         x, y = self.at(left, top + height)
         return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]))
 
+    def panels(self, count: int, columns: int, aspect: float, words: float) -> list[tuple[Box, float]]:
+        """Return equal boxes in rows, and how wide the lines above each may be.
+
+        Parameters
+        ----------
+        count, columns : int
+        aspect : float
+            Width by height of each box.
+        words : float, px
+            How wide the lines above would be; slots grow for them as far as there is room.
+        """
+        rows = -(-count // columns)
+        above, gap, below = 52 * self.scale, 6 * self.scale, 70 * self.scale
+        widest = (self.size[0] - self.margin) / columns - self.margin
+        highest = (self.size[1] - below - self.margin / 2) / rows - above - gap
+        width = min(widest, highest * aspect)
+        height = width / aspect
+        slot = min(max(width, words), widest)
+        left = (self.size[0] - columns * slot - (columns - 1) * self.margin) / 2
+        block = above + height + gap
+        top = max((self.size[1] - below - rows * block) / 2, self.margin / 2)
+        boxes = []
+        for number in range(count):
+            row, column = divmod(number, columns)
+            x, y = left + column * (slot + self.margin), top + row * block + above
+            boxes.append(((x, y, width, height), slot))
+        return boxes
+
     def text(
         self,
         text: str,

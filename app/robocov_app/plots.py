@@ -61,7 +61,7 @@ def plot_environment(
         axes = _arena(page, box, environment)
         draw_map(axes, environment, theme)
         _titles(page, box, environment.name, facts)
-        _scale_bar(page, box, environment)
+        _scale_bar(page, box[0], box[1] + box[3], _zoom(box, environment))
         page.legend(map_handles(environment, theme), box[1] + box[3] + 34 * page.scale)
         return page.figure
 
@@ -104,8 +104,10 @@ def plot_trajectories(
         box = _arena_box(page, record.environment)
         axes = _arena(page, box, record.environment)
         draw_run(axes, record, theme, colours)
-        _titles(page, box, f"{record.label}  ·  {record.environment.name}", _facts(record, mean_distance))
-        _scale_bar(page, box, record.environment)
+        n = len(record.team)
+        facts = f"{_facts(record, mean_distance)}  ·  {n} robot{'s' if n > 1 else ''}"
+        _titles(page, box, f"{record.label}  ·  {record.environment.name}", facts)
+        _scale_bar(page, box[0], box[1] + box[3], _zoom(box, record.environment))
         page.legend(run_handles(record, theme, colours), box[1] + box[3] + 34 * page.scale)
         return page.figure
 
@@ -157,30 +159,25 @@ def plot_comparison(
             tall = (1400 - 36) / columns / aspect + 62
             size = (1400, int(np.clip(rows * tall + 70, 320, 2400)))
         page = Page(size, theme)
-        s, margin = page.scale, page.margin
-        below = 70 * s
-        wide, high = (size[0] - margin) / columns - margin, (size[1] - below - margin / 2) / rows - 58 * s
-        width = min(wide, high * aspect)
-        height = width / aspect
-        block = height + 58 * s
-        left = (size[0] - columns * width - (columns - 1) * margin) / 2
-        top = max((size[1] - below - rows * block) / 2, margin / 2)
-        box = (left, top, width, height)
-        for number, (record, cost) in enumerate(zip(records, costs, strict=True)):
-            row, column = divmod(number, columns)
-            box = (left + column * (width + margin), top + row * block + 52 * s, width, height)
+        facts = [_facts(record, cost) for record, cost in zip(records, costs, strict=True)]
+        words = max(page.text_width(text) for text in facts)
+        panels = page.panels(len(records), columns, aspect, words)
+        for record, text, (box, room) in zip(records, facts, panels, strict=True):
             axes = page.axes(box)
             axes.set_xlim(limits[0], limits[2])
             axes.set_ylim(limits[1], limits[3])
             axes.set_axis_off()
             draw_run(axes, record, theme, colours)
-            _titles(page, box, record.label, _facts(record, cost, with_team=False), alone=False)
-        bottom = (left, top, width, rows * block - 6 * s)
-        _scale_bar(page, bottom, records[0].environment, zoom=width / (limits[2] - limits[0]))
+            left, top = box[0], box[1]
+            page.text(record.label, left, top - 38 * page.scale, points=TITLE, bold=True, room=room)
+            page.text(text, left, top - 16 * page.scale, colour=theme.faint, room=room)
+        (left, _, width, _), _ = panels[0]
+        bottom = max(box[1] + box[3] for box, _ in panels)
+        _scale_bar(page, left, bottom, width / (limits[2] - limits[0]))
         handles: dict[str, Artist] = {}
         for record in records:
             handles |= {str(h.get_label()): h for h in run_handles(record, theme, colours)}
-        page.legend(list(handles.values()), bottom[1] + bottom[3] + 34 * s)
+        page.legend(list(handles.values()), bottom + 34 * page.scale)
         return page.figure
 
 
@@ -319,37 +316,33 @@ def _arena(page: Page, box: Box, environment: Environment) -> Axes:
     return axes
 
 
-def _titles(page: Page, box: Box, title: str, facts: str, alone: bool = True) -> None:
-    """Write two lines above `box`; above a lone narrow map they may be wider than it."""
+def _titles(page: Page, box: Box, title: str, facts: str) -> None:
+    """Write two lines above `box`; above a narrow map they may be wider than it."""
     left, top, width, _ = box
+    room = page.size[0] - 2 * page.margin
     for text, up, points, bold, colour in (
         (title, 38, TITLE, True, page.theme.ink),
         (facts, 16, TEXT, False, page.theme.faint),
     ):
-        wide = page.text_width(text, points=points, bold=bold)
-        room = page.size[0] - 2 * page.margin if alone else width
-        start = left if wide <= width or not alone else max(left + (width - min(wide, room)) / 2, page.margin)
+        wide = min(page.text_width(text, points=points, bold=bold), room)
+        start = left if wide <= width else max(left + (width - wide) / 2, page.margin)
         page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
 
 
-def _facts(record: Record, mean_distance: float | None, with_team: bool = True) -> str:
+def _facts(record: Record, mean_distance: float | None) -> str:
+    """Return the mean distance and the time: first what may not be cut."""
     facts = [f"t = {record.time[-1]:.1f} s"]
     if mean_distance is not None and np.isfinite(mean_distance):
-        facts.append(f"mean distance {mean_distance:.3f} m")
-    if with_team:
-        n = len(record.team)
-        facts.append("1 robot" if n == 1 else f"{n} robots")
+        facts.insert(0, f"mean distance {mean_distance:.3f} m")
     return "  ·  ".join(facts)
 
 
-def _scale_bar(page: Page, box: Box, environment: Environment, zoom: float | None = None) -> None:
-    """Draw a bar of a round length below the left end of `box`."""
+def _scale_bar(page: Page, left: float, bottom: float, zoom: float) -> None:
+    """Draw a bar of a round length under the left end of an arena; `zoom` is in pixels per metre."""
     from matplotlib.lines import Line2D
 
-    low_x, _, high_x, _ = environment.region.bounds
-    zoom = box[2] / (high_x - low_x) if zoom is None else zoom
     length = round_length(max(min(140 * page.scale, page.size[0] / 6), 20.0) / zoom)
-    left, y, tick = box[0], box[1] + box[3] + 17 * page.scale, 4 * page.scale
+    y, tick = bottom + 17 * page.scale, 4 * page.scale
     right = left + length * zoom
     for (x1, y1), (x2, y2) in (
         ((left, y), (right, y)),
@@ -359,6 +352,11 @@ def _scale_bar(page: Page, box: Box, environment: Environment, zoom: float | Non
         (a, b), (c, d) = page.at(x1, y1), page.at(x2, y2)
         page.figure.add_artist(Line2D([a, c], [b, d], color=tone(page.theme.ink), linewidth=1.3))
     page.text(length_label(length), right + 8 * page.scale, y, points=SMALL, bold=True)
+
+
+def _zoom(box: Box, environment: Environment) -> float:
+    low_x, _, high_x, _ = environment.region.bounds
+    return box[2] / (high_x - low_x)
 
 
 def _columns(count: int, aspect: float, size: tuple[int, int]) -> int:

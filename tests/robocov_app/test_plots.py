@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from robocov.errors import OutputError, ParameterError
@@ -179,7 +180,8 @@ class TestTrajectories:
     def test_the_scale_bar_is_as_long_as_it_says(self):
         figure = plot_trajectories(run_of(ROOMS, 3))
         box = figure.axes[0].get_window_extent()
-        bar = max(figure.lines, key=lambda line: np.ptp(line.get_xdata()))
+        bars = [artist for artist in figure.artists if isinstance(artist, Line2D)]
+        bar = max(bars, key=lambda line: np.ptp(line.get_xdata()))
         pixels = np.ptp(bar.get_xdata()) * figure.bbox.width
         label = next(t.get_text() for t in figure.texts if re.fullmatch(r"[\d.]+ m", t.get_text()))
         assert pixels / (box.width / 16.0) == pytest.approx(float(label.split()[0]))
@@ -211,6 +213,7 @@ class TestCost:
     @pytest.mark.parametrize("size", [(900, 600), (2560, 1440), (500, 320)])
     def test_labels_stand_apart_in_order_and_on_the_page(self, finals, size):
         figure = plot_cost(curves(*finals), size=size)
+        figure.canvas.draw()
         renderer = figure.canvas.get_renderer()
         axes = figure.axes[0]
         words = [text.get_window_extent(renderer) for text in axes.texts if isinstance(text, Text)]
