@@ -9,14 +9,20 @@ cell has about six vertices, and numpy's calls would cost more than the arithmet
 from __future__ import annotations
 
 from itertools import chain, pairwise
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.cell_edges import REGION, CellEdges
 from robocov.observation import Neighbours
 from robocov.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+_ENOUGH = 32
+"""Neighbours a robot, on average, among which most cells find all that cut them."""
 
 Vertex: TypeAlias = tuple[float, float, int]
 """x and y in metres relative to the generator, and what lies beyond the edge that begins here: the index
@@ -96,21 +102,42 @@ def edges_of(cells: list[Cell]) -> CellEdges:
     )
 
 
-def _by_distance(generators: Array, neighbours: Neighbours) -> list[list[int]]:
+def _by_distance(generators: Array, neighbours: Neighbours) -> list[Iterable[int]]:
     """Return for every robot those that it hears, nearest first; at equal distances the lower index."""
     n = len(generators)
     x, y = generators[:, 0], generators[:, 1]
     if neighbours.indptr is None or neighbours.indices is None:
         square = np.square(x[:, None] - x) + np.square(y[:, None] - y)
         # each row begins with the robot itself, or with one at the same place, which does not cut it either
-        rows: list[list[int]] = square.argsort(axis=1, kind="stable")[:, 1:].tolist()
+        rows: list[Iterable[int]] = square.argsort(axis=1, kind="stable")[:, 1:].tolist()
         return rows
     first = np.repeat(np.arange(n), np.diff(neighbours.indptr))
     second = neighbours.indices
     square = np.square(x[first] - x[second]) + np.square(y[first] - y[second])
+    if len(second) <= _ENOUGH * n:
+        return list(_sorted_rows(first, second, square, n))
+
+    # sorting what a cell's security radius never reaches would take longer than the cells
+    near = square <= np.partition(square, _ENOUGH * n)[_ENOUGH * n]
+    far_stops = np.cumsum(np.bincount(first[~near], minlength=n)).tolist()
+    far, far_square = second[~near], square[~near]
+    return [
+        chain(row, _sorted_when_needed(far[start:stop], far_square[start:stop]))
+        for row, start, stop in zip(
+            _sorted_rows(first[near], second[near], square[near], n), [0, *far_stops], far_stops, strict=False
+        )
+    ]
+
+
+def _sorted_rows(first: IntArray, second: IntArray, square: Array, n: int) -> Iterator[list[int]]:
     ordered = second[np.lexsort((square, first))].tolist()
-    stops = neighbours.indptr.tolist()
-    return [ordered[start:stop] for start, stop in pairwise(stops)]
+    stops = np.cumsum(np.bincount(first, minlength=n)).tolist()
+    for start, stop in pairwise([0, *stops]):
+        yield ordered[start:stop]
+
+
+def _sorted_when_needed(others: IntArray, square: Array) -> Iterator[int]:
+    yield from others[square.argsort(kind="stable")].tolist()
 
 
 def _security(cell: Cell) -> float:

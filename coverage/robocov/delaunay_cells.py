@@ -30,9 +30,10 @@ from robocov.region import Region
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
-_QHULL_OPTIONS = "Qbb"
+_QHULL_OPTIONS = "Qbb Q5"
 """As scipy's, without the point at infinity (Qz), which only a team on one circle needs, without leave to
-return doubtful facets (Q12), and without the list of points left out (Qc): their cells have no mass."""
+return doubtful facets (Q12), without the list of points left out (Qc): their cells have no mass; and
+without widening the facets for printing (Q5)."""
 
 _TOLERANCE = 1e-12
 """How far the masses may miss the region's area, relative to it."""
