@@ -1,8 +1,8 @@
 """The command `robocov`: finds the subcommand, and turns errors into one line and an exit status.
 
-Each command lives in a module of `robocov_app.commands` with one function `command`. Its options
-are the function's signature or, where there are many, a dataclass `Arguments` that it takes. Only
-the module of the command that is called gets imported: asking for help must not pay for plotting.
+Each command lives in a module of `robocov_app.commands`: a dataclass `Arguments`, which is its
+options and its help, and a function `command`. Only the module of the command that is called gets
+imported: asking for help must not pay for plotting.
 """
 
 from __future__ import annotations
@@ -61,13 +61,9 @@ def _guarded(name: str, rest: list[str]) -> int:
         # pygame greets on stdout, which belongs to answers
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-        import tyro
+        from robocov_app.arguments import parsed
 
-        options = {"prog": f"robocov {name}", "args": rest, "config": (tyro.conf.FlagCreatePairsOff,)}
-        if hasattr(module, "Arguments"):
-            status = module.command(tyro.cli(module.Arguments, **options))
-        else:
-            status = tyro.cli(module.command, **options)
+        status = module.command(parsed(module.Arguments, name, rest))
         sys.stdout.flush()
     except RobocovError as error:
         return _complain(str(error))

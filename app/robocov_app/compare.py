@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import controller_kind, gains_of
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.output import finite, write_csv, write_json
-from robocov_app.run import FILM_HOLD, Run, frames_of, save_figures, save_moving
+from robocov_app.run import COST_SIZE, FILM_HOLD, Run, frames_of, save_figures, save_moving
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, 
             raise ParameterError(f"--set {key}: {unknown_name('controller', owner, known)}")
         takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
         if not takers:
-            every = {gain for name in names for gain in known[name]}
+            every = known[owner] if dot else {gain for name in names for gain in known[name]}
             raise ParameterError(f"--set {key}: {unknown_name('gain', gain, every)}")
         for k in takers:
             chosen[k][gain] = value
@@ -92,7 +92,7 @@ def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) 
             "trajectories": lambda: plot_comparison(
                 records, theme=theme, colours=options.colours, size=size, mean_distances=finals
             ),
-            "cost": lambda: plot_cost(curves, theme=theme, **({} if size is None else {"size": size})),
+            "cost": lambda: plot_cost(curves, theme=theme, size=size or COST_SIZE),
         },
         quiet=options.json,
     )

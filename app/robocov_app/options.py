@@ -12,6 +12,9 @@ import tyro
 
 from robocov.errors import ParameterError, shown
 
+MOST_ROWS = 2e7
+"""Largest record, in moments times robots: about 2 GB."""
+
 
 @dataclass
 class RunOptions:
@@ -62,7 +65,7 @@ class RunOptions:
     colours: Literal["paper", "robots"] = "paper"
     """Trajectories in the paper's red, or a colour for each robot."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size of pictures and films in pixels; by default 1280x720 for films, and what suits the map for pictures."""
+    """Size in pixels; by default 1280x720 for films, and what suits the map for pictures."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -73,6 +76,12 @@ class RunOptions:
         _in_range("--lattice", self.lattice, 2, 2048)
         _in_range("--fps", self.fps, 1, 240)
         _in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        moments = self.duration / self.dt if self.dt > 0 else 0.0
+        if moments * self.robots > MOST_ROWS:
+            raise ParameterError(
+                f"--duration: {self.duration:g} s of {self.robots} robots at {self.dt:g} s are "
+                f"{moments * self.robots:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
+            )
         self.picture_size()
 
     def picture_size(self) -> tuple[int, int] | None:

@@ -13,7 +13,11 @@ from typing import Any
 from robocov.atomic import written
 from robocov.errors import InputError, OutputError
 
-_OURS = ["run.json", "record.npz", "cost.csv", "trajectories.png", "trajectories.svg", "cost.png", "cost.svg", "run.mp4", "comparison.json", "comparison.csv", "comparison.mp4"]
+_OURS = (
+    *("run.json", "record.npz", "cost.csv", "run.mp4"),
+    *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
+    *("comparison.json", "comparison.csv", "comparison.mp4"),
+)
 """Files that an earlier result in the same folder may have left; `--overwrite` removes these."""
 
 

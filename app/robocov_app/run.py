@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from robocov_app.options import RunOptions
     from robocov_app.recording import Frame
 
+COST_SIZE = (1000, 560)
+"""Size in pixels of the picture of cost curves, where no size is asked for."""
+
 FILM_HOLD = 1.0
 """Seconds for which a film stays on its last moment."""
 
@@ -53,9 +56,7 @@ def team_of(options: RunOptions) -> Team:
         max_acceleration=options.max_acceleration,
         viscosity=options.viscosity,
         sensing_range=options.sensing_range,
-        communication_range=np.inf
-        if options.communication_range is None or unlimited
-        else options.communication_range,
+        communication_range=np.inf if options.communication_range is None else options.communication_range,
     )
 
 
@@ -132,7 +133,7 @@ def save_pictures(run: Run, folder: Path, options: RunOptions) -> None:
             "trajectories": lambda: plot_trajectories(
                 record, theme=theme, colours=options.colours, size=size, mean_distance=final
             ),
-            "cost": lambda: plot_cost([curve], theme=theme, **({} if size is None else {"size": size})),
+            "cost": lambda: plot_cost([curve], theme=theme, size=size or COST_SIZE),
         },
         quiet=options.json,
     )

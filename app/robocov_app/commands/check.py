@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
 import sys
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import tyro
 
@@ -13,36 +14,42 @@ from robocov.mapcheck import MapReport, check_map
 from robocov.mapfile import load_map
 
 
-def command(files: tyro.conf.Positional[tuple[str, ...]], json: bool = False) -> int:
+@dataclass
+class Arguments:
     """Validate maps; print area, free area, vertices, components and the narrowest gap of each.
 
     The exit status is 2 when one of them is not a valid map. Warnings (a gap that is narrower than
     a robot, say) do not make a map invalid.
 
     Example: robocov check mine.json rooms
-
-    Args:
-        files: Map files, or names of bundled maps.
-        json: Print one JSON object.
     """
-    if not files:
+
+    files: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="MAP ...")] = ()
+    """Map files, or names of bundled maps."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> int:
+    """Check each, and say what is wrong with all that are wrong."""
+    if not options.files:
         raise InputError("check: at least one map file was wanted")
     rows: list[dict[str, Any]] = []
     failed = False
-    for name in files:
+    for name in options.files:
         try:
             report = check_map(load_map(name))
         except InputError as error:
             failed = True
             rows.append({"map": name, "valid": False, "error": str(error)})
-            if not json:
+            if not options.json:
                 print(f"robocov: error: {error}", file=sys.stderr)
             continue
         rows.append({"map": name, "valid": True, **report.to_dict()})
-        if not json:
+        if not options.json:
             print_report(name, report)
-    if json:
-        print(jsonlib.dumps({"maps": rows}, indent=1))
+    if options.json:
+        print(json.dumps({"maps": rows}, indent=1))
     return 2 if failed else 0
 
 

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
+from dataclasses import dataclass
 
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of
 from robocov_app.console import console
 
 
-def command(json: bool = False) -> None:
+@dataclass
+class Arguments:
     """List the controllers: one line each, and their gains with units, defaults and ranges.
 
     Example: robocov controllers --json
-
-    Args:
-        json: Print one JSON object; the recommended controller has "flagship": true.
     """
+
+    json: bool = False
+    """Print one JSON object and nothing else; the recommended controller has "flagship": true."""
+
+
+def command(options: Arguments) -> None:
+    """Print the list."""
     kinds = controller_kinds()
-    if json:
+    if options.json:
         rows = [
             {
                 "name": name,
@@ -39,7 +45,7 @@ def command(json: bool = False) -> None:
             }
             for name, kind in kinds.items()
         ]
-        print(jsonlib.dumps({"controllers": rows}, indent=1))
+        print(json.dumps({"controllers": rows}, indent=1))
         return
     from rich.table import Table
     from rich.text import Text
@@ -53,8 +59,13 @@ def command(json: bool = False) -> None:
         for gain in gains_of(kind).values():
             default = "null" if gain.default is None else f"{gain.default:g}"
             also = ", or null" if gain.optional else ""
-            value = f"{default} {gain.unit}"
-            table.add_row("   ", gain.name, value, f"{gain.low:g} to {gain.high:g}{also}", gain.meaning)
+            table.add_row(
+                "   ",
+                gain.name,
+                f"{default} {gain.unit}",
+                f"{gain.low:g} to {gain.high:g}{also}",
+                gain.meaning,
+            )
         out.print(table)
     out.print(
         Text("A law of your own: robocov run rooms --controller mine.py:MyController (see the README).")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -14,35 +15,38 @@ from robocov.atomic import written
 from robocov.cost import CoverageCost
 from robocov.errors import InputError, ParameterError, shown
 from robocov.mapfile import load_map
+from robocov_app.output import finite
 
 
-def command(
-    map: tyro.conf.Positional[str],  # noqa: A002 - the name of the argument as users see it
-    positions: Path,
-    lattice: int = 64,
-    sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None,
-    json: bool = False,
-) -> None:
+@dataclass
+class Arguments:
     """Evaluate the exact coverage cost (22) of given positions.
 
     Example: robocov cost rooms --positions robots.json --lattice 128
-
-    Args:
-        map: Path to a map JSON, or the name of a bundled map.
-        positions: JSON file with a list of [x, y] in metres, one for each robot.
-        lattice: Evaluate on N x N sites over the map.
-        sites: Save per-site points (m,2), distances (m,) and owner (m,) there.
-        json: Print one JSON object.
     """
-    if not 2 <= lattice <= 2048:
-        raise ParameterError(f"--lattice: {lattice}, but a whole number from 2 to 2048 was wanted")
-    environment = load_map(map)
-    robots = read_positions(positions)
-    cost = CoverageCost(environment, lattice=lattice)
+
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")]
+    """Path to a map JSON, or the name of a bundled map."""
+    positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
+    """JSON file with a list of [x, y] in metres, one for each robot."""
+    lattice: int = 64
+    """Evaluate on N x N sites over the map."""
+    sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
+    """Save per-site points (m,2), distances (m,) and owner (m,) there."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Evaluate and print."""
+    if not 2 <= options.lattice <= 2048:
+        raise ParameterError(f"--lattice: {options.lattice}, but a whole number from 2 to 2048 was wanted")
+    environment = load_map(options.map)
+    robots = read_positions(options.positions)
+    cost = CoverageCost(environment, lattice=options.lattice)
     result = cost(robots)
-    if sites is not None:
-        target = sites if sites.suffix == ".npz" else sites.with_name(sites.name + ".npz")
-        with written(target) as part, part.open("wb") as file:
+    if options.sites is not None:
+        with written(options.sites) as part, part.open("wb") as file:
             np.savez(file, points=cost.points, distances=result.distances, owner=result.owner)
     answer = {
         "mean_distance_m": result.mean_distance,
@@ -51,8 +55,8 @@ def command(
         "robots": len(robots),
         "sites": len(cost.points),
     }
-    if json:
-        print(jsonlib.dumps(answer))
+    if options.json:
+        print(json.dumps(finite(answer)))
         return
     print(f"mean distance   {result.mean_distance:.4f} m")
     print(f"coverage cost   {result.value:.3f} m³")
@@ -69,7 +73,7 @@ def read_positions(path: Path) -> Array:
         When it is not a list of [x, y]; the message names file, place and value.
     """
     try:
-        content = jsonlib.loads(path.read_bytes())
+        content = json.loads(path.read_bytes())
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,35 +14,41 @@ from robocov.mapfile import save_map
 from robocov_app.importers import detect, import_houseexpo
 
 
-def command(
-    file: tyro.conf.Positional[Path],
-    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")],
-    tolerance: float = 0.02,
-    default_start: Literal["room", "uniform"] = "room",
-    overwrite: bool = False,
-    json: bool = False,
-) -> None:
+@dataclass
+class Arguments:
     """Turn a foreign map file into a map JSON, and say what was dropped or repaired.
 
     Known formats: HouseExpo floor plans (JSON with "verts" in metres).
 
     Example: robocov import plan.json -o flat.json
-
-    Args:
-        file: The foreign map.
-        out: The map JSON to write.
-        tolerance: Walls may move by so many metres where that saves vertices; 0 keeps all.
-        default_start: The map's default start: a disc at the roomiest place, or anywhere.
-        overwrite: Replace an existing file.
-        json: Print one JSON object.
     """
-    if out.exists() and not overwrite:
+
+    file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
+    """The foreign map."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")]
+    """The map JSON to write."""
+    tolerance: float = 0.02
+    """Walls may move by so many metres where that saves vertices; 0 keeps all."""
+    default_start: Literal["room", "uniform"] = "room"
+    """The map's default start: a disc at the roomiest place, or anywhere."""
+    overwrite: bool = False
+    """Replace an existing file."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Import, save and report."""
+    out = options.out
+    if out.exists() and not options.overwrite:
         raise InputError(f"{out}: exists already; another -o, or --overwrite, was wanted")
-    detect(file)
-    environment, report = import_houseexpo(file, tolerance=tolerance, default_start=default_start)
+    detect(options.file)
+    environment, report = import_houseexpo(
+        options.file, tolerance=options.tolerance, default_start=options.default_start
+    )
     save_map(environment, out)
-    if json:
-        print(jsonlib.dumps({"out": str(out), **report.to_dict()}))
+    if options.json:
+        print(json.dumps({"out": str(out), **report.to_dict()}))
         return
     for line in report.lines():
         print(line)

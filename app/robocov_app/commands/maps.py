@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-import json as jsonlib
+import json
+from dataclasses import dataclass
 
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.console import console
 
 
-def command(json: bool = False) -> None:
+@dataclass
+class Arguments:
     """List the bundled maps: name, size, starts, and a sentence each.
 
     Example: robocov maps
-
-    Args:
-        json: Print one JSON object.
     """
+
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Print the list."""
     maps = {name: load_map(name) for name in bundled_maps()}
-    if json:
+    if options.json:
         rows = []
         for name, environment in maps.items():
             low_x, low_y, high_x, high_y = environment.region.bounds
@@ -32,7 +38,7 @@ def command(json: bool = False) -> None:
                     "starts": list(environment.starts),
                 }
             )
-        print(jsonlib.dumps({"maps": rows}, indent=1))
+        print(json.dumps({"maps": rows}, indent=1))
         return
     from rich.table import Table
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 
 from robocov.mapfile import map_schema
 
 
-def command() -> None:
+@dataclass
+class Arguments:
     """Print the JSON Schema of map files, for completion and checks in editors.
 
     Example: robocov schema > robocov-map.schema.json
     """
+
+
+def command(options: Arguments) -> None:
+    """Print the schema."""
     print(json.dumps(map_schema(), indent=1, ensure_ascii=False))
