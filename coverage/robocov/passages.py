@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.environment import SAGITTA
+from robocov.environment import GRID, SAGITTA
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
@@ -30,6 +30,9 @@ NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
 
 _CRACK = 2 * SAGITTA
 """Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
+
+_CHUNK = 256
+"""Corners that are looked at together, so that memory stays bounded."""
 
 _DIGITS = 6
 """Results are rounded to the grid of the derived geometry, a micrometre."""
@@ -58,6 +61,8 @@ class _Walls:
     Attributes
     ----------
     start, end : (e, 2) m
+    before : (e,)
+        Index of the edge that ends where this one starts.
     ring : (e,)
         Index of the edge's ring.
     origin : (e, 2) m
@@ -72,6 +77,7 @@ class _Walls:
 
     start: Array
     end: Array
+    before: IntArray
     ring: IntArray
     origin: Array
     swept: Array
@@ -101,62 +107,67 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     if free.is_empty:
         return None
     walls = _walls(free)
-    corners = walls.start[walls.jutting]
-    edges = shapely.linestrings(np.stack([walls.start, walls.end], axis=1))
-    tree = shapely.STRtree(edges)
+    # boxes: the index needs no more, and they are made in one call
+    low, high = np.minimum(walls.start, walls.end), np.maximum(walls.start, walls.end)
+    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
     boundary = free.boundary
     shapely.prepare(boundary)
     shapely.prepare(free)
     low_x, low_y, high_x, high_y = free.bounds
     largest = math.hypot(high_x - low_x, high_y - low_y)
-    below, reach = _CRACK / 2, largest / 256
+    chunks = (
+        np.array_split(walls.jutting, math.ceil(len(walls.jutting) / _CHUNK)) if len(walls.jutting) else []
+    )
+    best: Gap | None = None
+    below, reach = _CRACK / 2, largest / 4096
     # most maps have a gap far narrower than the map is wide: look near first
-    while len(corners) and below < largest:
-        corner, edge = tree.query(shapely.points(corners), predicate="dwithin", distance=reach)
-        found = _narrowest(walls, walls.jutting[corner], edge, below, boundary, free)
-        if found is not None:
-            return found
+    while len(walls.jutting) and best is None and below < largest:
+        for corners in chunks:
+            limit = reach if best is None else best.width
+            at = walls.start[corners]
+            corner, edge = tree.query(shapely.box(*(at - limit).T, *(at + limit).T))
+            found = _narrowest(walls, corners[corner], edge, below, limit, boundary, free)
+            best = found or best
         below, reach = reach, 2 * reach
-    return None
+    return best
 
 
 def _without_cracks(free: MultiPolygon) -> MultiPolygon:
     """Return `free` without the parts that are narrower than `_CRACK`.
 
     What touches there becomes one wall, and stays apart by a nanometre so that it does not touch
-    in a point again. Corners of less than a degree are cut, everything else comes back as it was.
+    in a point again. Corners of less than a degree are cut, vertices that bend a wall by less than
+    a micrometre go, everything else comes back as it was.
     """
     for distance in (-_CRACK / 2, _CRACK / 2 - 1e-9):
         free = free.buffer(distance, join_style="mitre", mitre_limit=100.0)
+    free = free.simplify(GRID)
     return MultiPolygon([shapely.orient_polygons(part) for part in shapely.get_parts(free)])
 
 
 def _walls(free: MultiPolygon) -> _Walls:
-    starts, ends, rings, origins, swept, totals, jutting = [], [], [], [], [], [], []
+    parts: list[tuple[Array | IntArray, ...]] = []
     count = 0
     for index, ring in enumerate(ring for part in free.geoms for ring in (part.exterior, *part.interiors)):
         start = np.asarray(ring.coords)[:-1]
         end = np.roll(start, -1, axis=0)
-        before = np.roll(start, 1, axis=0)
-        origin = start[0]
+        origin = np.broadcast_to(start[0], start.shape)
         area = _cross(start - origin, end - origin) / 2
-        starts.append(start)
-        ends.append(end)
-        rings.append(np.full(len(start), index))
-        origins.append(np.broadcast_to(origin, start.shape))
-        swept.append(np.cumsum(area) - area)
-        totals.append(np.full(len(start), area.sum()))
-        jutting.append(count + np.flatnonzero(_cross(start - before, end - start) < 0))
+        turn = _cross(start - np.roll(start, 1, axis=0), end - start)
+        parts.append(
+            (
+                start,
+                end,
+                count + np.roll(np.arange(len(start)), 1),
+                np.full(len(start), index),
+                origin,
+                np.cumsum(area) - area,
+                np.full(len(start), area.sum()),
+                count + np.flatnonzero(turn < 0),
+            )
+        )
         count += len(start)
-    return _Walls(
-        np.concatenate(starts),
-        np.concatenate(ends),
-        np.concatenate(rings),
-        np.concatenate(origins),
-        np.concatenate(swept),
-        np.concatenate(totals),
-        np.concatenate(jutting),
-    )
+    return _Walls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -164,19 +175,28 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _narrowest(
-    walls: _Walls, corner: IntArray, edge: IntArray, below: float, boundary: BaseGeometry, free: MultiPolygon
+    walls: _Walls,
+    corner: IntArray,
+    edge: IntArray,
+    below: float,
+    limit: float,
+    boundary: BaseGeometry,
+    free: MultiPolygon,
 ) -> Gap | None:
     """Return the narrowest passage between the corners and the edges paired with them.
 
-    Pairs closer than `below` are known to be none.
+    Only passages wider than `below` and narrower than `limit` are looked for.
     """
     p = walls.start[corner]
     along = walls.end[edge] - walls.start[edge]
     part = np.einsum("kd,kd->k", p - walls.start[edge], along) / np.einsum("kd,kd->k", along, along)
     q = walls.start[edge] + np.clip(part, 0.0, 1.0)[:, None] * along
     width = np.hypot(*(q - p).T)
-    wide = width > below
-    p, q, width, corner, edge = p[wide], q[wide], width[wide], corner[wide], edge[wide]
+    wanted = (width > below) & (width < limit)
+    # the sides of the corner may not lean into the disc
+    for side in (walls.start[walls.before[corner]], walls.end[corner]):
+        wanted &= np.einsum("kd,kd->k", side - p, q - p) <= 1e-9 * width * np.hypot(*(side - p).T)
+    p, q, width, corner, edge = p[wanted], q[wanted], width[wanted], corner[wanted], edge[wanted]
     passage = _leads_on(walls, corner, edge, p, q, width)
     p, q, width = p[passage], q[passage], width[passage]
     order = np.argsort(width, kind="stable")

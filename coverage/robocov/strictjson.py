@@ -109,30 +109,46 @@ def require_json(value: object, where: str) -> None:
     MapError
         On anything else; the message names the JSON path.
     """
-    stack: list[tuple[object, tuple[str | int, ...]]] = [(value, ())]
+    if not isinstance(value, (dict, list, tuple)):
+        _require_scalar(value, (), where)
+        return
+    stack: list[tuple[Any, tuple[str | int, ...]]] = [(value, ())]
     while stack:
-        item, path = stack.pop()
-        problem = None
-        if isinstance(item, (list, tuple, dict)) and len(path) >= MAX_DEPTH:
-            problem = _too_deep(place(path[:4]) + "...: ")
-        elif isinstance(item, dict):
-            problem = _object_problem(item, path)
-            stack.extend((item[key], (*path, key)) for key in reversed(item))
-        elif isinstance(item, (list, tuple)):
-            stack.extend((item[k], (*path, k)) for k in range(len(item) - 1, -1, -1))
-        elif isinstance(item, float):
-            if not math.isfinite(item):
-                problem = f"{_colon(path)}{item}, but a finite number was wanted"
-        elif isinstance(item, str):
-            if not _is_text(item):
-                problem = f"{_colon(path)}{shown(item)}, but text that UTF-8 can hold was wanted"
-        elif isinstance(item, int):
-            if item.bit_length() > 1023:
-                problem = f"{_colon(path)}{item.bit_length()} bits long, but a smaller number was wanted"
-        elif item is not None:
-            problem = f"{_colon(path)}{type(item).__name__}, but a JSON value was wanted"
-        if problem is not None:
-            raise MapError(f"{where}: {problem}")
+        holder, path = stack.pop()
+        if len(path) >= MAX_DEPTH:
+            raise MapError(f"{where}: {_too_deep(place(path[:4]) + '...: ')}")
+        if isinstance(holder, dict):
+            problem = _object_problem(holder, path)
+            if problem is not None:
+                raise MapError(f"{where}: {problem}")
+        inner = []
+        for key, item in holder.items() if isinstance(holder, dict) else enumerate(holder):
+            # most of a large file is numbers: no call, no path for each
+            if type(item) is float and math.isfinite(item):
+                continue
+            if isinstance(item, (dict, list, tuple)):
+                inner.append((item, (*path, key)))
+            else:
+                _require_scalar(item, (*path, key), where)
+        stack += reversed(inner)
+
+
+def _require_scalar(item: object, path: tuple[str | int, ...], where: str) -> None:
+    at = f"{place(path)}: " if path else ""
+    problem = None
+    if isinstance(item, float):
+        if not math.isfinite(item):
+            problem = f"{item}, but a finite number was wanted"
+    elif isinstance(item, str):
+        if not _is_text(item):
+            problem = f"{shown(item)}, but text that UTF-8 can hold was wanted"
+    elif isinstance(item, int):
+        if item.bit_length() > 1023:
+            problem = f"{item.bit_length()} bits long, but a smaller number was wanted"
+    elif item is not None:
+        problem = f"{type(item).__name__}, but a JSON value was wanted"
+    if problem is not None:
+        raise MapError(f"{where}: {at}{problem}")
 
 
 def place(path: Sequence[str | int]) -> str:
@@ -173,13 +189,10 @@ def _object_problem(item: dict[Any, Any], path: tuple[str | int, ...]) -> str | 
     """Return what is wrong with the keys of an object, if anything is."""
     for key in item:
         if not isinstance(key, str) or not _is_text(key):
-            return f"{_colon(path)}key {shown(key)}, but text that UTF-8 can hold was wanted"
+            at = f"{place(path)}: " if path else ""
+            return f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
     twice = item.twice if isinstance(item, _Object) else None
     return None if twice is None else f"{place((*path, twice))}: given twice, but once was wanted"
-
-
-def _colon(path: tuple[str | int, ...]) -> str:
-    return f"{place(path)}: " if path else ""
 
 
 def _too_deep(prefix: str) -> str:

@@ -202,6 +202,14 @@ def test_what_json_cannot_hold_is_refused_in_documents_too(value: object) -> Non
         from_json(changed("extra", {"a": value}), "m")
 
 
+def test_a_misspelt_key_is_named_before_the_one_that_it_leaves_missing() -> None:
+    document = changed("boundry", DOCUMENT["boundary"], document=changed("boundary", DELETED))
+    with pytest.raises(
+        MapError, match=r"^map: unknown key 'boundry': did you mean 'boundary'\?.*\(and 1 more\)$"
+    ):
+        from_json(document)
+
+
 def test_several_errors_are_counted() -> None:
     document = changed("boundary", 0, 0, "a", document=changed("obstacles", 1, "radius", -1))
     with pytest.raises(MapError, match=r"boundary\[0\]\[0\].*\(and 1 more\)$"):

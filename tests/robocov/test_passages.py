@@ -74,6 +74,12 @@ def test_no_free_space() -> None:
     assert narrowest_gap(MultiPolygon()) is None
 
 
+def test_many_vertices_along_a_wall_are_no_passage() -> None:
+    angle = np.linspace(0, 2 * np.pi, 40_001)[:-1]
+    round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]).round(9) * 50)
+    assert narrowest_gap(free(round_room)) is None
+
+
 def test_the_narrowest_of_several_components() -> None:
     elsewhere = affine_transform(ROOM - box(4, 2, 6, 5.8), [1, 0, 0, 1, 20, 0])
     gap = narrowest_gap(free(TWO_ROOMS, elsewhere))
