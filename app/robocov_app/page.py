@@ -124,7 +124,7 @@ class Page:
         )
         while room is not None and len(text) > 1 and self.width_of(written) > room:
             text = text[:-1]
-            written.set_text(text.rstrip() + "…")
+            written.set_text(text.rstrip(" ·") + "…")
 
     def text_width(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
         """Return how wide a line would be, in pixels."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pygame
 import pytest
 import shapely
 from hypothesis import given, settings
@@ -170,6 +171,29 @@ class TestRobots:
         scene = scene_of(run_of(SQUARE, 9, seed=3))
         frame, painter = drawn(scene, "robots")
         assert max(self.ink_of_numbers(frame, painter, scene)) == 0
+
+    def test_numbers_are_those_of_the_robots(self):
+        """Of all nine numbers drawn in a robot's place, its own looks most like the picture."""
+        from robocov_app.view import sprites
+
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
+            quarters = np.rint(pixel * sprites.FINE).astype(int)
+            (x, y), shift = quarters // sprites.FINE, tuple((quarters % sprites.FINE).tolist())
+            fill = LIGHT.robots[painter._hues[robot]]
+            misses = []
+            for number in range(1, 10):
+                radius = round(9.0 * painter.scale * 2) / 2
+                sprite = sprites.disc(
+                    radius, fill, (255,) * 3, 1.6 * painter.scale, (0,) * 3, str(number), shift
+                )
+                pixels = np.frombuffer(pygame.image.tobytes(sprite, "RGB"), np.uint8)
+                pixels = pixels.reshape(sprite.get_height(), sprite.get_width(), 3).astype(int)
+                half = sprite.get_width() // 2
+                middle = pixels[half - 4 : half + 5, half - 4 : half + 5]
+                misses.append(np.abs(frame[y - 4 : y + 5, x - 4 : x + 5] - middle).sum())
+            assert int(np.argmin(misses)) == robot
 
     def test_numbers_differ(self):
         """Robots 1 and 7 at one place look different, in the middle of the disc."""

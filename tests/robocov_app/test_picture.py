@@ -2,20 +2,24 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pygame
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
 from robocov_app.view import fonts
 from robocov_app.view.layers import Obstacles
-from robocov_app.view.picture import Painter, scale_for
+from robocov_app.view.picture import Painter, scale_for, standard_layers
 from robocov_app.view.theme import DARK, LIGHT
+from robocov_app.view.trajectories import Trajectories
 
 sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, run_of, scene_of
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, explained, run_of, scene_of
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
@@ -64,6 +68,65 @@ def test_zoomed_world_stays_in_its_view_and_fit_brings_it_back():
     assert (zoomed[:strip] == before[:strip]).all()  # the legend is not drawn over
     painter.fit()
     assert (painter.frame(scene) == before).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.floats(-12, 14).map(lambda power: 2.0**power),
+    st.tuples(st.floats(-3000, 3000), st.floats(-3000, 3000)),
+    st.tuples(st.floats(0, 320), st.floats(0, 240)),
+)
+@example(2.0**40, (0.0, 0.0), (100.0, 100.0))
+def test_any_zoom_can_be_drawn(factor, pan, at):
+    scene = explained(
+        np.array([[2.0, 2.0], [6.0, 6.0]]),
+        forces=np.ones((2, 2)),
+        velocities=np.ones((2, 2)),
+        goals=np.array([[1.0, 7.0], [7.0, 1.0]]),
+        obstacle_points=np.zeros((2, 2)),
+        communication_range=9.0,
+    )
+    scene = replace(
+        scene, starts=np.ones((2, 2)), trail=np.linspace(np.ones((2, 2)), scene.snapshot.positions, 9)
+    )
+    painter = Painter(SQUARE, (320, 240))
+    painter.show({layer.name for layer in painter.layers})
+    painter.frame(scene)
+    painter.camera = painter.camera.zoomed(factor, at).panned(*pan)
+    assert painter.frame(scene).shape == (240, 320, 3)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.floats(20, 5000), st.floats(0.5, 7.5), st.floats(0.5, 7.5))
+def test_what_is_magnified_is_still_true(factor, x, y):
+    """Cells seen through a strong lens: edges that end far outside do not turn."""
+    scene = explained(np.array([[1.0, 2.0], [6.0, 7.0], [5.0, 1.0]]))
+    painter = Painter(SQUARE, (320, 240))
+    painter.show({"cells"})
+    painter.frame(scene)
+    painter.camera = replace(painter.camera, center=(x, y)).zoomed(factor, painter.camera.middle)
+    frame = painter.frame(scene)
+    grid = np.stack(np.meshgrid(np.arange(4, 320, 13), np.arange(16, 225, 13)), axis=-1).reshape(-1, 2)
+    points = painter.camera.to_world(grid + 0.5)
+    distances = np.linalg.norm(points[:, None] - scene.snapshot.positions[None], axis=2)
+    two = np.sort(distances, axis=1)
+    clear = (
+        ((two[:, 1] - two[:, 0]) * painter.camera.zoom > 6)
+        & (points > 0).all(axis=1)
+        & (points < 8).all(axis=1)
+    )
+    for (column, row), robot in zip(grid[clear], distances[clear].argmin(axis=1), strict=True):
+        assert tuple(frame[row, column]) == LIGHT.cell(robot)
+
+
+def test_the_legend_follows_the_colours_of_the_trajectories():
+    scene = scene_of(run_of(ROOMS, 6))
+    layers = standard_layers()
+    painter = Painter(ROOMS, (640, 480), layers=layers)
+    painter.show({"legend", "trajectories"})
+    top = painter.frame(scene)[:20]
+    next(layer for layer in layers if isinstance(layer, Trajectories)).colours = "paper"
+    assert (painter.frame(scene)[:20] != top).any()
 
 
 def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():

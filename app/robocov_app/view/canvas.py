@@ -12,6 +12,7 @@ import pygame
 
 from robocov.arrays import Array
 from robocov_app.view import sprites
+from robocov_app.view.clipping import clipped_polygon, clipped_segment
 from robocov_app.view.fonts import label, text_width
 from robocov_app.view.theme import Colour
 
@@ -58,27 +59,33 @@ class Canvas:
 
     def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
         """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
-        if len(corners) > 2:
-            pygame.draw.polygon(self.surface, fill, np.rint(bounded(corners)).tolist())
+        for ring in clipped_polygon(corners):
+            pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
     def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
         """Draw the smooth line through the (k, 2) px points."""
-        points = bounded(corners).tolist()
+        points = corners.tolist()
         if closed and points:
             points.append(points[0])
         for start, end in pairwise(points):
-            pygame.draw.aaline(self.surface, colour, start, end, width)
+            self.line(start, end, colour, width)
         if width > 2:  # lines have straight ends: fill the corners' notches
-            for x, y in points:
-                pygame.draw.circle(self.surface, colour, (x, y), width / 2)
+            for point in points:
+                if not self._far_off(point):
+                    pygame.draw.circle(self.surface, colour, point, width / 2)
 
     def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
         """Draw a smooth line between two pixels."""
-        pygame.draw.aaline(self.surface, colour, start, end, width)
+        ends = clipped_segment(start[0], start[1], end[0], end[1])
+        if ends is not None:
+            pygame.draw.aaline(self.surface, colour, *ends, width)
 
     def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
         """Draw a dashed smooth line."""
-        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        ends = clipped_segment(start[0], start[1], end[0], end[1])
+        if ends is None:
+            return
+        a, b = np.array(ends[0]), np.array(ends[1])
         length = float(np.hypot(*(b - a)))
         count = max(1, round(length / (2 * dash * self.scale)))
         for k in range(count):
@@ -87,19 +94,19 @@ class Canvas:
 
     def circle(self, center: Pixel, radius: float, colour: Colour, dashed: bool = False) -> None:
         """Draw a large circle's line, a pixel or so wide."""
-        sides = int(min(max(radius, 24), 240)) // 2 * 2
+        sides = int(min(max(radius, 24), 720)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
         points = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        corners = bounded(points).tolist()
+        corners = points.tolist()
         width = self.width(1.0)
         for k in range(0, sides, 2 if dashed else 1):
-            pygame.draw.aaline(self.surface, colour, corners[k], corners[k + 1], width)
+            self.line(corners[k], corners[k + 1], colour, width)
 
     def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
         """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         length = float(np.hypot(*(b - a)))
-        if length < 1.0:
+        if length < 1.0 or self._far_off(start):
             return
         along = (b - a) / length
         across = np.array([-along[1], along[0]])
@@ -121,11 +128,18 @@ class Canvas:
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
         """Put a sprite where it belongs to a quarter of a pixel."""
+        if self._far_off(center):
+            return
         quarters_x, quarters_y = round(center[0] * sprites.FINE), round(center[1] * sprites.FINE)
         (x, shift_x), (y, shift_y) = divmod(quarters_x, sprites.FINE), divmod(quarters_y, sprites.FINE)
         picture = sprite((shift_x, shift_y))
         half = picture.get_width() // 2
         self.surface.blit(picture, (x - half, y - half), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _far_off(self, pixel: Pixel) -> bool:
+        """Whether what is small and drawn at `pixel` cannot be seen."""
+        width, height = self.surface.get_size()
+        return not (-500 < pixel[0] < width + 500 and -500 < pixel[1] < height + 500)
 
     def text(
         self,
@@ -151,8 +165,3 @@ class Canvas:
     def text_width(self, text: str, size: float | None = None, bold: bool = False) -> int:
         """Return how wide `text` will be, in pixels."""
         return text_width(text, self.text_size(self.theme.text if size is None else size), bold)
-
-
-def bounded(points: Array) -> Array:
-    """Keep pixels within what the drawing routines' integers hold, far outside any surface."""
-    return np.clip(points, -20000.0, 20000.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pygame
@@ -86,9 +87,23 @@ class Legend(Layer):
 
     def __init__(self) -> None:
         self.entries: list[LegendEntry] = []
+        self._strip: pygame.Surface | None = None
+        self._key: object = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        rows = legend_rows(canvas, self.entries)
+        width = canvas.surface.get_width()
+        words = tuple((entry.text, entry.style) for entry in self.entries)
+        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist())
+        if self._strip is None or key != self._key:
+            rows = legend_rows(canvas, self.entries)
+            height = round((6.0 + LEGEND_ROW * len(rows)) * canvas.scale)
+            self._strip, self._key = pygame.Surface((width, height), 0, 32), key
+            self._strip.fill(canvas.theme.background)
+            self._fill(replace(canvas, surface=self._strip), rows)
+        canvas.surface.blit(self._strip, (0, 0))
+
+    @staticmethod
+    def _fill(canvas: Canvas, rows: list[list[LegendEntry]]) -> None:
         for number, row in enumerate(rows):
             x = MARGIN * canvas.scale
             y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale

@@ -18,7 +18,7 @@ import shapely
 from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.camera import round_length
-from robocov_app.view.canvas import Canvas, bounded
+from robocov_app.view.canvas import Canvas
 from robocov_app.view.scene import Scene
 from robocov_app.view.theme import mix
 
@@ -31,10 +31,20 @@ GRID_GAP = 34.0
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A line of the legend: its text and how its glyph is drawn at a pixel, within 22 x 14 px at scale 1."""
+    """A line of the legend.
+
+    Attributes
+    ----------
+    text : str
+    draw : callable
+        Draws the glyph around a pixel, within 22 x 14 px at scale 1.
+    style : str
+        Differs when the same words stand beside another glyph.
+    """
 
     text: str
     draw: Callable[[Canvas, float, float], None]
+    style: str = ""
 
 
 class Layer(ABC):
@@ -81,10 +91,8 @@ class Cells(Layer):
         sizes = np.array([len(cell) for cell in scene.cells])
         corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
         ends = np.cumsum(sizes)
-        whole = np.rint(bounded(corners)).tolist()
-        for size, end, hue in zip(sizes.tolist(), ends.tolist(), canvas.hues.tolist(), strict=True):
-            if size > 2:
-                pygame.draw.polygon(canvas.surface, canvas.theme.cell(hue), whole[end - size : end])
+        for cell, hue in zip(np.split(corners, ends[:-1]), canvas.hues.tolist(), strict=True):
+            canvas.polygon(cell, canvas.theme.cell(hue))
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         width = canvas.width(canvas.theme.line)
@@ -106,7 +114,6 @@ def _once(edges: Array) -> Array:
 
     Neighbouring cells share edges; a smooth line that is drawn twice is not smooth any more.
     """
-    edges = bounded(edges)
     turned = (edges[:, 0] > edges[:, 2]) | ((edges[:, 0] == edges[:, 2]) & (edges[:, 1] > edges[:, 3]))
     edges = np.where(turned[:, None], edges[:, [2, 3, 0, 1]], edges)
     _, first = np.unique(np.rint(edges * 16.0), axis=0, return_index=True)

@@ -7,6 +7,7 @@ import pygame
 
 from robocov.arrays import Array
 from robocov_app.view.canvas import Canvas
+from robocov_app.view.clipping import bounded
 from robocov_app.view.layers import Layer, LegendEntry
 from robocov_app.view.scene import Scene
 from robocov_app.view.sprites import Sketch
@@ -53,11 +54,11 @@ class Trajectories(Layer):
             self._faded(canvas, trail, scene.trail_time, colours, canvas.width(width / canvas.scale))
             return
         page, continues = self._page_for(canvas, trail)
-        self._lengthen(canvas.camera.to_pixels(trail[self._drawn :]))
+        self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
         self._finish_sections(page, colours, width, together=not continues)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        ends = canvas.camera.to_pixels(trail[-1]).tolist()
+        ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         for path, end, colour in zip(self._open, ends, colours, strict=True):
             # mostly below the robot's disc, where seams do not show
             canvas.outline(np.array([*path, end]), colour, canvas.width(width / canvas.scale), closed=False)
@@ -77,8 +78,7 @@ class Trajectories(Layer):
         self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
     ) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
-        moved = any(len(path) > 1 for path in self._open)
-        whole = Sketch(page.get_rect()) if together and moved else None
+        whole = self._sketch_of_all(page) if together else None
         for robot, path in enumerate(self._open):
             if len(path) < 2 or (whole is None and PIECE * (len(path) - 1) < SECTION):
                 continue
@@ -90,6 +90,16 @@ class Trajectories(Layer):
             self._open[robot] = path[-1:]
         if whole is not None:
             whole.onto(page)
+
+    def _sketch_of_all(self, page: pygame.Surface) -> Sketch | None:
+        """Return a sketch that holds all of the paths that can be seen, None when nothing moved."""
+        moved = [np.array(path) for path in self._open if len(path) > 1]
+        if not moved:
+            return None
+        points = np.concatenate(moved)
+        low, high = np.floor(points.min(axis=0)) - 5, np.ceil(points.max(axis=0)) + 5
+        box = pygame.Rect(*low.astype(int).tolist(), *(high - low).astype(int).tolist()).clip(page.get_clip())
+        return Sketch(box) if box.width and box.height else None
 
     def _page_for(self, canvas: Canvas, trail: Array) -> tuple[pygame.Surface, bool]:
         """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
@@ -104,7 +114,7 @@ class Trajectories(Layer):
         if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
             self._key, self._drawn, self._first = key, 0, trail[0].copy()
-            self._open = [[point] for point in canvas.camera.to_pixels(trail[0]).tolist()]
+            self._open = [[point] for point in bounded(canvas.camera.to_pixels(trail[0])).tolist()]
         self._page.set_clip(canvas.surface.get_clip())
         return self._page, continues
 
@@ -138,4 +148,4 @@ class Trajectories(Layer):
                 sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
                 sketch.onto(canvas.surface)
 
-        return [LegendEntry("trajectory", glyph)] if scene.trail is not None else []
+        return [LegendEntry("trajectory", glyph, self.colours)] if scene.trail is not None else []
