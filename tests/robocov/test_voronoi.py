@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pickle
-from fractions import Fraction
-from typing import TYPE_CHECKING
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,148 +13,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.cell_edges import REGION
-from robocov.clipped_cells import clip_cells, mass_and_centroid
-from robocov.delaunay_cells import delaunay_cells
 from robocov.errors import InputError
 from robocov.observation import Neighbours
 from robocov.region import Region
-from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi import partition
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import TypeAlias
-
-    from robocov.arrays import Array
-
-    Family: TypeAlias = Callable[[Region, int, np.random.Generator], Array]
-
-SQUARE = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]]))
-PENTAGON = Region(np.array([[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [2.0, 4.0], [-1.0, 1.5]]))
-REGIONS = {
-    "square": SQUARE,
-    "pentagon": PENTAGON,
-    "triangle": Region(np.array([[0.0, 0.0], [9.0, 1.0], [2.0, 5.0]])),
-    "far away": Region(PENTAGON.vertices + np.array([8000.0, -6000.0])),
-    "corridor": Region(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 1.0], [0.0, 1.0]])),
-    "round": Region(5.0 * np.column_stack([f(np.linspace(0, 2 * np.pi, 65)[:-1]) for f in (np.cos, np.sin)])),
-}
-ROUNDING = 3e-11
-"""Relative to the region's area, and to area times diameter for first moments."""
-
-seeds = st.integers(0, 2**32 - 1)
-names = st.sampled_from(sorted(REGIONS))
-
-
-def scattered(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return n points within the region, by convex combinations of its corners."""
-    return rng.dirichlet(np.full(len(region.vertices), 0.6), n) @ region.vertices
-
-
-def lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return points of a square lattice, all cocircular by fours, about the region's centroid."""
-    side = max(2, int(np.sqrt(n)))
-    step = 2.0 ** rng.integers(-6, -2)
-    x, y = np.meshgrid(np.arange(side), np.arange(side))
-    return region.centroid + step * (np.column_stack([x.ravel(), y.ravel()]) - (side - 1) / 2)
-
-
-def circle(region: Region, n: int, rng: np.random.Generator) -> Array:
-    turn = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
-    return region.centroid + 0.3 * np.column_stack([np.cos(turn), np.sin(turn)])
-
-
-def collinear(region: Region, n: int, rng: np.random.Generator) -> Array:
-    a, b = scattered(region, 2, rng)
-    return a + rng.uniform(0, 1, (n, 1)) * (b - a)
-
-
-def huddled(region: Region, n: int, rng: np.random.Generator) -> Array:
-    return region.centroid + 10.0 ** rng.uniform(-9, -2) * rng.uniform(-1, 1, (n, 2))
-
-
-def huddles(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return some points alone and some in heaps of a micrometre."""
-    centres = scattered(region, max(2, n // 3), rng)
-    return centres[rng.integers(0, len(centres), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
-
-
-def almost_twins(region: Region, n: int, rng: np.random.Generator) -> Array:
-    points = scattered(region, n, rng)
-    points[1::2] = points[: n - 1 : 2] + 10.0 ** rng.uniform(-12, -3, (n // 2, 1)) * rng.normal(
-        size=(n // 2, 2)
-    )
-    return points
-
-
-def on_boundary(region: Region, n: int, rng: np.random.Generator) -> Array:
-    edge = rng.integers(0, len(region.edges), n)
-    return region.vertices[edge] + rng.choice([0.0, 0.25, 0.5, 0.71], (n, 1)) * region.edges[edge]
-
-
-def half_outside(region: Region, n: int, rng: np.random.Generator) -> Array:
-    return region.centroid + 1.3 * (scattered(region, n, rng) - region.centroid)
-
-
-FAMILIES = [scattered, lattice, circle, collinear, huddled, huddles, almost_twins, on_boundary, half_outside]
-families = st.sampled_from(FAMILIES)
-
-
-def exact_cell(
-    robot: int, generators: Array, region: Region
-) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """Return area, first moments and polar moment (all about the generator) in rational arithmetic."""
-    px, py = map(Fraction, generators[robot].tolist())
-    ring = [(Fraction(x) - px, Fraction(y) - py) for x, y in region.vertices.tolist()]
-    for other in generators.tolist():
-        dx, dy = Fraction(other[0]) - px, Fraction(other[1]) - py
-        side = [x * dx + y * dy - (dx * dx + dy * dy) / 2 for x, y in ring]
-        clipped = []
-        for k, (x, y) in enumerate(ring):
-            u, v = ring[(k + 1) % len(ring)]
-            a, b = side[k], side[(k + 1) % len(ring)]
-            if a <= 0:
-                clipped.append((x, y))
-            if a * b < 0:
-                clipped.append((x + a / (a - b) * (u - x), y + a / (a - b) * (v - y)))
-        ring = clipped
-    area, mx, my, polar = (Fraction(0) for _ in range(4))
-    for (x, y), (u, v) in zip(ring, ring[1:] + ring[:1], strict=True):
-        cross = x * v - u * y
-        area += cross / 2
-        mx += cross * (x + u) / 6
-        my += cross * (y + v) / 6
-        polar += cross * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
-    return area, mx, my, polar
-
-
-def assert_exact(cells: VoronoiPartition, region: Region) -> None:
-    for robot, p in enumerate(cells.generators):
-        area, mx, my, polar = map(float, exact_cell(robot, cells.generators, region))
-        assert cells.mass[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
-        moment = cells.mass[robot] * (cells.centroid[robot] - p)
-        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * reach(cells, region))
-        assert cells.polar_moment[robot] == pytest.approx(
-            polar, abs=ROUNDING * region.area * reach(cells, region) ** 2
-        )
-
-
-def reach(cells: VoronoiPartition, region: Region) -> float:
-    """Return a length that no difference of a generator and a point of the region exceeds by much."""
-    outside = float(np.abs(cells.generators - region.centroid).max()) if len(cells.generators) else 0.0
-    # coordinates far from the origin carry the rounding of their size
-    return region.diameter + outside + 1e-4 * float(np.abs(region.vertices).max())
-
-
-def clipped(points: Array, region: Region) -> VoronoiPartition:
-    """Return the partition by clipping alone: the path of limited communication, with ranges that reach."""
-    n = len(points)
-    everybody = Neighbours(
-        n,
-        np.full(n, 1e9),
-        np.arange(n + 1) * (n - 1),
-        np.array([j for i in range(n) for j in range(n) if j != i], dtype=np.intp),
-    )
-    return partition(points, region, everybody)
+sys.path.insert(0, str(Path(__file__).parent))
+from voronoi_cases import (
+    FAMILIES,
+    PENTAGON,
+    REGIONS,
+    SQUARE,
+    Family,
+    assert_exact,
+    assert_same_ring,
+    clipped,
+    exact_cell,
+    families,
+    names,
+    scattered,
+    seeds,
+)
 
 
 @pytest.mark.parametrize("name", REGIONS)
@@ -166,7 +45,7 @@ def test_small_teams_are_exact(n: int, name: str) -> None:
     assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=300)
 @given(seeds, names, families, st.integers(1, 14))
 def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -211,73 +90,7 @@ def test_three_cells_that_meet_on_the_boundary() -> None:
     assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
 
 
-def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:
-    rng = np.random.default_rng(5)
-    inner = scattered(SQUARE, 30, rng) * 0.8 + 0.6
-    points = np.concatenate([inner, [[3.0, -0.05], [6.0, 2.5], [0.0, 1.0]]])
-    assert delaunay_cells(points, SQUARE) is not None
-    for a, b in zip(partition(points, SQUARE).polygons, clipped(points, SQUARE).polygons, strict=True):
-        assert_same_ring(a, b, 1e-9)
-
-
-def test_a_triangulation_that_is_not_delaunay_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = np.array([[1.0, 3.0], [3.0, 2.0], [5.0, 3.0], [3.0, 4.0]])
-    assert delaunay_cells(points, SQUARE) is not None
-
-    class LongDiagonal:
-        simplices = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-        neighbors = np.array([[-1, 1, -1], [-1, -1, 0]], dtype=np.int32)
-
-        def __init__(self, *_: object, **__: object) -> None: ...
-
-    monkeypatch.setattr("robocov.delaunay_cells.Delaunay", LongDiagonal)
-    assert delaunay_cells(points, SQUARE) is None
-
-
-@pytest.mark.parametrize("name", REGIONS)
-@pytest.mark.parametrize("n", [4, 6, 20, 50, 200])
-def test_both_paths_agree(n: int, name: str) -> None:
-    region = REGIONS[name]
-    points = scattered(region, n, np.random.default_rng(n))
-    fast = delaunay_cells(points, region)
-    assert fast is not None
-    cells = clip_cells(points, region, Neighbours(n))
-    mass, centroid = mass_and_centroid(cells, points)
-    assert fast.mass == pytest.approx(mass, rel=1e-9, abs=1e-12 * region.area)
-    assert fast.centroid == pytest.approx(centroid, abs=1e-9 * region.diameter)
-    assert fast.mass.sum() == pytest.approx(region.area, rel=1e-12)
-    assert mass.sum() == pytest.approx(region.area, rel=1e-12)
-    quick, slow = partition(points, region), clipped(points, region)
-    assert quick.adjacency.tolist() == slow.adjacency.tolist()
-    assert quick.polar_moment == pytest.approx(slow.polar_moment, rel=1e-9)
-    for a, b in zip(quick.polygons, slow.polygons, strict=True):
-        assert_same_ring(a, b, 1e-9 * region.diameter)
-
-
-@pytest.mark.parametrize("name", REGIONS)
-@pytest.mark.parametrize("side", [3, 4, 7, 12])
-def test_lattices_do_not_need_the_slow_path(side: int, name: str) -> None:
-    """All cocircular by fours, hulls collinear, and in the square and the round rays that end in corners."""
-    region = REGIONS[name]
-    points = 0.75 * region.centroid + 0.25 * lattice(region, side * side, np.random.default_rng(side))
-    assert delaunay_cells(points, region) is not None
-    if name != "far away":  # rounding of the coordinates there makes edges between the cocircular
-        links = 2 * side * (side - 1)
-        assert len(partition(points, region).adjacency) == links
-        assert len(clipped(points, region).adjacency) == links
-    eighth = region.centroid + (points - region.centroid) @ np.array([[1.0, 1.0], [-1.0, 1.0]])
-    cells = delaunay_cells(eighth, region)
-    assert cells is not None
-    assert cells.mass == pytest.approx(clipped(eighth, region).mass, abs=1e-12 * region.area)
-
-
-def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:
-    assert len(a) == len(b)
-    first = int(np.argmin(np.hypot(*(b - a[0]).T)))
-    assert np.roll(b, -first, axis=0) == pytest.approx(a, abs=tolerance)
-
-
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=200)
 @given(seeds, names, st.sampled_from(FAMILIES[:-1]), st.integers(1, 60))
 def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -300,7 +113,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
     assert (inside == (distance == best))[clear].all()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=200)
 @given(seeds, names, families, st.integers(1, 40))
 def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -317,7 +130,7 @@ def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family
         assert region.contains(ring, 1e-9 * region.diameter).all()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 30))
 def test_parallel_axis(seed: int, n: int) -> None:
     """Equation (3), with the moment about the centroid from triangles that have it for a corner."""
@@ -334,7 +147,7 @@ def test_parallel_axis(seed: int, n: int) -> None:
         assert cells.polar_moment == pytest.approx(shifted, abs=1e-11)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 40), st.floats(0.0, 6.3), st.booleans())
 def test_turned_and_mirrored(seed: int, n: int, angle: float, mirror: bool) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
@@ -348,7 +161,7 @@ def test_turned_and_mirrored(seed: int, n: int, angle: float, mirror: bool) -> N
     assert plain.mass[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=60)
 @given(seeds, st.integers(2, 40))
 def test_order_of_the_robots_does_not_matter(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
@@ -384,7 +197,7 @@ def test_an_empty_cell_has_its_generator_for_centroid() -> None:
     assert cells.mass.sum() == pytest.approx(SQUARE.area)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=200)
 @given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
 def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, range_: float) -> None:
     rng = np.random.default_rng(seed)
@@ -413,7 +226,7 @@ def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, ra
     assert after.polar_moment[again] == before.polar_moment[robot]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
 def test_limited_cells_are_those_of_the_heard_alone(seed: int, n: int, range_: float) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))

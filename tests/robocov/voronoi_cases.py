@@ -1,0 +1,155 @@
+"""Regions, families of points, and exact cells, for the tests of the Voronoi partition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from robocov.observation import Neighbours
+from robocov.region import Region
+from robocov.voronoi import VoronoiPartition, partition
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+
+Family: TypeAlias = Callable[..., "Array"]
+"""Makes so many points for a region."""
+
+SQUARE = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]]))
+PENTAGON = Region(np.array([[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [2.0, 4.0], [-1.0, 1.5]]))
+REGIONS = {
+    "square": SQUARE,
+    "pentagon": PENTAGON,
+    "triangle": Region(np.array([[0.0, 0.0], [9.0, 1.0], [2.0, 5.0]])),
+    "far away": Region(PENTAGON.vertices + np.array([8000.0, -6000.0])),
+    "corridor": Region(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 1.0], [0.0, 1.0]])),
+    "round": Region(5.0 * np.column_stack([f(np.linspace(0, 2 * np.pi, 65)[:-1]) for f in (np.cos, np.sin)])),
+}
+ROUNDING = 3e-11
+"""Relative to the region's area, and to area times diameter for first moments."""
+
+seeds = st.integers(0, 2**32 - 1)
+names = st.sampled_from(sorted(REGIONS))
+
+
+def scattered(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return n points within the region, by convex combinations of its corners."""
+    return rng.dirichlet(np.full(len(region.vertices), 0.6), n) @ region.vertices
+
+
+def lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return points of a square lattice, all cocircular by fours, about the region's centroid."""
+    side = max(2, int(np.sqrt(n)))
+    step = 2.0 ** rng.integers(-6, -2)
+    x, y = np.meshgrid(np.arange(side), np.arange(side))
+    return region.centroid + step * (np.column_stack([x.ravel(), y.ravel()]) - (side - 1) / 2)
+
+
+def circle(region: Region, n: int, rng: np.random.Generator) -> Array:
+    turn = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
+    return region.centroid + 0.3 * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def collinear(region: Region, n: int, rng: np.random.Generator) -> Array:
+    a, b = scattered(region, 2, rng)
+    return a + rng.uniform(0, 1, (n, 1)) * (b - a)
+
+
+def huddled(region: Region, n: int, rng: np.random.Generator) -> Array:
+    return region.centroid + 10.0 ** rng.uniform(-9, -2) * rng.uniform(-1, 1, (n, 2))
+
+
+def huddles(region: Region, n: int, rng: np.random.Generator) -> Array:
+    """Return some points alone and some in heaps of a micrometre."""
+    centres = scattered(region, max(2, n // 3), rng)
+    return centres[rng.integers(0, len(centres), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
+
+
+def almost_twins(region: Region, n: int, rng: np.random.Generator) -> Array:
+    points = scattered(region, n, rng)
+    points[1::2] = points[: n - 1 : 2] + 10.0 ** rng.uniform(-12, -3, (n // 2, 1)) * rng.normal(
+        size=(n // 2, 2)
+    )
+    return points
+
+
+def on_boundary(region: Region, n: int, rng: np.random.Generator) -> Array:
+    edge = rng.integers(0, len(region.edges), n)
+    return region.vertices[edge] + rng.choice([0.0, 0.25, 0.5, 0.71], (n, 1)) * region.edges[edge]
+
+
+def half_outside(region: Region, n: int, rng: np.random.Generator) -> Array:
+    return region.centroid + 1.3 * (scattered(region, n, rng) - region.centroid)
+
+
+FAMILIES = [scattered, lattice, circle, collinear, huddled, huddles, almost_twins, on_boundary, half_outside]
+families = st.sampled_from(FAMILIES)
+
+
+def exact_cell(
+    robot: int, generators: Array, region: Region
+) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """Return area, first moments and polar moment (all about the generator) in rational arithmetic."""
+    px, py = map(Fraction, generators[robot].tolist())
+    ring = [(Fraction(x) - px, Fraction(y) - py) for x, y in region.vertices.tolist()]
+    for other in generators.tolist():
+        dx, dy = Fraction(other[0]) - px, Fraction(other[1]) - py
+        side = [x * dx + y * dy - (dx * dx + dy * dy) / 2 for x, y in ring]
+        clipped = []
+        for k, (x, y) in enumerate(ring):
+            u, v = ring[(k + 1) % len(ring)]
+            a, b = side[k], side[(k + 1) % len(ring)]
+            if a <= 0:
+                clipped.append((x, y))
+            if a * b < 0:
+                clipped.append((x + a / (a - b) * (u - x), y + a / (a - b) * (v - y)))
+        ring = clipped
+    area, mx, my, polar = (Fraction(0) for _ in range(4))
+    for (x, y), (u, v) in zip(ring, ring[1:] + ring[:1], strict=True):
+        cross = x * v - u * y
+        area += cross / 2
+        mx += cross * (x + u) / 6
+        my += cross * (y + v) / 6
+        polar += cross * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
+    return area, mx, my, polar
+
+
+def assert_exact(cells: VoronoiPartition, region: Region) -> None:
+    for robot, p in enumerate(cells.generators):
+        area, mx, my, polar = map(float, exact_cell(robot, cells.generators, region))
+        assert cells.mass[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
+        moment = cells.mass[robot] * (cells.centroid[robot] - p)
+        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * reach(cells, region))
+        assert cells.polar_moment[robot] == pytest.approx(
+            polar, abs=ROUNDING * region.area * reach(cells, region) ** 2
+        )
+
+
+def reach(cells: VoronoiPartition, region: Region) -> float:
+    """Return a length that no difference of a generator and a point of the region exceeds by much."""
+    outside = float(np.abs(cells.generators - region.centroid).max()) if len(cells.generators) else 0.0
+    # coordinates far from the origin carry the rounding of their size
+    return region.diameter + outside + 1e-4 * float(np.abs(region.vertices).max())
+
+
+def clipped(points: Array, region: Region) -> VoronoiPartition:
+    """Return the partition by clipping alone: the path of limited communication, with ranges that reach."""
+    n = len(points)
+    everybody = Neighbours(
+        n,
+        np.full(n, 1e9),
+        np.arange(n + 1) * (n - 1),
+        np.array([j for i in range(n) for j in range(n) if j != i], dtype=np.intp),
+    )
+    return partition(points, region, everybody)
+
+
+def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:
+    assert len(a) == len(b)
+    first = int(np.argmin(np.hypot(*(b - a[0]).T)))
+    assert np.roll(b, -first, axis=0) == pytest.approx(a, abs=tolerance)
