@@ -11,7 +11,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.orientation import Grid, cross
+from robocov.clusters import coherent_order
+from robocov.orientation import BITS, Grid, cross
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,8 +41,10 @@ class Walls:
         Vertices: free space lies right of vertex → before, and left of vertex → after.
     sector_wide : (s,)
         True where the sector is a corner.
-    corner_vertex, corner_before, corner_after : (k,)
-        The corners, each like its sector.
+    corner_x, corner_y : (k,) grid steps
+        The corners, numbered so that neighbours have near numbers.
+    corner_in, corner_out : (2, k) grid steps
+        Their edges, along the wall: before → corner, corner → after.
     """
 
     grid: Grid
@@ -54,9 +57,10 @@ class Walls:
     sector_before: IntArray
     sector_after: IntArray
     sector_wide: BoolArray
-    corner_vertex: IntArray
-    corner_before: IntArray
-    corner_after: IntArray
+    corner_x: Array
+    corner_y: Array
+    corner_in: Array
+    corner_out: Array
 
     @classmethod
     def of(cls, free: MultiPolygon, grid: Grid) -> Walls:
@@ -77,6 +81,9 @@ class Walls:
         turn = cross(x[vertex] - x[before], y[vertex] - y[before], x[after] - x[vertex], y[after] - y[vertex])
         # a straight wall counts where another sector ends on it: that one's walls would hide what is ahead
         wide = (turn < 0.0) | ((turn == 0.0) & (np.bincount(vertex)[vertex] > 1))
+        corner = np.nonzero(wide)[0]
+        cells = np.column_stack([x[vertex[corner]], y[vertex[corner]]]) * 2.0 ** (16 - BITS)
+        corner = corner[coherent_order(*np.clip(cells, 0, 65535).astype(np.int64).T)]
         inner = ~_on_hull(x, y, start, end)
         return cls(
             grid=grid,
@@ -89,15 +96,11 @@ class Walls:
             sector_before=before,
             sector_after=after,
             sector_wide=wide,
-            corner_vertex=vertex[wide],
-            corner_before=before[wide],
-            corner_after=after[wide],
+            corner_x=x[vertex[corner]],
+            corner_y=y[vertex[corner]],
+            corner_in=_steps(x, y, before[corner], vertex[corner]),
+            corner_out=_steps(x, y, vertex[corner], after[corner]),
         )
-
-    @property
-    def corners(self) -> tuple[Array, Array]:
-        """The x and y of the corners, (k,) grid steps each."""
-        return self.x[self.corner_vertex], self.y[self.corner_vertex]
 
     def useful(self, corner: IntArray, x: Array, y: Array) -> BoolArray:
         """Return whether a shortest path that bends at a corner can come from, or go to, a point.
@@ -105,10 +108,9 @@ class Walls:
         The point must lie in the corner's sector, and not in front of both of its walls: from
         there a path that bends round the corner could be cut short. The three broadcast.
         """
-        v, a, b = self.corner_vertex[corner], self.corner_before[corner], self.corner_after[corner]
-        dx, dy = x - self.x[v], y - self.y[v]
-        first = cross(self.x[v] - self.x[a], self.y[v] - self.y[a], dx, dy)
-        second = cross(self.x[b] - self.x[v], self.y[b] - self.y[v], dx, dy)
+        dx, dy = x - self.corner_x[corner], y - self.corner_y[corner]
+        first = cross(self.corner_in[0, corner], self.corner_in[1, corner], dx, dy)
+        second = cross(self.corner_out[0, corner], self.corner_out[1, corner], dx, dy)
         return ((first >= 0.0) | (second >= 0.0)) & ((first <= 0.0) | (second <= 0.0))
 
     def vertex_at(self, x: Array, y: Array) -> IntArray:
@@ -139,6 +141,10 @@ def _rings(free: MultiPolygon) -> Iterator[shapely.LinearRing]:
     for part in free.geoms:
         yield part.exterior
         yield from part.interiors
+
+
+def _steps(x: Array, y: Array, begin: IntArray, end: IntArray) -> Array:
+    return np.stack([x[end] - x[begin], y[end] - y[begin]])
 
 
 def _sectors(x: Array, y: Array, start: IntArray, end: IntArray) -> tuple[IntArray, IntArray, IntArray]:

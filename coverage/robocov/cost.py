@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.clusters import Clusters, coherent_order
 from robocov.errors import InputError, ParameterError, shown
 from robocov.geodesic import CORNER_BINS, Geodesics
+from robocov.robot_views import RobotViews, first_of_least
 from robocov.visibility import Fans
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
 _PAIRS = 1 << 19
-"""Pairs of sites and corners, or robots, looked at in one piece, which bounds the memory."""
+"""Pairs of sites and corners looked at in one piece, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +43,13 @@ class CoverageResult:
         Geodesic distance to the nearest robot, inf where none can come.
     owner : (m,)
         The nearest robot (the geodesic Voronoi partition), -1 where none can come.
-    first : (m, 2) m
-        The first way-point from the owner to the site: a corner, or the site itself; nan where none can come.
+    corner : (m,)
+        The row in `corners` where the way from the owner to the site bends first, -1 where it is straight.
     positions : (n, 2) m
+    points : (m, 2) m
+        The sites.
+    corners : (k, 2) m
+        All places where ways can bend.
     """
 
     mean_distance: float
@@ -51,8 +57,18 @@ class CoverageResult:
     uncovered_area: float
     distances: Array
     owner: IntArray
-    first: Array
+    corner: IntArray
     positions: Array
+    points: Array
+    corners: Array
+
+    @cached_property
+    def first(self) -> Array:
+        """The first way-point from the owner to the site, (m, 2) m: a corner, or the site itself."""
+        first = self.points.copy()
+        bent = np.nonzero(self.corner >= 0)[0]
+        first[bent] = self.corners[self.corner[bent]]
+        return first
 
     @cached_property
     def gradient(self) -> Array:
@@ -136,10 +152,17 @@ class CoverageCost:
             raise ParameterError(
                 f"lattice: {self.lattice}, but none of its sites is free; a finer one was wanted"
             )
-        self.points = points[self.cells]
-        self.points.setflags(write=False)
-        self._component = component[self.cells]
-        self._x, self._y = np.ascontiguousarray(snapped[self.cells].T)
+        self.points = frozen(points[self.cells])
+        self._corners = frozen(
+            grid.metres(np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y]))
+        )
+        row, column = np.divmod(self.cells, self.lattice)
+        order = coherent_order(column, row)
+        self._rank = np.empty_like(order)
+        self._rank[order] = np.arange(len(order))
+        self._component = component[self.cells[order]]
+        self._x, self._y = np.ascontiguousarray(snapped[self.cells[order]].T)
+        self._clusters = Clusters(self._x, self._y, leaf=64)
 
     def _view(self) -> None:
         """List for each site the useful corners in view: rows of site, corner and distance."""
@@ -149,7 +172,8 @@ class CoverageCost:
         pieces = [(np.empty(0, np.int32), np.empty(0, np.int32))]
         for begin in range(0, count, rows):
             corner = np.arange(begin, min(begin + rows, count))
-            fans = Fans(paths.walls, paths.corner_x[corner], paths.corner_y[corner], CORNER_BINS)
+            reach = np.full(len(corner), np.inf)
+            fans = Fans(paths.index, paths.corner_x[corner], paths.corner_y[corner], reach, CORNER_BINS)
             row, site = np.nonzero(paths.walls.useful(corner[:, None], self._x, self._y))
             seen = fans.see(row, self._x[site], self._y[site])
             pieces.append((site[seen].astype(np.int32), corner[row[seen]].astype(np.int32)))
@@ -175,29 +199,42 @@ class CoverageCost:
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        robots = _Robots(self.geodesics, positions)
-        corners = robots.to_corners()
-        covered = np.asarray(robots.holds.any(axis=0))
-        site = np.nonzero(covered[self._component])[0]
-        x, y = self._x[site], self._y[site]
+        paths = self.geodesics
+        x, y, holds = paths.place(positions)
+        covered = np.asarray(holds.any(axis=0))
+        owner, distance2 = self._clusters.nearest(x, y)
+        near, near2 = paths.corner_clusters.nearest(x, y)
+        reach2 = np.zeros(len(x))
+        np.maximum.at(reach2, owner, distance2)
+        np.maximum.at(reach2, near, near2)
+        robots = RobotViews(paths, x, y, np.sqrt(reach2))
 
-        owner, distance = robots.nearest(x, y)
-        corner = np.full(len(site), -1, dtype=np.intp)
-        hidden = np.nonzero(~robots.see(owner, x, y))[0]
+        corner = np.full(len(owner), -1, dtype=np.intp)
+        distance = np.sqrt(distance2)
+        seen = robots.see(owner, self._x, self._y)
+        if not covered.all():
+            away = ~covered[self._component]
+            owner[away], distance[away], seen[away] = -1, np.inf, True
+        hidden = np.nonzero(~seen)[0]
         if len(hidden):
-            least, way = self._by_corners(site[hidden], corners.distance)
-            other, straight = robots.nearest_seen(x[hidden], y[hidden], least, owner[hidden])
-            direct = straight < least
-            distance[hidden] = np.minimum(straight, least)
-            owner[hidden[direct]] = other[direct]
-            by_way = hidden[~direct]
-            corner[by_way], owner[by_way] = corners.first[way[~direct]], corners.owner[way[~direct]]
-        return self._result(positions, covered, site, distance, owner, corner)
+            ways = robots.to_corners(near, np.sqrt(near2))
+            least, way = self._by_corners(hidden, ways.distance)
+            bound = np.zeros(len(owner))
+            bound[hidden] = least
+            site, other, straight = self._clusters.within(x, y, bound)
+            pairs = other != owner[site]
+            site, other, straight = site[pairs], other[pairs], straight[pairs]
+            pairs = robots.see_beyond(other, self._x[site], self._y[site], straight)
+            if len(ways.first):
+                distance[hidden], corner[hidden], owner[hidden] = least, ways.first[way], ways.owner[way]
+            site, other, straight = first_of_least(site[pairs], other[pairs], straight[pairs])
+            distance[site], corner[site], owner[site] = straight, -1, other
+        return self._result(positions, covered, distance, owner, corner)
 
     def _by_corners(self, site: IntArray, distance: Array) -> tuple[Array, IntArray]:
-        """Return the least distance of sites by way of a corner, and that corner."""
+        """Return the least distance of sites by way of a corner, and that corner; inf and any for none."""
         first, last = self._list_first[site], self._list_first[site + 1]
-        least, way = np.full(len(site), np.inf), np.full(len(site), -1, dtype=np.intp)
+        least, way = np.full(len(site), np.inf), np.zeros(len(site), dtype=np.intp)
         some = np.nonzero(last > first)[0]
         if not len(some):
             return least, way
@@ -212,33 +249,24 @@ class CoverageCost:
         return least, way
 
     def _result(
-        self,
-        positions: Array,
-        covered: BoolArray,
-        site: IntArray,
-        distance: Array,
-        owner: IntArray,
-        corner: IntArray,
+        self, positions: Array, covered: BoolArray, distance: Array, owner: IntArray, corner: IntArray
     ) -> CoverageResult:
+        """Put the sites, which are worked on group by group, back row by row."""
         paths = self.geodesics
-        distances = np.full(len(self.points), np.inf)
-        owners = np.full(len(self.points), -1, dtype=np.intp)
-        first = np.full(self.points.shape, np.nan)
-        distances[site] = distance * paths.walls.grid.unit
-        owners[site] = owner
-        first[site] = self.points[site]
-        bent = np.nonzero(corner >= 0)[0]
-        at = corner[bent]
-        first[site[bent]] = paths.walls.grid.metres(np.column_stack([paths.corner_x[at], paths.corner_y[at]]))
-        mean = float(distances[site].mean()) if len(site) else np.nan
+        distances = distance[self._rank] * paths.walls.grid.unit
+        owner = owner[self._rank]
+        reached = distances if covered.all() else distances[owner >= 0]
+        mean = float(reached.mean()) if len(reached) else np.nan
         return CoverageResult(
             mean_distance=mean,
             value=mean * float(self._areas[covered].sum()),
             uncovered_area=float(self._areas[~covered].sum()),
             distances=distances,
-            owner=owners,
-            first=first,
+            owner=owner,
+            corner=corner[self._rank],
             positions=positions,
+            points=self.points,
+            corners=self._corners,
         )
 
     def path(self, positions: Array, point: Array) -> Array:
@@ -255,81 +283,3 @@ class CoverageCost:
         point = np.asarray(point, dtype=float)
         distances = self.geodesics.distances(point[None], positions)[0]
         return self.geodesics.path(point, positions[int(distances.argmin())])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Corners:
-    """For every corner the distance to the nearest robot, that robot, and the first corner on its way."""
-
-    distance: Array
-    owner: IntArray
-    first: IntArray
-
-
-class _Robots:
-    """The robots of one evaluation, and what they see."""
-
-    def __init__(self, paths: Geodesics, positions: Array) -> None:
-        self._paths = paths
-        self.x, self.y, self.holds = paths.place(positions)
-        self._vertex = paths.walls.vertex_at(self.x, self.y)
-        self._fans = Fans(paths.walls, self.x, self.y)
-
-    def see(self, robot: IntArray, x: Array, y: Array) -> BoolArray:
-        """Return for (m,) pairs of a robot and a target whether the robot sees the target."""
-        return self._paths.see(self._fans, self._vertex, robot, x, y)
-
-    def nearest(self, x: Array, y: Array) -> tuple[IntArray, Array]:
-        """Return the robot nearest to each of (m,) targets as the crow flies, and its distance."""
-        robot = np.empty(len(x), dtype=np.intp)
-        rows = max(1, _PAIRS // len(self.x))
-        for begin in range(0, len(x), rows):
-            at = slice(begin, begin + rows)
-            distance2 = (x[at, None] - self.x) ** 2 + (y[at, None] - self.y) ** 2
-            robot[at] = distance2.argmin(axis=1)
-        return robot, np.hypot(x - self.x[robot], y - self.y[robot])
-
-    def nearest_seen(
-        self, x: Array, y: Array, bound: Array, but: IntArray, *, corners: bool = False
-    ) -> tuple[IntArray, Array]:
-        """Return the nearest robot that sees each of (m,) targets from less than `bound`, and its distance.
-
-        The robot `but` (m,) is left out. Where there is none the distance is inf. With `corners`, the targets
-        are all corners, and the robot must be where a path round the corner can come from.
-        """
-        robot, least = np.zeros(len(x), dtype=np.intp), np.full(len(x), np.inf)
-        number = np.arange(len(self.x))
-        rows = max(1, _PAIRS // len(self.x))
-        for begin in range(0, len(x), rows):
-            at = slice(begin, begin + rows)
-            distance = np.hypot(x[at, None] - self.x, y[at, None] - self.y)
-            target, other = np.nonzero((distance < bound[at, None]) & (number != but[at, None]))
-            distance = distance[target, other]
-            target += begin
-            if corners:
-                good = self._paths.walls.useful(target, self.x[other], self.y[other])
-                target, other, distance = target[good], other[good], distance[good]
-            good = self.see(other, x[target], y[target])
-            # the nearest, and of equals the first, is written last
-            order = np.lexsort((other[good], distance[good]))[::-1]
-            target, other, distance = target[good][order], other[good][order], distance[good][order]
-            robot[target], least[target] = other, distance
-        return robot, least
-
-    def to_corners(self) -> _Corners:
-        """Return the corners' distances: from the nearest robot, by the graph, then from the others."""
-        paths = self._paths
-        x, y = paths.corner_x, paths.corner_y
-        owner, reach = self.nearest(x, y)
-        good = paths.walls.useful(np.arange(len(x)), self.x[owner], self.y[owner]) & self.see(owner, x, y)
-        reach[~good] = np.inf
-        distance = paths.relax(reach)
-        other, straight = self.nearest_seen(x, y, distance, owner, corners=True)
-        nearer = straight < reach
-        reach[nearer], owner[nearer] = straight[nearer], other[nearer]
-        distance = paths.relax(np.minimum(distance, reach))
-        before = paths.previous(distance, reach)
-        first = np.where(before < 0, np.arange(len(before)), before)
-        while (first != first[first]).any():
-            first = first[first]
-        return _Corners(distance, owner[first], first)

@@ -14,11 +14,12 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.clusters import Clusters
 from robocov.corners import Walls
 from robocov.environment import GRID
 from robocov.errors import InputError
 from robocov.orientation import Grid
-from robocov.visibility import Fans
+from robocov.visibility import Fans, WallIndex
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
@@ -38,6 +39,9 @@ class Geodesics:
     ----------
     walls : Walls
         Vertices, edges and corners, in grid coordinates.
+    index : WallIndex
+        The edges for `Fans`.
+    corner_clusters : Clusters
     size : float, m
         Side of the square over the region's bounding box.
     graph_row, graph_column : (g,)
@@ -51,14 +55,16 @@ class Geodesics:
         self._name = environment.name
         self.walls = Walls.of(environment.free, Grid.over(np.array([low_x, low_y]), self.size))
         shapely.prepare(list(self.walls.free.geoms))
-        self.corner_x, self.corner_y = self.walls.corners
+        self.corner_x, self.corner_y = self.walls.corner_x, self.walls.corner_y
+        self.index = WallIndex(self.walls)
+        self.corner_clusters = Clusters(self.corner_x, self.corner_y, leaf=8)
         self._link()
 
     def _link(self) -> None:
         """Build the graph of the corners."""
         count = len(self.corner_x)
         corner = np.arange(count)
-        fans = Fans(self.walls, self.corner_x, self.corner_y, CORNER_BINS)
+        fans = Fans(self.index, self.corner_x, self.corner_y, np.full(count, np.inf), CORNER_BINS)
         useful = np.empty((count, count), dtype=bool)
         for v in range(count):
             useful[v] = self.walls.useful(corner[v : v + 1], self.corner_x, self.corner_y)
@@ -184,7 +190,7 @@ class Geodesics:
 
     def _views(self, x: Array, y: Array) -> tuple[Fans, IntArray, Array]:
         """Return fans and vertices of (n,) points, and their (n, k) distances to useful corners in view."""
-        fans, vertex = Fans(self.walls, x, y), self.walls.vertex_at(x, y)
+        fans, vertex = Fans(self.index, x, y, np.full(len(x), np.inf)), self.walls.vertex_at(x, y)
         count = len(self.corner_x)
         source, corner = np.indices((len(x), count)).reshape(2, -1)
         good = self.walls.useful(corner, x[source], y[source])

@@ -2,17 +2,104 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.corners import Walls
-from robocov.orientation import cross
+from robocov.orientation import BITS, cross
+
+if TYPE_CHECKING:
+    from robocov.corners import Walls
 
 _PAD = 1e-9
 """Added to the angles that a wall spans, and taken off its distance: far more than rounding, at no cost."""
 
 _PAIRS = 1 << 18
 """Source and wall pairs looked at in one piece, which bounds the memory."""
+
+_TILES = 16
+"""Tiles along a side of the grid; each lists all walls, the nearest first."""
+
+
+_FAR = 2.0 ** (BITS + 2)
+"""More than any distance on the grid, in steps."""
+
+
+class WallIndex:
+    """The walls that can block a view, a → b with free space on the left, sorted around each place.
+
+    Attributes
+    ----------
+    ax, ay, bx, by, ux, uy : (e,) grid steps
+        Their ends, and from the one to the other.
+    """
+
+    def __init__(self, walls: Walls) -> None:
+        self.ax, self.ay = walls.x[walls.start], walls.y[walls.start]
+        self.bx, self.by = walls.x[walls.end], walls.y[walls.end]
+        self.ux, self.uy = self.bx - self.ax, self.by - self.ay
+        self._length2 = self.ux**2 + self.uy**2
+        self._tile = 2.0**BITS / _TILES
+        middle = (np.arange(_TILES) + 0.5) * self._tile
+        y, x = (part.ravel() for part in np.meshgrid(middle, middle, indexing="ij"))
+        self._tile_x, self._tile_y = x, y
+        edges = np.arange(len(self.ax))
+        distances = [
+            np.sqrt(self._near(edges, tx - self.ax, ty - self.ay)) for tx, ty in zip(x, y, strict=True)
+        ]
+        order = [np.argsort(row, kind="stable") for row in distances]
+        self._nearest = np.array(order, dtype=np.int32)
+        # one sorted list for all tiles
+        key = np.array([row[at] for row, at in zip(distances, order, strict=True)])
+        self._key = (key + np.arange(len(x))[:, None] * _FAR).ravel()
+
+    def _near(self, edge: IntArray, dx: Array, dy: Array) -> Array:
+        """Return a hair less than the squared distance of walls from points at (dx, dy) from their starts."""
+        ux, uy = self.ux[edge], self.uy[edge]
+        along = np.minimum(np.maximum((dx * ux + dy * uy) / self._length2[edge], 0.0), 1.0)
+        near = (dx - along * ux) ** 2 + (dy - along * uy) ** 2
+        return np.asarray(near * (1.0 - _PAD))
+
+    def facing(self, x: Array, y: Array, reach: Array) -> tuple[IntArray, IntArray, Array]:
+        """Return the walls that (n,) sources look at from the front, nearer than `reach` (n,).
+
+        Returns
+        -------
+        source, edge : (p,)
+        near : (p,)
+            Squared distance.
+        """
+        last = _TILES - 1
+        column = np.minimum(np.maximum(x / self._tile, 0.0), last).astype(np.intp)
+        row = np.minimum(np.maximum(y / self._tile, 0.0), last).astype(np.intp)
+        tile = row * _TILES + column
+        radius = (reach + np.hypot(x - self._tile_x[tile], y - self._tile_y[tile])) * (1.0 + _PAD)
+        radius = np.minimum(radius, _FAR * (1.0 - _PAD))
+        count = np.searchsorted(self._key, tile * _FAR + radius) - tile * len(self.ax)
+        total = np.cumsum(count)
+        pieces = [(np.empty(0, np.intp), np.empty(0, np.int32), np.empty(0))]
+        begin = 0
+        while begin < len(x):
+            done = total[begin - 1] if begin else 0
+            end = max(begin + 1, int(np.searchsorted(total, done + _PAIRS)))
+            part = count[begin:end]
+            source = np.repeat(np.arange(begin, end), part)
+            place = np.arange(len(source)) - np.repeat(total[begin:end] - part - done, part)
+            edge = self._nearest[tile[source], place]
+            dx, dy = x[source] - self.ax[edge], y[source] - self.ay[edge]
+            ux, uy = self.ux[edge], self.uy[edge]
+            side = cross(ux, uy, dx, dy)
+            # in line with the wall: it hides nothing unless the source is on it, ends apart
+            on_wall = (side == 0.0) & (dx * (dx - ux) + dy * (dy - uy) < 0.0)
+            front = np.nonzero((side > 0.0) | on_wall)[0]
+            source, edge = source[front], edge[front]
+            near = self._near(edge, dx[front], dy[front])
+            inside = near < reach[source] ** 2
+            pieces.append((source[inside], edge[inside], near[inside]))
+            begin = end
+        source, edge, near = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        return source, edge, near
 
 
 class Fans:
@@ -25,48 +112,20 @@ class Fans:
 
     Parameters
     ----------
-    walls : Walls
+    walls : WallIndex
     x, y : (n,) grid steps
         The sources; none of them inside an obstacle.
+    reach : (n,) grid steps
+        No target is farther from its source.
     bins : int
         Angular bins for each source.
-    reach : (n,) grid steps, optional
-        No target will be farther from its source.
     """
 
-    def __init__(self, walls: Walls, x: Array, y: Array, bins: int = 64, reach: Array | None = None) -> None:
+    def __init__(self, walls: WallIndex, x: Array, y: Array, reach: Array, bins: int = 64) -> None:
         self._walls = walls
         self._bins = bins
         self.x, self.y = x, y
-        self._ax, self._ay = walls.x[walls.start], walls.y[walls.start]
-        self._bx, self._by = walls.x[walls.end], walls.y[walls.end]
-        self._ux, self._uy = self._bx - self._ax, self._by - self._ay
-        limit = np.full(len(x), np.inf) if reach is None else reach * reach
-        rows = max(1, _PAIRS // max(1, len(walls.start)))
-        pieces = [self._facing(at, min(at + rows, len(x)), limit) for at in range(0, len(x), rows)]
-        source, edge, near = (
-            (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
-            if pieces
-            else (np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))
-        )
-        self._sort(source.astype(np.intp), edge.astype(np.intp), near)
-
-    def _facing(self, first: int, last: int, limit: Array) -> tuple[IntArray, IntArray, Array]:
-        """Return (source, edge, squared distance) for walls that face the sources first ... last - 1."""
-        px, py = self.x[first:last, None], self.y[first:last, None]
-        dx, dy = px - self._ax, py - self._ay
-        length2 = self._ux**2 + self._uy**2
-        along = np.clip((dx * self._ux + dy * self._uy) / length2, 0.0, 1.0)
-        near = (dx - along * self._ux) ** 2 + (dy - along * self._uy) ** 2
-        near *= 1.0 - _PAD
-        row, edge = np.nonzero(near < limit[first:last, None])
-        near = near[row, edge]
-        dx, dy = dx[row, edge], dy[row, edge]
-        side = cross(self._ux[edge], self._uy[edge], dx, dy)
-        # in line with the wall: it hides nothing unless the source is on it, ends apart
-        on_wall = dx * (dx - self._ux[edge]) + dy * (dy - self._uy[edge]) < 0.0
-        facing = (side > 0.0) | ((side == 0.0) & on_wall)
-        return row[facing] + first, edge[facing], near[facing]
+        self._sort(*walls.facing(x, y, reach))
 
     def _sort(self, source: IntArray, edge: IntArray, near: Array) -> None:
         """Enter every wall into the bins that it spans, the nearest first in each."""
@@ -75,8 +134,9 @@ class Fans:
         px, py = self.x[source], self.y[source]
         scale = self._bins / 4.0
         # seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn
-        begin = pseudo_angle(self._ax[edge] - px, self._ay[edge] - py)
-        finish = pseudo_angle(self._bx[edge] - px, self._by[edge] - py)
+        walls = self._walls
+        begin = pseudo_angle(walls.ax[edge] - px, walls.ay[edge] - py)
+        finish = pseudo_angle(walls.bx[edge] - px, walls.by[edge] - py)
         finish[finish < begin] += 4.0
         low = np.floor((begin - _PAD) * scale).astype(np.intp)
         count = np.floor((finish + _PAD) * scale).astype(np.intp) - low + 1
@@ -98,6 +158,7 @@ class Fans:
 
         Sources at vertices see past the walls that end there: the caller looks after their sectors.
         """
+        walls = self._walls
         px, py = self.x[source], self.y[source]
         dx, dy = x - px, y - py
         distance2 = dx * dx + dy * dy
@@ -110,13 +171,13 @@ class Fans:
         while pending.size:
             edge = self._edge[at]
             qx, qy = x[pending], y[pending]
-            hidden = cross(self._ux[edge], self._uy[edge], qx - self._ax[edge], qy - self._ay[edge]) < 0.0
+            hidden = cross(walls.ux[edge], walls.uy[edge], qx - walls.ax[edge], qy - walls.ay[edge]) < 0.0
             # the walls behind which the target is not need no further look
             check = np.nonzero(hidden)[0]
             edge, pair = edge[check], pending[check]
             vx, vy, wx, wy = px[pair], py[pair], dx[pair], dy[pair]
-            hidden[check] = (cross(self._ax[edge] - vx, self._ay[edge] - vy, wx, wy) >= 0.0) & (
-                cross(wx, wy, self._bx[edge] - vx, self._by[edge] - vy) >= 0.0
+            hidden[check] = (cross(walls.ax[edge] - vx, walls.ay[edge] - vy, wx, wy) >= 0.0) & (
+                cross(wx, wy, walls.bx[edge] - vx, walls.by[edge] - vy) >= 0.0
             )
             visible[pending[hidden]] = False
             pending, at = pending[~hidden], at[~hidden] + 1

@@ -104,7 +104,7 @@ def test_rooms_without_a_robot_are_reported_beside_the_cost():
     in_left = cost.points[:, 0] < 3.0
     np.testing.assert_array_equal(np.isfinite(left.distances), in_left)
     np.testing.assert_array_equal(left.owner, np.where(in_left, 0, -1))
-    np.testing.assert_array_equal(np.isnan(left.first).any(axis=1), ~in_left)
+    assert (left.corner[~in_left] == -1).all()
     assert left.mean_distance == left.distances[in_left].mean()
     assert left.value == pytest.approx(left.mean_distance * 24.0)
     assert both.value == pytest.approx(both.distances.mean() * 56.0)

@@ -121,7 +121,7 @@ def draw_points(data, where, count):
     """Points of the closed free space: vertices, points on walls or in line with them, any points."""
     vertices = np.unique(shapely.get_coordinates(where.free), axis=0)
     on_grid = st.tuples(st.integers(0, 32), st.integers(0, 32)).map(lambda p: (p[0] / 4, p[1] / 4))
-    anywhere = st.tuples(st.floats(0, 8), st.floats(0, 8))
+    anywhere = st.tuples(*[st.integers(0, 2**23).map(lambda k: k / 2**20)] * 2)
     at_vertex = st.integers(0, len(vertices) - 1).map(lambda k: tuple(vertices[k].tolist()))
     points = data.draw(st.lists(on_grid | anywhere | at_vertex, min_size=count, max_size=count + 4))
     keep = [
@@ -267,5 +267,6 @@ def test_the_view_does_not_depend_on_the_number_of_bins(bins):
     lines = shapely.linestrings(np.stack([np.c_[x[source], y[source]], np.c_[x[target], y[target]]], axis=1))
     expected = shapely.covers(geodesics.walls.free, lines) | (source == target)
     np.testing.assert_array_equal(
-        Fans(geodesics.walls, x, y, bins).see(source, x[target], y[target]), expected
+        Fans(geodesics.index, x, y, np.full(len(x), 2.0**49), bins).see(source, x[target], y[target]),
+        expected,
     )
