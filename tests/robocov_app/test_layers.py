@@ -12,7 +12,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov.environment import Environment, PolygonObstacle
 from robocov.robots import Team
+from robocov.starts import UniformStart
 from robocov_app.view.picture import Painter, standard_layers
 from robocov_app.view.theme import DARK, LIGHT, readable_on
 from robocov_app.view.trajectories import Trajectories
@@ -106,6 +108,19 @@ def test_obstacles_are_where_the_robots_cannot_be(environment):
         assert distance(frame, pixel, LIGHT.obstacle) == 0
     for pixel in painter.camera.to_pixels(free):  # the courtyard of ROOMS is free
         assert distance(frame, pixel, LIGHT.background) == 0
+
+
+def test_an_obstacle_in_the_courtyard_of_a_thin_one_is_drawn():
+    ring = PolygonObstacle(
+        ((0.5, 0.5), (7.5, 0.5), (7.5, 7.5), (0.5, 7.5)), (((1, 1), (7, 1), (7, 7), (1, 7)),)
+    )
+    island = PolygonObstacle(((1.5, 1.5), (6.5, 1.5), (6.5, 6.5), (1.5, 6.5)))
+    yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
+    frame, painter = drawn(scene_of(run_of(yard, 2)), "obstacles")
+    points = np.array([[0.75, 4.0], [4.0, 4.0], [1.25, 4.0], [0.25, 4.0]])
+    colours = [LIGHT.obstacle, LIGHT.obstacle, LIGHT.background, LIGHT.background]
+    for pixel, colour in zip(painter.camera.to_pixels(points), colours, strict=True):
+        assert distance(frame, pixel, colour) == 0
 
 
 def test_the_boundary_is_the_convex_hull():

@@ -179,12 +179,12 @@ class TestSaveFilm:
     @pytest.mark.parametrize(("width", "height"), [(63, 48), (64, 47), (63, 47)])
     def test_odd_sizes_are_made_even_without_scaling(self, tmp_path, width, height):
         frame = np.zeros((height, width, 3), dtype=np.uint8)
-        frame[:, ::8] = 255
+        frame[:, ::8] = frame[:, -1] = 255
         save_film(tmp_path / "odd.mp4", [frame] * 3)
         frames, _ = read(tmp_path / "odd.mp4")
         assert frames[0].shape == (height + height % 2, width + width % 2, 3)
         bright = frames[0][20, :, 1] > 128
-        assert np.nonzero(bright)[0].tolist() == list(range(0, width, 8))
+        assert np.nonzero(bright)[0].tolist() == [*range(0, width, 8), *range(width - 1, width + width % 2)]
 
     def test_same_frames_same_bytes(self, tmp_path):
         record = run_of(ROOMS, 5, steps=12)

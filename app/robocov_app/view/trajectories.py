@@ -40,7 +40,6 @@ class Trajectories(Layer):
         self._page: pygame.Surface | None = None
         self._key: object = None
         self._drawn = 0
-        self._first = np.empty((0, 2))
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
 
@@ -108,12 +107,11 @@ class Trajectories(Layer):
         continues = (
             key == self._key
             and 0 < self._drawn <= len(trail)
-            and np.array_equal(trail[0], self._first)
             and np.array_equal(trail[self._drawn - 1], self._last_row)
         )
         if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
-            self._key, self._drawn, self._first = key, 0, trail[0].copy()
+            self._key, self._drawn = key, 0
             self._open = [[point] for point in bounded(canvas.camera.to_pixels(trail[0])).tolist()]
         self._page.set_clip(canvas.surface.get_clip())
         return self._page, continues
