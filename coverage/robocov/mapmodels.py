@@ -22,6 +22,7 @@ LARGEST = 1e4
 FARTHEST = 1e7
 """Largest coordinate in metres: national grids fit, and a micrometre still counts."""
 
+_LONGEST_LABEL = 100
 _NAME = r"^[^\x00-\x1f\x7f]+$"
 
 Coordinate: TypeAlias = Annotated[
@@ -30,14 +31,14 @@ Coordinate: TypeAlias = Annotated[
 Size: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 Vertex: TypeAlias = Annotated[list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]])]
 VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3)]
-Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=100, pattern=_NAME)]
+Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_LABEL, pattern=_NAME)]
 
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=False)
 
 
-class PolygonModel(_Model):
+class PolygonModel(_Model, title="polygon"):
     """A solid polygon, with holes where given."""
 
     kind: Literal["polygon"]
@@ -49,7 +50,7 @@ class PolygonModel(_Model):
     holes: list[VertexRing] = Field([], description="Rings inside that are free, such as courtyards")
 
 
-class CircleModel(_Model):
+class CircleModel(_Model, title="circle"):
     """A round pillar."""
 
     kind: Literal["circle"]
@@ -58,7 +59,7 @@ class CircleModel(_Model):
     radius: Size = Field(description="Its radius in metres", examples=[0.5])
 
 
-class WallModel(_Model):
+class WallModel(_Model, title="wall"):
     """A poly-line of some width, with flat ends."""
 
     kind: Literal["wall"]
@@ -69,7 +70,7 @@ class WallModel(_Model):
     width: Size = Field(description="Its width in metres", examples=[0.1])
 
 
-class DiscModel(_Model):
+class DiscModel(_Model, title="disc start"):
     """The robots start somewhere in a disc."""
 
     kind: Literal["disc"]
@@ -77,13 +78,13 @@ class DiscModel(_Model):
     radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
 
 
-class UniformModel(_Model):
+class UniformModel(_Model, title="uniform start"):
     """The robots start anywhere in the free space."""
 
     kind: Literal["uniform"]
 
 
-class PointsModel(_Model):
+class PointsModel(_Model, title="points start"):
     """The robots start at given positions."""
 
     kind: Literal["points"]
@@ -100,7 +101,7 @@ StartModel: TypeAlias = Annotated[
 ]
 
 
-class MapModel(_Model):
+class MapModel(_Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
 
     schema_: Annotated[str, Field(strict=True)] | None = Field(
@@ -130,7 +131,17 @@ class MapModel(_Model):
 def map_schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a map, with descriptions and examples for editors."""
     schema = MapModel.model_json_schema(by_alias=True)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "robocov map"}
+    # pydantic says what keys of a pattern hold, but not that other keys are errors
+    starts = schema["properties"]["starts"]
+    ((pattern, start),) = starts.pop("patternProperties").items()
+    starts["additionalProperties"] = start
+    starts["propertyNames"] = {
+        "type": "string",
+        "pattern": pattern,
+        "minLength": 1,
+        "maxLength": _LONGEST_LABEL,
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def validate(document: object, where: str) -> MapModel:
@@ -177,7 +188,7 @@ _POINT = "a point [x, y] in metres"
 _COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
 _SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
 _RING = "a list of at least 3 points [x, y]"
-_LABEL = "a text of 1 to 100 characters on one line"
+_LABEL = f"a text of 1 to {_LONGEST_LABEL} characters on one line"
 _WANTED: dict[str, tuple[str, ...]] = {
     # what is wanted at a key, in its items, in their items, ...
     "boundary": (_RING, _POINT, _COORDINATE),

@@ -62,15 +62,12 @@ def _ring_problems(at: str, ring: Ring) -> Iterator[str]:
         yield size_problem
         return
     polygon = Polygon(points)
-    if polygon.area <= _FLAT * float(extent.max()) ** 2 and not _crosses(points):
+    # a ring that crosses itself may have no area either
+    flat = _FLAT * float(extent.max()) ** 2
+    if shapely.convex_hull(polygon).area <= flat:
         yield f"{at}: area {polygon.area:g} m², but points that are not on one line were wanted"
     elif not polygon.is_valid:
         yield _crossing(at, points, polygon)
-
-
-def _crosses(points: Array) -> bool:
-    """Return whether the points span a plane figure, so that no area means that the ring crosses itself."""
-    return bool(shapely.convex_hull(shapely.MultiPoint(points)).area > _FLAT * float(np.ptp(points)) ** 2)
 
 
 def _size_problem(at: str, extent: Array) -> str | None:
@@ -91,7 +88,11 @@ def _crossing(at: str, points: Array, polygon: Polygon) -> str:
     edges = shapely.linestrings(np.stack([points, ends], axis=1))
     distance = shapely.distance(edges, shapely.Point(spot))
     distance[(points == ends).all(axis=1)] = np.inf
-    first, second = sorted(int(k) for k in np.argsort(distance, kind="stable")[:2])
+    nearest = [int(k) for k in np.argsort(distance, kind="stable")[:6]]
+    # neighbours in the ring always meet: name another edge if there is one at that spot
+    apart = (k for k in nearest if (k - nearest[0]) % len(points) not in (0, 1, len(points) - 1))
+    other = next((k for k in apart if distance[k] <= 1e-6), nearest[1])
+    first, second = sorted((nearest[0], other))
     return (
         f"{at}[{first}]: the edge from here meets the edge from {at}[{second}] near "
         f"[{spot[0]:g}, {spot[1]:g}], but a ring that does not meet itself was wanted"

@@ -122,6 +122,14 @@ GEOMETRIC = [
         changed("obstacles", 0, {"kind": "polygon", "vertices": [[0, 0], [4, 4], [4, 0], [0, 4]]}),
         "obstacles[0].vertices[0]: the edge from here meets the edge from obstacles[0].vertices[2]",
     ),
+    (
+        changed("boundary", [[5, 0], [10, 6], [0, 6], [5, 0], [0, -6], [10, -6]]),  # an hourglass
+        "boundary[0]: the edge from here meets the edge from boundary[2] near [5, 0]",
+    ),
+    (
+        changed("boundary", [[1e6, 0], [1e6 + 6, 3], [1e6 + 3, 1.5]]),
+        "boundary: area 0 m², but points that are not on one line",
+    ),
     (changed("boundary", [[0, 0], [10, 10], [5, 5]]), "boundary: area 0 m², but"),
     (changed("boundary", [[0, 0], [10, 10], [0, 0]]), "boundary: 2 different points, but at least 3"),
     (changed("boundary", [[0, 0], [10001, 0], [0, 10]]), "boundary: 10001 x 10 m, but at most 10 km"),
@@ -321,6 +329,13 @@ def test_any_ring_on_a_grid_loads_or_says_why(ring: list[tuple[int, int]]) -> No
 
 
 # The schema says the same as the loader
+
+
+def test_the_schema_knows_which_names_starts_may_have() -> None:
+    for name in ("", "a\nb", "x" * 101):
+        assert not SCHEMA.is_valid(changed("starts", name, {"kind": "uniform"}))
+    assert SCHEMA.is_valid(changed("starts", "the lobby", {"kind": "uniform"}))
+    assert not SCHEMA.is_valid(changed("starts", "the lobby", {"kind": "lobby"}))
 
 
 def test_the_schema_is_one_and_knows_every_key() -> None:
