@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from robocov.mapcheck import check_map
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
     from robocov.metrics import cost_history, settled_at, summarise
-    from robocov.observation import Decision, Neighbours, Observations, Snapshot
+    from robocov.neighbours import Neighbours
+    from robocov.observation import Decision, Observations, Snapshot
     from robocov.record import Record
     from robocov.region import Region
     from robocov.robots import Team
@@ -60,7 +61,7 @@ _HOME = {
     "InputError": "errors",
     "Lloyd": "controllers",
     "MapError": "errors",
-    "Neighbours": "observation",
+    "Neighbours": "neighbours",
     "Observations": "observation",
     "OutputError": "errors",
     "OwnView": "controllers",

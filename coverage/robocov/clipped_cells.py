@@ -15,7 +15,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.cell_edges import REGION, CellEdges
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.region import Region
 
 if TYPE_CHECKING:

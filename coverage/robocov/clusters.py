@@ -63,15 +63,12 @@ class Clusters:
         robot = np.zeros(self._x.shape, dtype=np.intp)
         best = np.full(self._x.shape, np.inf)
         for leaf, other in self._leaves_near(x, y):
-            count = np.bincount(leaf, minlength=len(best))
-            first = np.cumsum(count) - count
-            for k in range(int(count.max(initial=0))):
-                rows = np.nonzero(count > k)[0]
-                candidate = other[first[rows] + k, None]
-                distance2 = (self._x[rows] - x[candidate]) ** 2 + (self._y[rows] - y[candidate]) ** 2
-                nearer = distance2 < best[rows] if k else True
-                best[rows] = np.where(nearer, distance2, best[rows])
-                robot[rows] = np.where(nearer, candidate, robot[rows])
+            distance2 = (self._x[leaf] - x[other, None]) ** 2 + (self._y[leaf] - y[other, None]) ** 2
+            begin = np.nonzero(np.diff(leaf, prepend=-1))[0]
+            best[leaf[begin]] = np.minimum.reduceat(distance2, begin, axis=0)
+            # the first of equals is written last
+            pair, slot = (part[::-1] for part in np.nonzero(distance2 == best[leaf]))
+            robot[leaf[pair], slot] = other[pair]
         return robot.ravel()[: self._count], best.ravel()[: self._count]
 
     def _leaves_near(self, x: Array, y: Array) -> Iterator[tuple[IntArray, IntArray]]:
@@ -91,7 +88,15 @@ class Clusters:
             least = np.minimum.reduceat(far, np.cumsum(count) - count, axis=0)
             pair, leaf = np.nonzero(near <= least[block])
             leaf += (begin + block[pair]) * _LEAVES
-            yield _sorted_pairs(leaf, other[pair], len(self._x))
+            leaf, other = _sorted_pairs(leaf, other[pair], len(self._x))
+            count = np.cumsum(np.bincount(leaf, minlength=len(self._x)))
+            cut = 0
+            while cut < len(leaf):
+                done = cut
+                # whole leaves, as many as make a piece
+                last = int(np.searchsorted(count, done + _PAIRS // self._leaf, side="right"))
+                cut = max(int(count[last - 1]) if last else 0, int(count[leaf[done]]))
+                yield leaf[done:cut], other[done:cut]
 
     def within(self, x: Array, y: Array, bound: Array) -> tuple[IntArray, IntArray, Array]:
         """Return the pairs of a point and one of (n,) others that are less than `bound` (m,) apart.

@@ -12,9 +12,8 @@ import shapely
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.clusters import Clusters, coherent_order
 from robocov.errors import InputError, ParameterError, shown
-from robocov.geodesic import CORNER_BINS, Geodesics
+from robocov.geodesic import Geodesics
 from robocov.robot_views import RobotViews, first_of_least
-from robocov.visibility import Fans
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
@@ -172,11 +171,10 @@ class CoverageCost:
         pieces = [(np.empty(0, np.int32), np.empty(0, np.int32))]
         for begin in range(0, count, rows):
             corner = np.arange(begin, min(begin + rows, count))
-            reach = np.full(len(corner), np.inf)
-            fans = Fans(paths.index, paths.corner_x[corner], paths.corner_y[corner], reach, CORNER_BINS)
             row, site = np.nonzero(paths.walls.useful(corner[:, None], self._x, self._y))
-            seen = fans.see(row, self._x[site], self._y[site])
-            pieces.append((site[seen].astype(np.int32), corner[row[seen]].astype(np.int32)))
+            row += begin
+            seen = paths.corner_fans.see(row, self._x[site], self._y[site])
+            pieces.append((site[seen].astype(np.int32), row[seen].astype(np.int32)))
         site, corner = (np.concatenate([piece[k] for piece in pieces]) for k in (0, 1))
         order = np.argsort(site, kind="stable")
         self._list_corner = corner[order]
@@ -206,7 +204,6 @@ class CoverageCost:
         near, near2 = paths.corner_clusters.nearest(x, y)
         reach2 = np.zeros(len(x))
         np.maximum.at(reach2, owner, distance2)
-        np.maximum.at(reach2, near, near2)
         robots = RobotViews(paths, x, y, np.sqrt(reach2))
 
         corner = np.full(len(owner), -1, dtype=np.intp)

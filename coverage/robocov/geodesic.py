@@ -24,7 +24,7 @@ from robocov.visibility import Fans, WallIndex
 if TYPE_CHECKING:
     from robocov.environment import Environment
 
-CORNER_BINS = 256
+_CORNER_BINS = 256
 """Angular bins of a corner, which looks at many targets; other sources have the default."""
 
 
@@ -42,6 +42,8 @@ class Geodesics:
     index : WallIndex
         The edges for `Fans`.
     corner_clusters : Clusters
+    corner_fans : Fans
+        The views of the corners.
     size : float, m
         Side of the square over the region's bounding box.
     graph_row, graph_column : (g,)
@@ -58,18 +60,19 @@ class Geodesics:
         self.corner_x, self.corner_y = self.walls.corner_x, self.walls.corner_y
         self.index = WallIndex(self.walls)
         self.corner_clusters = Clusters(self.corner_x, self.corner_y, leaf=8)
+        everywhere = np.full(len(self.corner_x), np.inf)
+        self.corner_fans = Fans(self.index, self.corner_x, self.corner_y, everywhere, _CORNER_BINS)
         self._link()
 
     def _link(self) -> None:
         """Build the graph of the corners."""
         count = len(self.corner_x)
         corner = np.arange(count)
-        fans = Fans(self.index, self.corner_x, self.corner_y, np.full(count, np.inf), CORNER_BINS)
         useful = np.empty((count, count), dtype=bool)
         for v in range(count):
             useful[v] = self.walls.useful(corner[v : v + 1], self.corner_x, self.corner_y)
         row, column = np.nonzero(np.triu(useful & useful.T, 1))
-        seen = fans.see(row, self.corner_x[column], self.corner_y[column])
+        seen = self.corner_fans.see(row, self.corner_x[column], self.corner_y[column])
         row, column = row[seen], column[seen]
         row, column = np.concatenate([row, column]), np.concatenate([column, row])
         order = np.lexsort((column, row))

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
-from robocov.observation import close_pairs
+from robocov.neighbours import close_pairs
 from robocov.record import Record
 from robocov.sensor import RangeSensor
 from robocov.solid import solid_pieces

@@ -17,7 +17,8 @@ from robocov.atomic import written
 from robocov.controllers import CONTROLLERS, gain_values
 from robocov.environment import Environment
 from robocov.errors import InputError
-from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.neighbours import Neighbours
+from robocov.observation import Decision, Observations, Snapshot
 from robocov.robots import Team
 
 if TYPE_CHECKING:

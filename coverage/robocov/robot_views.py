@@ -82,9 +82,9 @@ class RobotViews:
             Its distance.
         """
         paths = self._paths
-        x, y = paths.corner_x, paths.corner_y
-        good = paths.walls.useful(np.arange(len(x)), self.x[robot], self.y[robot])
-        good &= self.see(robot, x, y)
+        corner = np.arange(len(robot))
+        good = paths.walls.useful(corner, self.x[robot], self.y[robot])
+        good &= paths.corner_fans.see(corner, self.x[robot], self.y[robot])
         owner, reach = robot.copy(), np.where(good, straight, np.inf)
         distance = paths.relax(reach)
         # whoever else is nearer than that may see the corner
@@ -93,7 +93,7 @@ class RobotViews:
         corner, other, away = corner[pairs], other[pairs], away[pairs]
         pairs = paths.walls.useful(corner, self.x[other], self.y[other])
         corner, other, away = corner[pairs], other[pairs], away[pairs]
-        pairs = self.see_beyond(other, x[corner], y[corner], away)
+        pairs = paths.corner_fans.see(corner, self.x[other], self.y[other])
         corner, other, away = first_of_least(corner[pairs], other[pairs], away[pairs])
         reach[corner], owner[corner] = away, other
         distance = paths.relax(np.minimum(distance, reach))

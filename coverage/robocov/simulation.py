@@ -11,7 +11,8 @@ from robocov.arrays import Array
 from robocov.controllers.base import Controller
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError, shown
-from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.neighbours import Neighbours
+from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
@@ -70,8 +71,7 @@ class Simulation:
         self.team = Team.homogeneous(len(positions)) if team is None else team
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
-        if not 1e-4 <= dt <= 1.0:
-            raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
+        check_dt(dt)
         _check_starts(environment, positions, self.team)
         self.environment = environment
         self.controller = controller
@@ -190,6 +190,18 @@ class Simulation:
                 f"controller {self.controller.name!r}: force {forces[robot].tolist()} on robot {robot + 1} "
                 f"at {self.time:.3f} s, but finite newtons were wanted"
             )
+
+
+def check_dt(dt: float) -> None:
+    """Check a control period.
+
+    Raises
+    ------
+    ParameterError
+        When it is out of range.
+    """
+    if not 1e-4 <= dt <= 1.0:
+        raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
 
 
 def _check_starts(environment: Environment, positions: Array, team: Team) -> None:

@@ -6,11 +6,13 @@ every controller gets the same positions for the same seed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 
 from robocov.arrays import Array
 from robocov.errors import StartError
@@ -21,8 +23,6 @@ if TYPE_CHECKING:
 
 GAP = 0.02
 """Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""
-
-_DARTS_PER_ROBOT = 200
 
 
 @dataclass(frozen=True)
@@ -92,15 +92,22 @@ class Start:
         if room.is_empty:
             raise StartError(f"{where}: no room for a robot of radius {radius:g} m; a wider start was wanted")
         rng = np.random.default_rng([seed, n])
+        # no packing of equal discs is denser than the hexagonal one
+        most = 1 + math.floor(room.buffer(spacing / 2).area / (spacing**2 * math.sqrt(3) / 2))
+        if n > most:
+            raise self._too_many(n, radius, most)
         points = _darts(rng, room, n, spacing)
         if len(points) < n:
             points = _hexagonal(rng, room, n, spacing)
         if len(points) < n:
-            raise StartError(
-                f"{where}: room for {len(points)} robots of radius {radius:g} m, but {n} were asked for; "
-                f"fewer robots or a wider start was wanted"
-            )
+            raise self._too_many(n, radius, len(points))
         return points
+
+    def _too_many(self, n: int, radius: float, room_for: int) -> StartError:
+        return StartError(
+            f"start {self.name!r}: room for about {room_for} robots of radius {radius:g} m, "
+            f"but {n} were asked for; fewer robots or a wider start was wanted"
+        )
 
     def _room(self, clearance: float) -> BaseGeometry:
         """Return where a robot's centre may be."""
@@ -140,22 +147,36 @@ class Start:
 
 
 def _darts(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:
-    """Throw darts at `room`, keep those at least `spacing` apart; (up to n, 2)."""
+    """Throw darts at `room`, keep those at least `spacing` apart; (up to n, 2).
+
+    It gives up when a round keeps less than one dart in a hundred: the rest would take for ever.
+    """
     low_x, low_y, high_x, high_y = room.bounds
-    kept = np.empty((n, 2))
-    count = 0
+    kept = np.empty((0, 2))
     shapely.prepare(room)
-    for _ in range(_DARTS_PER_ROBOT):
-        darts = rng.uniform((low_x, low_y), (high_x, high_y), size=(max(64, 4 * n), 2))
+    # a thin room misses most darts that are thrown at its bounding box
+    share = max(room.area / ((high_x - low_x) * (high_y - low_y)), 1e-3)
+    while len(kept) < n:
+        count = max(64, int(4 * (n - len(kept)) / share))
+        darts = rng.uniform((low_x, low_y), (high_x, high_y), size=(count, 2))
         darts = darts[shapely.contains_xy(room, darts[:, 0], darts[:, 1])]
-        for dart in darts:
-            if count and (np.hypot(*(kept[:count] - dart).T) < spacing).any():
-                continue
-            kept[count] = dart
-            count += 1
-            if count == n:
-                return kept
-    return kept[:count]
+        if len(kept):
+            darts = darts[cKDTree(kept).query(darts)[0] >= spacing]
+        fresh = _apart(darts, spacing)
+        kept = np.concatenate([kept, fresh])
+        if len(fresh) < count * share / 100:
+            break
+    return kept[:n]
+
+
+def _apart(points: Array, spacing: float) -> Array:
+    """Return the points, in their order, that are at least `spacing` from every one returned before."""
+    crowd = cKDTree(points).query_ball_point(points, spacing) if len(points) else []
+    keep = np.ones(len(points), dtype=bool)
+    for i, near in enumerate(crowd):
+        if keep[i]:
+            keep[[k for k in near if k > i]] = False
+    return points[keep]
 
 
 def _hexagonal(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:

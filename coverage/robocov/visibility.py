@@ -10,12 +10,14 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.orientation import BITS, cross
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from robocov.corners import Walls
 
 _PAD = 1e-9
 """Added to the angles that a wall spans, and taken off its distance: far more than rounding, at no cost."""
 
-_PAIRS = 1 << 18
+_PAIRS = 1 << 16
 """Source and wall pairs looked at in one piece, which bounds the memory."""
 
 _TILES = 16
@@ -61,14 +63,18 @@ class WallIndex:
         near = (dx - along * ux) ** 2 + (dy - along * uy) ** 2
         return np.asarray(near * (1.0 - _PAD))
 
-    def facing(self, x: Array, y: Array, reach: Array) -> tuple[IntArray, IntArray, Array]:
-        """Return the walls that (n,) sources look at from the front, nearer than `reach` (n,).
+    def facing(
+        self, x: Array, y: Array, reach: Array
+    ) -> Iterator[tuple[int, int, IntArray, IntArray, Array]]:
+        """Yield the walls that (n,) sources look at from the front, nearer than `reach` (n,), in pieces.
 
-        Returns
-        -------
+        Yields
+        ------
+        begin, end : int
+            The sources of the piece.
         source, edge : (p,)
         near : (p,)
-            Squared distance.
+            A hair less than their squared distance.
         """
         last = _TILES - 1
         column = np.minimum(np.maximum(x / self._tile, 0.0), last).astype(np.intp)
@@ -78,7 +84,6 @@ class WallIndex:
         radius = np.minimum(radius, _FAR * (1.0 - _PAD))
         count = np.searchsorted(self._key, tile * _FAR + radius) - tile * len(self.ax)
         total = np.cumsum(count)
-        pieces = [(np.empty(0, np.intp), np.empty(0, np.int32), np.empty(0))]
         begin = 0
         while begin < len(x):
             done = total[begin - 1] if begin else 0
@@ -96,10 +101,8 @@ class WallIndex:
             source, edge = source[front], edge[front]
             near = self._near(edge, dx[front], dy[front])
             inside = near < reach[source] ** 2
-            pieces.append((source[inside], edge[inside], near[inside]))
+            yield begin, end, source[inside], edge[inside], near[inside]
             begin = end
-        source, edge, near = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
-        return source, edge, near
 
 
 class Fans:
@@ -125,33 +128,56 @@ class Fans:
         self._walls = walls
         self._bins = bins
         self.x, self.y = x, y
-        self._sort(*walls.facing(x, y, reach))
+        nothing = np.empty(0, np.int32), np.empty(0), np.zeros(1, np.intp)
+        pieces = [nothing, *(self._bin(*piece) for piece in walls.facing(x, y, reach))]
+        self._edge, near, count = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        self._near = np.append(near, np.inf)
+        self._first = np.cumsum(count)
 
-    def _sort(self, source: IntArray, edge: IntArray, near: Array) -> None:
-        """Enter every wall into the bins that it spans, the nearest first in each."""
+    def _bin(
+        self, begin: int, end: int, source: IntArray, edge: IntArray, near: Array
+    ) -> tuple[IntArray, Array, IntArray]:
+        """Enter every wall into the bins that it spans, the nearest first in each.
+
+        Returns
+        -------
+        edge, near : (entries,)
+        count : (bins of all sources from `begin` to `end`,)
+        """
+        walls = self._walls
         order = np.argsort(near, kind="stable")
         source, edge, near = source[order], edge[order], near[order]
         px, py = self.x[source], self.y[source]
-        scale = self._bins / 4.0
+        from_x, from_y, to_x, to_y = (
+            walls.ax[edge] - px,
+            walls.ay[edge] - py,
+            walls.bx[edge] - px,
+            walls.by[edge] - py,
+        )
         # seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn
-        walls = self._walls
-        begin = pseudo_angle(walls.ax[edge] - px, walls.ay[edge] - py)
-        finish = pseudo_angle(walls.bx[edge] - px, walls.by[edge] - py)
-        finish[finish < begin] += 4.0
-        low = np.floor((begin - _PAD) * scale).astype(np.intp)
-        count = np.floor((finish + _PAD) * scale).astype(np.intp) - low + 1
+        scale = self._bins / 4.0
+        start, stop = pseudo_angle(from_x, from_y), pseudo_angle(to_x, to_y)
+        stop[stop < start] += 4.0
+        low = np.floor((start - _PAD) * scale).astype(np.intp)
+        count = np.floor((stop + _PAD) * scale).astype(np.intp) - low + 1
         np.minimum(count, self._bins, out=count)
         entry = np.repeat(np.arange(len(edge)), count)
-        step = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
-        key = source[entry] * self._bins + (low[entry] + step) % self._bins
-        size = len(self.x) * self._bins
+        place = low[entry] + np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
+        key = (source[entry] - begin) * self._bins + place % self._bins
+
+        # what is farther than all of a wall across the whole bin is hidden by that one
+        far = np.maximum(from_x * from_x + from_y * from_y, to_x * to_x + to_y * to_y) * (1.0 + _PAD)
+        across = (place >= ((start + _PAD) * scale)[entry]) & (place + 1 <= ((stop - _PAD) * scale)[entry])
+        size = (end - begin) * self._bins
+        horizon = np.full(size, np.inf)
+        np.minimum.at(horizon, key[across], far[entry[across]])
+        some = np.nonzero(near[entry] <= horizon[key])[0]
+        entry, key = entry[some], key[some]
+
         # numpy sorts 16 bit integers in linear time
         order = np.argsort(key.astype(np.uint16) if size <= 1 << 16 else key, kind="stable")
         entry = entry[order]
-        self._edge = edge[entry]
-        self._near = np.append(near[entry], np.inf)
-        self._first = np.zeros(size + 1, dtype=np.intp)
-        np.cumsum(np.bincount(key, minlength=size), out=self._first[1:])
+        return edge[entry], near[entry], np.bincount(key, minlength=size)
 
     def see(self, source: IntArray, x: Array, y: Array) -> BoolArray:
         """Return for (m,) pairs of a source and a target at (x, y) whether no wall hides the target.

@@ -13,7 +13,7 @@ from robocov.cell_edges import CellEdges
 from robocov.clipped_cells import clip_cells, edges_of, mass_and_centroid
 from robocov.delaunay_cells import delaunay_cells
 from robocov.errors import InputError, shown
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.region import Region
 
 if TYPE_CHECKING:

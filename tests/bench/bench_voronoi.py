@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import Delaunay
 
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.region import Region
 from robocov.voronoi import partition
 

@@ -23,7 +23,8 @@ from robocov.controllers import (
 )
 from robocov.controllers.gains import gain
 from robocov.errors import ParameterError
-from robocov.observation import Decision, Neighbours, Observations
+from robocov.neighbours import Neighbours
+from robocov.observation import Decision, Observations
 from robocov.region import Region
 from robocov.robots import Team
 

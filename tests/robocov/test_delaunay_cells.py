@@ -10,7 +10,7 @@ import pytest
 
 from robocov.clipped_cells import clip_cells, mass_and_centroid
 from robocov.delaunay_cells import delaunay_cells
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.voronoi import partition
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -52,7 +52,7 @@ def test_a_tight_start_is_filled_by_a_lattice() -> None:
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
     assert apart.min() >= 0.2
     with pytest.raises(
-        StartError, match=r"start 'tight': room for \d+ robots of radius 0.1 m, but 200 were asked for"
+        StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were asked for"
     ):
         start.sample(200, seed=0)
 

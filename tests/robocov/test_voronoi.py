@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from robocov.cell_edges import REGION
 from robocov.errors import InputError
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.region import Region
 from robocov.voronoi import partition
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from robocov.observation import Neighbours
+from robocov.neighbours import Neighbours
 from robocov.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.observation import Decision, Neighbours, Observations, Snapshot
+from robocov.neighbours import Neighbours
+from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.starts import DiscStart, UniformStart

@@ -32,7 +32,7 @@ class Rapf:
         "the paper's law: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
     )
 
-    k_rep: float = gain(0.1, "N m³", "strength of the repulsion, (24)")
+    k_rep: float = gain(0.3, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(2.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
     k_att: float = gain(30.0, "N/m³", "strength of the attraction, (27)")
     attraction_limit: float | None = gain(

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.observation import Neighbours, close_pairs
+from robocov.neighbours import Neighbours, close_pairs
 
 
 @given(n=st.integers(1, 120), reach=st.floats(0.0, 8.0), seed=st.integers(0, 2**32))
