@@ -153,11 +153,13 @@ def plot_comparison(
         bounds = np.array([record.environment.region.bounds for record in records])
         limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
         aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
-        columns = _columns(len(records), aspect, size or (1400, 800))
-        rows = -(-len(records) // columns)
-        if size is None:
-            tall = (1400 - 36) / columns / aspect + 62
-            size = (1400, int(np.clip(rows * tall + 70, 320, 2400)))
+        if size is not None:
+            columns = _columns(len(records), aspect, size)
+        else:
+            in_a_row = len(records) <= 3 and aspect < 2.5
+            columns = len(records) if in_a_row else _columns(len(records), aspect, (1400, 800))
+            rows, wide = -(-len(records) // columns), 1400 if columns < 3 else 1800
+            size = (wide, int(np.clip(rows * ((wide - 36) / columns / aspect + 62) + 70, 320, 2400)))
         page = Page(size, theme)
         facts = [_facts(record, cost) for record, cost in zip(records, costs, strict=True)]
         words = max(page.text_width(text) for text in facts)

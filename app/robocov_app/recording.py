@@ -28,7 +28,7 @@ Frame: TypeAlias = NDArray[np.uint8]
 Progress: TypeAlias = Callable[[int, int | None], None]
 """Is told how many frames are done, and of how many where that is known."""
 
-_NOTHING_NEW = "frames: none were given, but at least one was wanted"
+_NO_FRAMES = "frames: none were given, but at least one was wanted"
 
 
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
@@ -162,7 +162,7 @@ def side_by_side(films: Sequence[Iterator[Frame]], gap: int = 2, grey: int = 128
         parts: list[Frame] = []
         for frame in current:
             if frame is None:
-                raise ParameterError(_NOTHING_NEW)
+                raise ParameterError(_NO_FRAMES)
             if parts:
                 parts.append(np.full((frame.shape[0], gap, 3), grey, dtype=np.uint8))
             parts.append(frame)
@@ -274,7 +274,7 @@ def save_film(
     source = iter(frames)
     first = next(source, None)
     if first is None:
-        raise ParameterError(_NOTHING_NEW)
+        raise ParameterError(_NO_FRAMES)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -72,10 +72,9 @@ class Status(Layer):
 
 
 def status_text(scene: Scene) -> str:
-    """Return what the status line says, the most important first."""
-    parts = [f"t = {scene.snapshot.time:.1f} s"] if scene.snapshot is not None else []
-    parts += [text for text in (scene.cost, scene.label, scene.environment.name) if text]
-    return "   ·   ".join(parts)
+    """Return what the status line says, what may be cut last: the map's name."""
+    time = f"t = {scene.snapshot.time:.1f} s" if scene.snapshot is not None else ""
+    return "   ·   ".join(text for text in (scene.label, time, scene.cost, scene.environment.name) if text)
 
 
 class Legend(Layer):
