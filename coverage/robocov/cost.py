@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
-_PAIRS = 1 << 19
+_PAIRS = 1 << 16
 """Pairs of sites and corners looked at in one piece, which bounds the memory."""
 
 
@@ -183,8 +183,9 @@ class CoverageCost:
             paths.corner_x[self._list_corner] - self._x[site],
             paths.corner_y[self._list_corner] - self._y[site],
         )
-        self._list_first = np.zeros(sites + 1, dtype=np.intp)
-        np.cumsum(np.bincount(site, minlength=sites), out=self._list_first[1:])
+        self._list_count = np.bincount(site, minlength=sites)
+        self._list_first = np.cumsum(self._list_count) - self._list_count
+        self._listed = np.nonzero(self._list_count)[0]
 
     def __call__(self, positions: Array) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -216,33 +217,41 @@ class CoverageCost:
         if len(hidden):
             ways = robots.to_corners(near, np.sqrt(near2))
             least, way = self._by_corners(hidden, ways.distance)
-            bound = np.zeros(len(owner))
-            bound[hidden] = least
-            site, other, straight = self._clusters.within(x, y, bound)
+            site, other, straight = self._clusters.within(x, y, np.where(seen, 0.0, least))
             pairs = other != owner[site]
             site, other, straight = site[pairs], other[pairs], straight[pairs]
             pairs = robots.see_beyond(other, self._x[site], self._y[site], straight)
             if len(ways.first):
-                distance[hidden], corner[hidden], owner[hidden] = least, ways.first[way], ways.owner[way]
+                way = way[hidden]
+                distance[hidden], corner[hidden], owner[hidden] = (
+                    least[hidden],
+                    ways.first[way],
+                    ways.owner[way],
+                )
             site, other, straight = first_of_least(site[pairs], other[pairs], straight[pairs])
             distance[site], corner[site], owner[site] = straight, -1, other
         return self._result(positions, covered, distance, owner, corner)
 
     def _by_corners(self, site: IntArray, distance: Array) -> tuple[Array, IntArray]:
-        """Return the least distance of sites by way of a corner, and that corner; inf and any for none."""
-        first, last = self._list_first[site], self._list_first[site + 1]
-        least, way = np.full(len(site), np.inf), np.zeros(len(site), dtype=np.intp)
-        some = np.nonzero(last > first)[0]
-        if not len(some):
-            return least, way
-        count = (last - first)[some]
-        begin = np.cumsum(count) - count
-        entry = np.arange(begin[-1] + count[-1]) + np.repeat(first[some] - begin, count)
-        corner = self._list_corner[entry]
-        total = self._list_length[entry] + distance[corner]
-        least[some] = np.minimum.reduceat(total, begin)
-        hit = np.nonzero(total == np.repeat(least[some], count))[0][::-1]
-        way[np.repeat(some, count)[hit]] = corner[hit]
+        """Return the least distance of all sites by way of a corner, and that corner; of `site` at least."""
+        least, way = np.full(len(self._x), np.inf), np.zeros(len(self._x), dtype=np.intp)
+        if len(site) > len(self._x) // 2:
+            # to look at all is quicker than to pick
+            site, corner, length = self._listed, self._list_corner, self._list_length
+            count = self._list_count[site]
+        else:
+            count = self._list_count[site]
+            site, count = site[count > 0], count[count > 0]
+            begin = np.cumsum(count) - count
+            entry = np.arange(count.sum()) + np.repeat(self._list_first[site] - begin, count)
+            corner, length = self._list_corner[entry], self._list_length[entry]
+        if len(corner):
+            total = length + distance[corner]
+            best = np.minimum.reduceat(total, np.cumsum(count) - count)
+            # of equals the first is written last
+            hit = np.nonzero(total == np.repeat(best, count))[0][::-1]
+            least[site] = best
+            way[np.repeat(site, count)[hit]] = corner[hit]
         return least, way
 
     def _result(

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from robocov.geodesic import Geodesics
 
 
+_FEW = 1 << 13
+"""Pairs of robots and walls that are few enough to look at all."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Ways:
     """The shortest ways from the robots to the corners.
@@ -49,8 +53,9 @@ class RobotViews:
         self._paths = paths
         self.x, self.y = x, y
         self._vertex = paths.walls.vertex_at(x, y)
-        # the targets at the very end of it belong to it
-        self._reach = reach * (1.0 + 1e-9)
+        # targets at the very end belong to it; with few walls a second look costs more than all of them
+        few = len(x) * len(paths.index.ax) <= _FEW
+        self._reach = np.full(len(x), np.inf) if few else reach * (1.0 + 1e-9)
         self._fans = Fans(paths.index, x, y, self._reach)
 
     def see(self, robot: IntArray, x: Array, y: Array) -> BoolArray:
