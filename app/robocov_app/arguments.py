@@ -20,7 +20,7 @@ _WORDING = (
     ),
     (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
     (
-        r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),?\)\.$",
+        r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
         r"\2: \1, but one of \3 was wanted",
     ),
     (r"^Missing value for argument '(\S+)'\..*$", r"\1: a value was wanted"),
@@ -52,14 +52,17 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
 
 
 def one_line(boxed: str) -> str:
-    """Return the first paragraph of a boxed complaint as one line, with the suggestion where there is one."""
-    lines = [line.strip("│╭╮╰╯─ \t") for line in boxed.splitlines()]
-    paragraphs: list[list[str]] = [[]]
-    for line in lines[1:]:
-        if line:
-            paragraphs[-1].append(line)
-        else:
+    """Return the first paragraph of a boxed complaint as one line, with the suggestion where there is one.
+
+    The box is drawn with lines or, where the terminal has none, with dashes.
+    """
+    paragraphs: list[list[str]] = []
+    for line in boxed.splitlines():
+        words = line.strip("│| \t")
+        if words.startswith("╭") or re.fullmatch(r"[-─]{3,}", words):
             paragraphs.append([])
+        elif paragraphs and words and not words.startswith("╰"):
+            paragraphs[-1].append(words)
     text = " ".join(paragraphs[0])
     for pattern, wording in _WORDING:
         text, changed = re.subn(pattern, wording, text)

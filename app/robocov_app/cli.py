@@ -28,7 +28,7 @@ COMMANDS = {
 }
 
 _EXAMPLES = (
-    ("robocov run rooms --video --out first-run", "six robots cover four rooms; pictures and a film"),
+    ("robocov run rooms --video --out first-run", "six robots cover six rooms; pictures and a film"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),
 )

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from robocov.errors import ParameterError, shown
+from robocov.simulation import DEFAULT_DT, check_dt
 
 MOST_ROWS = 2e7
 """Largest record, in moments times robots: about 2 GB."""
@@ -32,7 +33,7 @@ class RunOptions:
     """Seed of the starting positions; every controller gets the same."""
     duration: float = 60.0
     """Simulated seconds."""
-    dt: float = 1 / 60
+    dt: float = DEFAULT_DT
     """Control period in seconds."""
     radius: float = 0.1
     """Radius of a robot in metres."""
@@ -76,7 +77,8 @@ class RunOptions:
         _in_range("--lattice", self.lattice, 2, 2048)
         _in_range("--fps", self.fps, 1, 240)
         _in_range("--film-speed", self.film_speed, 0.01, 1e4)
-        moments = self.duration / self.dt if self.dt > 0 else 0.0
+        check_dt(self.dt)
+        moments = self.duration / self.dt
         if moments * self.robots > MOST_ROWS:
             raise ParameterError(
                 f"--duration: {self.duration:g} s of {self.robots} robots at {self.dt:g} s are "

@@ -185,7 +185,7 @@ class CoverageCost:
         )
         self._list_count = np.bincount(site, minlength=sites)
         self._list_first = np.cumsum(self._list_count) - self._list_count
-        self._listed = np.nonzero(self._list_count)[0]
+        self._list_site = site
 
     def __call__(self, positions: Array) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -235,23 +235,21 @@ class CoverageCost:
     def _by_corners(self, site: IntArray, distance: Array) -> tuple[Array, IntArray]:
         """Return the least distance of all sites by way of a corner, and that corner; of `site` at least."""
         least, way = np.full(len(self._x), np.inf), np.zeros(len(self._x), dtype=np.intp)
-        if len(site) > len(self._x) // 2:
-            # to look at all is quicker than to pick
-            site, corner, length = self._listed, self._list_corner, self._list_length
+        row, corner, length = self._list_site, self._list_corner, self._list_length
+        # to look at all is quicker than to pick more than half
+        if len(site) <= len(self._x) // 2:
             count = self._list_count[site]
-        else:
-            count = self._list_count[site]
-            site, count = site[count > 0], count[count > 0]
-            begin = np.cumsum(count) - count
-            entry = np.arange(count.sum()) + np.repeat(self._list_first[site] - begin, count)
-            corner, length = self._list_corner[entry], self._list_length[entry]
-        if len(corner):
+            row = np.repeat(site, count)
+            first = self._list_first[site] - (np.cumsum(count) - count)
+            entry = np.arange(len(row)) + np.repeat(first, count)
+            corner, length = corner[entry], length[entry]
+        if len(row):
             total = length + distance[corner]
-            best = np.minimum.reduceat(total, np.cumsum(count) - count)
+            begin = np.nonzero(np.diff(row, prepend=-1))[0]
+            least[row[begin]] = np.minimum.reduceat(total, begin)
             # of equals the first is written last
-            hit = np.nonzero(total == np.repeat(best, count))[0][::-1]
-            least[site] = best
-            way[np.repeat(site, count)[hit]] = corner[hit]
+            hit = np.nonzero(total == least[row])[0][::-1]
+            way[row[hit]] = corner[hit]
         return least, way
 
     def _result(

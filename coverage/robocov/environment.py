@@ -13,7 +13,7 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.errors import StartError, unknown_name
 from robocov.region import Region
-from robocov.starts import Start, StartSpec
+from robocov.starts import Start, StartSpec, UniformStart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -156,20 +156,21 @@ class Environment:
     def start(self, name: str | None = None) -> Start:
         """Return the start called `name`, by default the map's first.
 
+        Every map has a start ``uniform``, anywhere in the free space, whether the file names it
+        or not; it is the default of a map without starts.
+
         Raises
         ------
         StartError
             When there is none of that name; the message names the nearest.
         """
+        starts = {**self.starts}
+        starts.setdefault("uniform", UniformStart())
         if name is None:
-            if not self.starts:
-                raise StartError(
-                    f"map {self.name!r} has no starts; positions or a start in the map was wanted"
-                )
-            name = next(iter(self.starts))
-        if name not in self.starts:
-            raise StartError(f"map {self.name!r}: {unknown_name('start', name, self.starts)}")
-        return Start(name, self.starts[name], self.free)
+            name = next(iter(starts))
+        if name not in starts:
+            raise StartError(f"map {self.name!r}: {unknown_name('start', name, starts)}")
+        return Start(name, starts[name], self.free)
 
     def _repr_svg_(self) -> str:
         """Show the free space in notebooks."""

@@ -182,7 +182,8 @@ class Simulation:
         expected = (len(self.team), 2)
         if forces.shape != expected:
             raise ParameterError(
-                f"controller {self.controller.name!r}: forces of shape {forces.shape}, but {expected} was wanted"
+                f"controller {self.controller.name!r}: forces of shape {forces.shape}, "
+                f"but {expected} was wanted"
             )
         if not np.isfinite(forces).all():
             robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])

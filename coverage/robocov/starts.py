@@ -171,11 +171,12 @@ def _darts(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float)
 
 def _apart(points: Array, spacing: float) -> Array:
     """Return the points, in their order, that are at least `spacing` from every one returned before."""
-    crowd = cKDTree(points).query_ball_point(points, spacing) if len(points) else []
     keep = np.ones(len(points), dtype=bool)
-    for i, near in enumerate(crowd):
-        if keep[i]:
-            keep[[k for k in near if k > i]] = False
+    if len(points):
+        pairs = cKDTree(points).query_pairs(spacing, output_type="ndarray")
+        for i, k in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
+            if keep[i]:
+                keep[k] = False
     return points[keep]
 
 

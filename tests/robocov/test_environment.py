@@ -73,8 +73,8 @@ def test_starts_are_found_by_name(cluttered: Environment) -> None:
     assert cluttered.start().name == "corner"
     with pytest.raises(StartError, match=r"unknown start 'corner2': did you mean 'corner'\?"):
         cluttered.start("corner2")
-    with pytest.raises(StartError, match="has no starts"):
-        Environment("bare", SQUARE).start()
+    assert Environment("bare", SQUARE).start().name == "uniform"
+    assert cluttered.start("uniform").sample(3).shape == (3, 2)
 
 
 def test_environments_are_equal_by_content() -> None:

@@ -4,6 +4,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def test_the_same_run_in_another_process_has_the_same_bits() -> None:
     room = load_map("rooms")
     here = [digest(Simulation(room, each, room.start().sample(6, seed=3)).run(8.0)) for each in CONTROLLERS]
     for hash_seed in ("0", "1"):
-        script = _PROCESS.format(path=[os.path.dirname(__file__)])
+        script = _PROCESS.format(path=[str(Path(__file__).parent)])
         there = subprocess.run(
             [sys.executable, "-c", script],
             env={**os.environ, "PYTHONHASHSEED": hash_seed},

@@ -430,7 +430,9 @@ def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, fil
         "from robocov_app.cli import main\n"
         "import robocov, robocov_app.run, robocov_app.plots, matplotlib.figure\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
-        f"sys.exit(main(['run', 'rooms', '--duration', '1', '--lattice', '16', '--out', {str(tmp_path / 'run')!r}]))\n"
+        f"out = {str(tmp_path / 'run')!r}\n"
+        "words = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--out', out]\n"
+        "sys.exit(main(words))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr

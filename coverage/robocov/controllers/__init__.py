@@ -132,12 +132,14 @@ def _kind_in_file(name: str) -> type[Any]:
     if class_name not in kinds:
         if class_name in vars(module):
             raise ParameterError(
-                f"controller {shown(name)}: {class_name} has neither a method decide(seen, memory) nor force(own)"
+                f"controller {shown(name)}: {class_name} has neither a method decide(seen, memory) "
+                f"nor force(own)"
             )
         raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
     kind = kinds[class_name]
     if not hasattr(kind, "__dataclass_fields__"):
         raise ParameterError(
-            f"controller {shown(name)}: {class_name} is not a dataclass; write @dataclass(frozen=True) above it"
+            f"controller {shown(name)}: {class_name} is not a dataclass; "
+            f"@dataclass(frozen=True) above it was wanted"
         )
     return kind

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import pytest
+
+from robocov.errors import InputError
+from robocov_app.arguments import one_line, parsed
+
+
+@dataclass
+class Options:
+    """Some options."""
+
+    count: int = 1
+    """How many."""
+    length: float = 0.5
+    """How long."""
+    kind: Literal["a", "b"] = "a"
+    """Which."""
+
+
+def test_words_become_values() -> None:
+    assert parsed(Options, "try", ["--count", "3", "--kind", "b"]) == Options(3, 0.5, "b")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--count 1.5", "--count: '1.5', but a whole number was wanted"),
+        ("--length far", "--length: 'far', but a number was wanted"),
+        ("--kind c", "--kind: 'c', but one of 'a', 'b' was wanted"),
+        ("--kount 3", "unknown option --kount, 3: did you mean --count?"),
+        ("--count", "--count: a value was wanted"),
+    ],
+)
+def test_a_wrong_word_gets_one_line_whatever_the_terminal(
+    words: str, message: str, encoding: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", encoding)
+    monkeypatch.setenv("COLUMNS", "40")
+    with pytest.raises(InputError) as caught:
+        parsed(Options, "try", words.split())
+    assert str(caught.value) == f"{message} (robocov try -h explains)"
+
+
+def test_a_box_in_either_drawing() -> None:
+    lines = "╭─ Oh ─╮\n│ no   │\n│ more │\n│ ──── │\n│ rest │\n╰──────╯"
+    dashes = " Oh \n ---- \n  no  \n  more \n  ---- \n  rest \n"
+    assert one_line(lines) == one_line(dashes) == "no more"

@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import pytest
+
+from robocov.errors import ParameterError
+from robocov_app.compare import gains_for
+
+NAMES = ("rapf", "rpf", "lloyd")
+
+
+def test_a_gain_goes_to_every_controller_that_has_it() -> None:
+    assert gains_for(NAMES, {"k_rep": 1, "k_att": 3}) == [{"k_rep": 1, "k_att": 3}, {"k_rep": 1}, {}]
+
+
+@pytest.mark.parametrize("order", [("k_rep", "rpf.k_rep"), ("rpf.k_rep", "k_rep")])
+def test_what_is_said_of_one_counts_for_more(order: tuple[str, str]) -> None:
+    given = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
+    assert gains_for(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("krep", "--set krep: unknown gain 'krep': did you mean 'k_rep'"),
+        ("lloyd.k_rep", r"--set lloyd.k_rep: unknown gain 'k_rep': did you mean 'k_prop'\?"),
+        ("rap.k_rep", "--set rap.k_rep: unknown controller 'rap': did you mean 'rapf'"),
+    ],
+)
+def test_a_gain_of_nobody_is_refused(key: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        gains_for(NAMES, {key: 1})

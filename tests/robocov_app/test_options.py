@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.errors import ParameterError
+from robocov_app.options import RunOptions, parsed_gains
+
+
+def test_gains_are_json_values() -> None:
+    assert parsed_gains(("k_rep=0.3", "attraction_limit=null", "n=2")) == {
+        "k_rep": 0.3,
+        "attraction_limit": None,
+        "n": 2,
+    }
+
+
+@given(st.lists(st.text(max_size=12), max_size=3))
+def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
+    try:
+        parsed_gains(tuple(texts))
+    except ParameterError as error:
+        assert str(error).startswith("--set")
+        assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("640x480", (640, 480)), ("800X600", (800, 600)), (None, None)]
+)
+def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
+    options = RunOptions(size=text)
+    assert options.picture_size() == size
+    assert options.film_size() == (size or (1280, 720))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"size": "640"},
+        {"size": "1x1"},
+        {"size": "99999x99999"},
+        {"robots": 0},
+        {"lattice": 5000},
+        {"fps": 0},
+        {"film_speed": 0.0},
+        {"dt": 0.0},
+        {"duration": 1e6},
+        {"robots": 10_000, "duration": 100.0},
+    ],
+)
+def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ParameterError, match="wanted"):
+        RunOptions(**wrong)  # type: ignore[arg-type]

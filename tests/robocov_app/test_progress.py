@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from robocov_app.progress import progress
+
+
+def test_one_plain_line_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("counting", 3) as update:
+        for done in (1, 2, 3):
+            update(done)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert re.fullmatch(r"counting: 3 of 3 in \d+\.\d s\n", said.err)
+
+
+def test_quiet_is_quiet(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("counting", 3, quiet=True) as update:
+        update(3)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_bar_in_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress("counting", 3) as update:
+        update(3)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "counting" in said.err
+    assert "3/3" in said.err
