@@ -51,6 +51,8 @@ def prepared(folder: Path, *, overwrite: bool) -> Path:
 def _clear(folder: Path) -> None:
     for name in _OURS:
         (folder / name).unlink(missing_ok=True)
+    for part in folder.glob(".*.part.*"):  # of a run that was killed
+        part.unlink()
     frames = folder / "frames"
     if frames.is_dir():
         for picture in frames.glob("[0-9]*.png"):

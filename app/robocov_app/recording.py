@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
-import struct
 import subprocess
 import tempfile
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias
@@ -170,21 +169,38 @@ def side_by_side(films: Sequence[Iterator[Frame]], gap: int = 2, grey: int = 128
 
 
 def png_bytes(frame: Frame) -> bytes:
-    """Return the frame as a PNG file. The same pixels give the same bytes.
+    """Return the frame as a PNG file. The same pixels give the same bytes."""
+    from PIL import Image
 
-    Written here since it is quicker than the general encoders for drawings of flat colours, and
-    since a full disk is then seen where the bytes are written.
+    file = io.BytesIO()
+    # the lowest levels are several times as fast, and drawings of flat colours stay small all the same
+    Image.fromarray(frame).save(file, format="PNG", compress_level=2)
+    return file.getvalue()
+
+
+def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
+    """Write frames as ``000000.png``, ``000001.png``, ... and hand each on once it is written.
+
+    Parameters
+    ----------
+    folder : path
+        Created when it is not there.
+    frames : iterable of (height, width, 3) RGB
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written. Frames already written stay; each one is whole.
     """
-    height, width, _ = frame.shape
-    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with filter 0: none
-    rows[:, 1:] = frame.reshape(height, 3 * width)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    body = zlib.compress(rows.tobytes(), 2)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {_reason(error)}") from error
+    for number, frame in enumerate(frames):
+        with written(folder / f"{number:06d}.png", durable=False) as part:
+            part.write_bytes(png_bytes(frame))
+        yield frame
 
 
 def save_frames(
@@ -194,12 +210,11 @@ def save_frames(
     total: int | None = None,
     progress: Progress | None = None,
 ) -> int:
-    """Write frames as ``000000.png``, ``000001.png``, ... and return how many.
+    """Write frames as `kept_frames` does, and return how many.
 
     Parameters
     ----------
     folder : path
-        Created when it is not there.
     frames : iterable of (height, width, 3) RGB
     total : int or None
         Number of frames where it is known, for `progress`.
@@ -209,33 +224,13 @@ def save_frames(
     Raises
     ------
     OutputError
-        When the folder cannot be written. Frames already written stay; each one is whole.
+        When the folder cannot be written.
     """
-    folder = Path(folder)
     done = 0
-    path = folder
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for frame in frames:
-            path = folder / f"{done:06d}.png"
-            _write_whole(path, png_bytes(frame))
-            done += 1
-            if progress is not None:
-                progress(done, total)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({_reason(error)})") from error
+    for done, _ in enumerate(kept_frames(folder, frames), start=1):
+        if progress is not None:
+            progress(done, total)
     return done
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def save_film(
@@ -318,7 +313,10 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
         str(part),
     ]
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
+        # in a session of its own: Ctrl-C in a terminal goes to us alone, and we end the film properly
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+        )
         assert process.stdin is not None
         broken = False
         try:

@@ -162,7 +162,10 @@ def save_moving(
     stop: Interruption,
 ) -> None:
     """Write the frames as PNGs, as a film, or both, as the options say; Ctrl-C ends both early."""
-    from robocov_app.recording import save_film, save_frames
+    from robocov_app.recording import kept_frames, save_film, save_frames
+
+    if not (options.frames or options.video):
+        return
 
     def until_stopped() -> Iterator[Frame]:
         for frame in frames():
@@ -170,12 +173,13 @@ def save_moving(
             if stop.requested:
                 return
 
-    if options.frames:
-        with progress("frames", total, quiet=options.json) as update:
-            save_frames(folder / "frames", until_stopped(), progress=lambda done, _: update(done))
-    if options.video and not stop.requested:
-        with progress("film", total, quiet=options.json) as update:
-            save_film(folder / film, until_stopped(), fps=options.fps, progress=lambda done, _: update(done))
+    pictures = folder / "frames"
+    with progress("film" if options.video else "frames", total, quiet=options.json) as update:
+        if not options.video:
+            save_frames(pictures, until_stopped(), progress=lambda done, _: update(done))
+        else:
+            shown = kept_frames(pictures, until_stopped()) if options.frames else until_stopped()
+            save_film(folder / film, shown, fps=options.fps, progress=lambda done, _: update(done))
 
 
 def save_run_moving(run: Run, folder: Path, options: RunOptions, stop: Interruption) -> None:

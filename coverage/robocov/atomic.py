@@ -11,10 +11,11 @@ from robocov.errors import OutputError
 
 
 @contextmanager
-def written(target: Path) -> Iterator[Path]:
+def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
     """Give a path beside `target` to write to; rename it to `target` when all went well, else remove it.
 
-    The path has the suffix of `target`, so that writers which go by it work.
+    The path has the suffix of `target`, so that writers which go by it work. Unless `durable` is
+    switched off, as for one of many frames, the file is on the disk before it gets its name.
 
     Raises
     ------
@@ -24,8 +25,9 @@ def written(target: Path) -> Iterator[Path]:
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         yield part
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
+        if durable:
+            with part.open("rb") as file:
+                os.fsync(file.fileno())
         part.replace(target)
     except OSError as error:
         part.unlink(missing_ok=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from robocov.region import Region
     from robocov.voronoi import VoronoiPartition
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
     """All that the robots know, as a structure of arrays; row i belongs to robot i alone.

@@ -483,6 +483,46 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
     assert (out / "trajectories.png").exists()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
+    """In a terminal Ctrl-C goes to the whole process group, the encoder included."""
+    import imageio_ffmpeg
+
+    out = tmp_path / "run"
+    words = [
+        "run",
+        "square",
+        "--duration",
+        "20",
+        "--lattice",
+        "16",
+        "--film-speed",
+        "0.01",
+        "--size",
+        "480x320",
+    ]
+    process = subprocess.Popen(
+        [*COMMAND, *words, "--video", "--out", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not list(out.glob(".run.*.part.mp4")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    said, complaints = process.communicate(timeout=60)
+    assert process.returncode == 130, complaints
+    assert "Traceback" not in complaints
+    assert "run.mp4" in said
+    assert not list(out.glob(".*")), "no unfinished file is left"
+    film = imageio_ffmpeg.read_frames(str(out / "run.mp4"))
+    assert next(film)["size"] == (480, 320)
+    assert sum(1 for _ in film) > 3
+
+
 def test_a_reader_that_has_had_enough_is_no_error() -> None:
     done = subprocess.run(
         f"{sys.executable} -m robocov_app schema | head -c 10",

@@ -25,9 +25,7 @@ def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
         assert "\n" not in str(error)
 
 
-@pytest.mark.parametrize(
-    ("text", "size"), [("640x480", (640, 480)), ("800X600", (800, 600)), (None, None)]
-)
+@pytest.mark.parametrize(("text", "size"), [("640x480", (640, 480)), ("800X600", (800, 600)), (None, None)])
 def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
     options = RunOptions(size=text)
     assert options.picture_size() == size

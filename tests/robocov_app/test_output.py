@@ -16,16 +16,20 @@ def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
 
 def test_a_folder_in_use_needs_overwrite(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
-    with pytest.raises(
-        InputError, match="not empty; another --out, or --overwrite, was wanted"
-    ):
+    with pytest.raises(InputError, match="not empty; another --out, or --overwrite, was wanted"):
         prepared(tmp_path, overwrite=False)
 
 
 def test_overwrite_removes_results_of_a_comparison_too(tmp_path: Path) -> None:
     part = tmp_path / "rapf"
     part.mkdir()
-    for path in (tmp_path / "comparison.json", part / "run.json", part / "record.npz", tmp_path / "mine.txt"):
+    for path in (
+        tmp_path / "comparison.json",
+        tmp_path / ".run.77.part.mp4",
+        part / "run.json",
+        part / "record.npz",
+        tmp_path / "mine.txt",
+    ):
         path.touch()
     kept = tmp_path / "photos"
     kept.mkdir()
