@@ -177,7 +177,7 @@ class CoverageCost:
             pieces.append((site[seen].astype(np.int32), row[seen].astype(np.int32)))
         site, corner = (np.concatenate([piece[k] for piece in pieces]) for k in (0, 1))
         order = np.argsort(site, kind="stable")
-        self._list_corner = corner[order]
+        self._list_corner = corner[order].astype(np.intp)
         site = site[order]
         self._list_length = np.hypot(
             paths.corner_x[self._list_corner] - self._x[site],
@@ -185,7 +185,7 @@ class CoverageCost:
         )
         self._list_count = np.bincount(site, minlength=sites)
         self._list_first = np.cumsum(self._list_count) - self._list_count
-        self._list_site = site
+        self._listed = np.nonzero(self._list_count)[0]
 
     def __call__(self, positions: Array) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -235,21 +235,21 @@ class CoverageCost:
     def _by_corners(self, site: IntArray, distance: Array) -> tuple[Array, IntArray]:
         """Return the least distance of all sites by way of a corner, and that corner; of `site` at least."""
         least, way = np.full(len(self._x), np.inf), np.zeros(len(self._x), dtype=np.intp)
-        row, corner, length = self._list_site, self._list_corner, self._list_length
+        corner, length = self._list_corner, self._list_length
         # to look at all is quicker than to pick more than half
-        if len(site) <= len(self._x) // 2:
-            count = self._list_count[site]
-            row = np.repeat(site, count)
-            first = self._list_first[site] - (np.cumsum(count) - count)
-            entry = np.arange(len(row)) + np.repeat(first, count)
+        some = self._listed if len(site) > len(self._x) // 2 else site[self._list_count[site] > 0]
+        count = self._list_count[some]
+        begin = np.cumsum(count) - count
+        if some is not self._listed:
+            entry = np.arange(count.sum()) + np.repeat(self._list_first[some] - begin, count)
             corner, length = corner[entry], length[entry]
-        if len(row):
-            total = length + distance[corner]
-            begin = np.nonzero(np.diff(row, prepend=-1))[0]
-            least[row[begin]] = np.minimum.reduceat(total, begin)
+        if len(some):
+            total = length + distance.take(corner)
+            best = np.minimum.reduceat(total, begin)
+            least[some] = best
             # of equals the first is written last
-            hit = np.nonzero(total == least[row])[0][::-1]
-            way[row[hit]] = corner[hit]
+            hit = np.nonzero(total == np.repeat(best, count))[0][::-1]
+            way[np.repeat(some, count)[hit]] = corner[hit]
         return least, way
 
     def _result(

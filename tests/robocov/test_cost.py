@@ -6,6 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov import clusters, robot_views, visibility
+from robocov import cost as cost_module
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import InputError, ParameterError
@@ -121,8 +123,14 @@ def test_a_room_too_small_for_a_site_has_no_mean():
     assert result.gradient.tolist() == [[0.0, 0.0]]
 
 
+@pytest.mark.parametrize("few", [0, 1 << 13])
 @pytest.mark.parametrize("n", [1, 2, 7, 40])
-def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n):
+def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n, few, monkeypatch):
+    # the walls in reach first, or all at once; everything in one piece, or in many
+    monkeypatch.setattr(robot_views, "_FEW", few)
+    if not few:
+        for module in (visibility, clusters, cost_module):
+            monkeypatch.setattr(module, "_PAIRS", 100)
     cost = CoverageCost(OFFICE, lattice=24)
     robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
     result = cost(robots)

@@ -13,8 +13,6 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError
 from robocov.geodesic import Geodesics
-from robocov.orientation import Grid, cross
-from robocov.visibility import Fans, pseudo_angle
 
 sys.path.insert(0, str(Path(__file__).parent))
 import brute_force_geodesic as brute
@@ -225,48 +223,15 @@ def test_points_that_are_no_numbers_are_named():
         Geodesics(SLANTED).place([1.0, 2.0, 3.0])
 
 
-whole = st.integers(-(2**49), 2**49)
-
-
-@settings(max_examples=300, deadline=None)
-@given(whole, whole, st.integers(-3, 3), st.integers(-3, 3), st.integers(1, 5), whole, whole)
-def test_the_side_of_a_line_is_exact(ux, uy, near_x, near_y, multiple, wx, wy):
-    pairs = [(ux // 5 * multiple + near_x, uy // 5 * multiple + near_y), (wx, wy)]
-    for vx, vy in pairs:
-        value = cross(*(np.array([float(c)]) for c in (ux, uy, vx, vy)))[0]
-        exact = ux * vy - uy * vx
-        assert np.sign(value) == (exact > 0) - (exact < 0)
-        assert value == pytest.approx(exact, rel=1e-12, abs=2.0**50)
-
-
-def test_the_grid_keeps_dyadic_numbers():
-    grid = Grid.over(np.array([-3.0, 5.0]), 10.0)
-    points = np.array([[-2.875, 5.5], [7.0, 14.99]])
-    assert grid.unit == 2.0**-44
-    np.testing.assert_allclose(grid.metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
-    np.testing.assert_array_equal(grid.metres(grid.snap(points))[0], points[0])
-
-
-def test_pseudo_angles_grow_with_the_angle():
-    angle = np.linspace(-np.pi / 2, 3 * np.pi / 2, 1000, endpoint=False)
-    values = pseudo_angle(np.cos(angle), np.sin(angle))
-    assert (np.diff(values) > 0.0).all()
-    assert values.min() >= 0.0
-    assert values.max() <= 4.0
-
-
-@pytest.mark.parametrize("bins", [1, 7, 64, 256])
-def test_the_view_does_not_depend_on_the_number_of_bins(bins):
-    rng = np.random.default_rng(2)
-    rings = [rng.uniform(0.1, 0.9, 2) + 0.07 * np.array([[1, 0], [0, 1], [-1, 0.3]]) for _ in range(12)]
-    geodesics = Geodesics(environment(*rings))
-    x, y = np.rint(rng.uniform(size=(2, 40)) * 2.0**48)
-    free = shapely.intersects_xy(geodesics.walls.free, x, y)
-    x, y = x[free], y[free]
-    source, target = np.indices((len(x), len(x))).reshape(2, -1)
-    lines = shapely.linestrings(np.stack([np.c_[x[source], y[source]], np.c_[x[target], y[target]]], axis=1))
-    expected = shapely.covers(geodesics.walls.free, lines) | (source == target)
-    np.testing.assert_array_equal(
-        Fans(geodesics.index, x, y, np.full(len(x), 2.0**49), bins).see(source, x[target], y[target]),
-        expected,
-    )
+def test_a_large_map_agrees_with_the_brute_force():
+    rng = np.random.default_rng(11)
+    turn = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])
+    rings = [rng.uniform(0.05, 0.95, 2) + rng.uniform(0.02, 0.07) * turn for _ in range(24)]
+    where = environment(*rings, [(0.5, 0.5), (0.7, 0.5), (0.6, 0.8)])
+    cost = CoverageCost(where, lattice=10)
+    robots = cost.points[[3, 30, 31, 60]]
+    expected = brute.distances(where.free, robots, cost.points)
+    np.testing.assert_allclose(cost.geodesics.distances(robots, cost.points), expected, rtol=0, atol=1e-12)
+    for count in (1, 4):
+        nearest = expected[:count].min(axis=0)
+        np.testing.assert_allclose(cost(robots[:count]).distances, nearest, rtol=0, atol=1e-12)

@@ -518,9 +518,8 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
     assert "Traceback" not in complaints
     assert "run.mp4" in said
     assert not list(out.glob(".*")), "no unfinished file is left"
-    film = imageio_ffmpeg.read_frames(str(out / "run.mp4"))
-    assert next(film)["size"] == (480, 320)
-    assert sum(1 for _ in film) > 3
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(out / "run.mp4"))
+    assert frames > 3
 
 
 def test_a_reader_that_has_had_enough_is_no_error() -> None:
