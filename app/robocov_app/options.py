@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from robocov.errors import ParameterError, shown
-from robocov.simulation import DEFAULT_DT, check_dt
 
 MOST_ROWS = 2e7
 """Largest record, in moments times robots: about 2 GB."""
@@ -33,7 +32,7 @@ class RunOptions:
     """Seed of the starting positions; every controller gets the same."""
     duration: float = 60.0
     """Simulated seconds."""
-    dt: float = DEFAULT_DT
+    dt: float = 1 / 60
     """Control period in seconds."""
     radius: float = 0.1
     """Radius of a robot in metres."""
@@ -77,6 +76,8 @@ class RunOptions:
         _in_range("--lattice", self.lattice, 2, 2048)
         _in_range("--fps", self.fps, 1, 240)
         _in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        from robocov.simulation import check_dt  # asking for help must not load the physics
+
         check_dt(self.dt)
         moments = self.duration / self.dt
         if moments * self.robots > MOST_ROWS:

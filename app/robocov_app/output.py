@@ -6,7 +6,8 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,26 @@ def prepared(folder: Path, *, overwrite: bool) -> Path:
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
     return folder
+
+
+@contextmanager
+def results(folder: Path, *, overwrite: bool) -> Iterator[Path]:
+    """Give a prepared folder; where the work in it fails with nothing written, it goes again.
+
+    Raises
+    ------
+    InputError, OutputError
+        As `prepared`.
+    """
+    existed = folder.exists()
+    prepared(folder, overwrite=overwrite)
+    try:
+        yield folder
+    except BaseException:
+        if not existed:
+            with suppress(OSError):
+                folder.rmdir()  # fails, as it should, where there is something in it
+        raise
 
 
 def _clear(folder: Path) -> None:

@@ -15,7 +15,7 @@ from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.interruption import Interruption
-from robocov_app.output import write_csv
+from robocov_app.output import finite, write_csv
 from robocov_app.progress import progress
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def evaluated(record: Record, cost: CoverageCost, *, quiet: bool) -> Run:
 
 def save_numbers(run: Run, folder: Path) -> None:
     """Write ``record.npz``, ``run.json`` and ``cost.csv``."""
-    run.record.save(folder, run.summary)
+    run.record.save(folder, finite(run.summary))
     history = run.history
     rows = zip(
         history.time.tolist(),

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import shapely
 
 from robocov.arrays import Array
+from robocov.controllers import CONTROLLERS
 from robocov.controllers.base import Controller
 from robocov.environment import Environment
-from robocov.errors import ParameterError, StartError, shown
+from robocov.errors import ParameterError, RobocovError, StartError, shown
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import Record, Recorder
@@ -108,8 +111,23 @@ class Simulation:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
             seen = self.observe()
-            self._snapshot = Snapshot(seen, self.controller.decide(seen, self._memory))
+            self._snapshot = Snapshot(seen, self._decide(seen))
         return self._snapshot
+
+    def _decide(self, seen: Observations) -> Decision:
+        """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
+        try:
+            return self.controller.decide(seen, self._memory)
+        except RobocovError:
+            raise
+        except Exception as error:
+            if type(self.controller) in CONTROLLERS.values():
+                raise
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            raise ParameterError(
+                f"controller {self.controller.name!r}: {type(error).__name__}: {error} "
+                f"({Path(last.filename).name}, line {last.lineno}) at {self.time:.3f} s"
+            ) from error
 
     def observe(self) -> Observations:
         """Return what each robot knows now."""

@@ -268,6 +268,36 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert not np.isnan(record.goals).any()
 
 
+@pytest.mark.parametrize(
+    ("law", "part"),
+    [
+        (
+            "return 1 / 0",
+            "controller 'Mine': ZeroDivisionError: division by zero (mine.py, line 5) at 0.000 s",
+        ),
+        ("return [1.0]", "controller 'Mine': force(own) gave [1.0], but two numbers in newtons were wanted"),
+        ("return None", "controller 'Mine': force(own) gave nan"),
+        ("return [float('nan'), 0]", "controller 'Mine': force [nan, 0.0] on robot 1 at 0.000 s"),
+        ("return 'east'", "controller 'Mine': ValueError"),
+    ],
+)
+def test_a_controller_that_fails_is_named_with_its_line(
+    law: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    def force(self, own):\n"
+        f"        {law}\n"
+    )
+    out = tmp_path / "run"
+    words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
+    assert part in complaint(capsys, *words)
+    assert not out.exists(), "a folder with nothing in it is not left behind"
+
+
 # -- wrong input -----------------------------------------------------------------------------------
 
 
@@ -440,7 +470,7 @@ def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, fil
     assert len(errors) == 1
     assert "Traceback" not in done.stderr
     assert f"{file}: cannot be written" in errors[0]
-    left = [path.name for path in (tmp_path / "run").iterdir()]
+    left = [path.name for path in (tmp_path / "run").glob("*")]
     assert file not in left
     assert not [name for name in left if "part" in name]
 

@@ -50,3 +50,16 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
 def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match="wanted"):
         RunOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() -> None:
+    from robocov.controllers import FLAGSHIP
+    from robocov.robots import Team
+    from robocov.simulation import DEFAULT_DT
+    from robocov_app.commands.compare import Arguments as Compare
+    from robocov_app.commands.run import Arguments as Run
+    from robocov_app.run import team_of
+
+    assert Run().controller == Compare().controllers[0] == FLAGSHIP
+    assert RunOptions().dt == DEFAULT_DT
+    assert team_of(RunOptions()).to_dict() == Team.homogeneous(6).to_dict()

@@ -5,17 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from robocov.controllers import make_controller
-from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
-from robocov.mapfile import load_map
-from robocov_app.compare import gains_for, rows_of, save_comparison, save_comparison_moving
-from robocov_app.console import console
-from robocov_app.interruption import Interruption
 from robocov_app.options import RunOptions, parsed_gains
-from robocov_app.output import finite, prepared
-from robocov_app.run import Run, evaluated, save_numbers, simulated, starts_of, team_of
+
+if TYPE_CHECKING:
+    from robocov_app.run import Run
 
 INTERRUPTED = 130
 
@@ -37,6 +33,14 @@ class Arguments(RunOptions):
 
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
+    from robocov.controllers import make_controller
+    from robocov.cost import CoverageCost
+    from robocov.mapfile import load_map
+    from robocov_app.compare import gains_for, rows_of, save_comparison, save_comparison_moving
+    from robocov_app.interruption import Interruption
+    from robocov_app.output import finite, prepared, results
+    from robocov_app.run import evaluated, save_numbers, simulated, starts_of, team_of
+
     names = options.controllers
     if not names:
         raise ParameterError("--controllers: none given, but at least one was wanted")
@@ -48,10 +52,10 @@ def command(options: Arguments) -> int:
     folders = [make_controller(name, chosen).name for name, chosen in zip(names, gains, strict=True)]
     starts_of(environment, options)
     team_of(options)
-    out = prepared(options.out or Path(f"{Path(options.map).stem}-comparison"), overwrite=options.overwrite)
+    target = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = CoverageCost(environment, lattice=options.lattice)
     runs: dict[str, Run] = {}
-    with Interruption() as stop:
+    with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
         for name, chosen, folder in zip(names, gains, folders, strict=True):
             run = evaluated(simulated(environment, name, chosen, options, stop), cost, quiet=options.json)
             save_numbers(run, prepared(out / folder, overwrite=True))
@@ -72,6 +76,9 @@ def command(options: Arguments) -> int:
 def print_table(runs: dict[str, Run]) -> None:
     """Print the comparison for people."""
     from rich.table import Table
+
+    from robocov_app.compare import rows_of
+    from robocov_app.console import console
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("", style="bold", no_wrap=True)

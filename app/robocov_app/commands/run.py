@@ -5,23 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from robocov.controllers import FLAGSHIP, make_controller
-from robocov.cost import CoverageCost
-from robocov.mapfile import load_map
-from robocov_app.interruption import Interruption
 from robocov_app.options import RunOptions, parsed_gains
-from robocov_app.output import finite, prepared
-from robocov_app.run import (
-    Run,
-    evaluated,
-    save_numbers,
-    save_pictures,
-    save_run_moving,
-    simulated,
-    starts_of,
-    team_of,
-)
+
+if TYPE_CHECKING:
+    from robocov_app.run import Run
 
 INTERRUPTED = 130
 
@@ -36,22 +25,35 @@ class Arguments(RunOptions):
     Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
     """
 
-    controller: str = FLAGSHIP
+    controller: str = "rapf"
     """A controller by name, or mine.py:MyController."""
 
 
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
+    from robocov.controllers import make_controller
+    from robocov.cost import CoverageCost
+    from robocov.mapfile import load_map
+    from robocov_app.interruption import Interruption
+    from robocov_app.output import finite, results
+    from robocov_app.run import (
+        evaluated,
+        save_numbers,
+        save_pictures,
+        save_run_moving,
+        simulated,
+        starts_of,
+        team_of,
+    )
+
     gains = parsed_gains(options.gains)
     environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
     controller = make_controller(options.controller, gains)
     starts_of(environment, options)
     team_of(options)
-    folder = prepared(
-        options.out or Path(f"{Path(options.map).stem}-{controller.name}"), overwrite=options.overwrite
-    )
-    with Interruption() as stop:
+    out = options.out or Path(f"{Path(options.map).stem}-{controller.name}")
+    with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
         run = evaluated(record, CoverageCost(environment, lattice=options.lattice), quiet=options.json)
         save_numbers(run, folder)

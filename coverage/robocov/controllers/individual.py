@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
 from robocov.region import Region
 from robocov.robots import Team
+from robocov.triangulation import Triangulation
 from robocov.voronoi import VoronoiPartition, partition
 
 if TYPE_CHECKING:
@@ -86,11 +88,11 @@ class Individually:
         self.summary = str(getattr(law, "summary", (kind.__doc__ or "").strip().split("\n")[0]))
 
     def begin(self, region: Region, team: Team) -> None:
-        """Nothing is remembered."""
+        """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
-    def decide(self, seen: Observations, memory: Any) -> Decision:
+    def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
         """Ask the law for each robot's force."""
-        cells = partition(seen.positions, seen.region, seen.neighbours)
+        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory)
         forces = np.empty_like(seen.positions)
         for i in range(len(forces)):
             point = seen.obstacle_points[i]
@@ -104,5 +106,11 @@ class Individually:
                 time=seen.time,
                 _cells=cells,
             )
-            forces[i] = self.law.force(own)
-        return Decision(forces=forces, goals=cells.centroid, cells=cells)
+            force = np.asarray(self.law.force(own), dtype=float)
+            if force.shape != (2,):
+                raise ParameterError(
+                    f"controller {self.name!r}: force(own) gave {shown(force.tolist())}, "
+                    f"but two numbers in newtons were wanted"
+                )
+            forces[i] = force
+        return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=cells.triangulation)
