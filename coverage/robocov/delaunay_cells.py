@@ -16,24 +16,17 @@ generator.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, ComplexArray, IntArray
 from robocov.cell_edges import REGION, CellEdges
 from robocov.region import Region
-
-ComplexArray: TypeAlias = NDArray[np.complex128]
-
-_QHULL_OPTIONS = "Qbb Q5"
-"""As scipy's, without the point at infinity (Qz), which only a team on one circle needs, without leave to
-return doubtful facets (Q12), without the list of points left out (Qc): their cells have no mass; and
-without widening the facets for printing (Q5)."""
+from robocov.triangulation import SENTINELS, Fitted, Triangulation, triangulated
 
 _TOLERANCE = 1e-12
 """How far the masses may miss the region's area, relative to it."""
@@ -42,8 +35,12 @@ _CLOSEST = 1e-5
 """Generators closer to each other than this, relative to the region's diameter, are left to the other
 path: coordinates about the region's centroid round their bisector's direction."""
 
-_SMALLEST_CROSS = 1e-200
-"""Cross product of a flat triangle's sides: its circumcentre is far away, on the apex's side."""
+_SENTINELS_AT = 5.0
+"""Distance of the sentinels from the region's centroid, in times the farthest corner's."""
+
+_ROBOTS_WITHIN = 2.0
+"""How far out robots may be, in the same measure: no sentinel then cuts a cell within the region, and all
+robots lie well within the triangle of the sentinels."""
 
 
 class Sides(NamedTuple):
@@ -93,12 +90,15 @@ class DelaunayCells:
     centroid : (n, 2) m
     sides : Sides
     pieces : Pieces
+    triangulation : Triangulation
+        Of the robots, from which the cells were read.
     """
 
     mass: Array
     centroid: Array
     sides: Sides
     pieces: Pieces
+    triangulation: Triangulation
 
     def edges(self, generators: Array) -> CellEdges:
         """Return the edges of the cells, in order round each cell's centroid."""
@@ -117,29 +117,30 @@ class DelaunayCells:
         return CellEdges(_real(start[order]), _real(end[order]), cell[order], beyond[order])
 
 
-def delaunay_cells(generators: Array, region: Region) -> DelaunayCells | None:
+def delaunay_cells(
+    generators: Array, region: Region, warm: Triangulation | None = None
+) -> DelaunayCells | None:
     """Return the cells V_i of equation (1) within `region`, or None where only clipping is safe.
 
-    That is when the generators are collinear, coincident, nearly so for Qhull's arithmetic, outside the
-    region, or when a Voronoi vertex lies on the region's boundary so closely that rounding decides.
+    That is when generators coincide, or nearly so for this arithmetic, when they are outside the region,
+    or when a Voronoi vertex lies on the region's boundary so closely that rounding decides.
 
     Parameters
     ----------
     generators : (n, 2) m
-        C-contiguous. Fewer than four cannot be triangulated here.
+        C-contiguous.
+    warm : Triangulation or None
+        Of cells before, from which to start.
     """
     frame = _frame(region)
-    z = _complex(generators) - frame.origin
-    try:
-        triangulation = Delaunay(_real(z), qhull_options=_QHULL_OPTIONS)
-    except (QhullError, ValueError):
+    z = frame.points(generators)
+    if z is None:
         return None
-    ends, apexes, hull = _paired_edges(triangulation.simplices, triangulation.neighbors)
-    p = z.take(ends)
+    fitted = triangulated(z, warm)
+    if fitted is None:
+        return None
+    ends, p, reach = _between_robots(fitted)
     difference = p[1] - p[0]
-    reach = _cotangents(p, z.take(apexes, mode="clip"))
-    np.putmask(reach[1], hull, np.inf)
-
     limits = frame.limits(p[0] + p[1], difference)
     if limits is None:
         return None
@@ -158,7 +159,15 @@ def delaunay_cells(generators: Array, region: Region) -> DelaunayCells | None:
         return None
     sides = Sides(ends, difference, reach, width)
     sums = _mass_and_centroid(sides, square, pieces, generators, frame)
-    return None if sums is None else DelaunayCells(*sums, sides, pieces)
+    return None if sums is None else DelaunayCells(*sums, sides, pieces, fitted.triangulation)
+
+
+def _between_robots(fitted: Fitted) -> tuple[IntArray, ComplexArray, Array]:
+    """Return the edges among robots: ends, their places, and the cotangents at the apexes, (2, e) each."""
+    ends = fitted.triangulation.ends
+    count = int(ends[1].searchsorted(fitted.triangulation.robots))
+    angles = fitted.angles[:, :count]
+    return ends[:, :count], fitted.places[:, :count], np.asarray(angles.real / angles.imag)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,6 +181,9 @@ class _Frame:
     area : float, m²
     closest : float, m²
         Square of the distance below which two generators are left to the other path.
+    farthest : float, m
+        Largest coordinate with which a generator is not left to the other path.
+    sentinels : (3,) m
     corners : (k,) m and angles : (k,) rad
         Sorted by the angle about the origin.
     normals, turned : (k, 2)
@@ -183,11 +195,21 @@ class _Frame:
     origin: complex
     area: float
     closest: float
+    farthest: float
+    sentinels: ComplexArray
     corners: ComplexArray
     angles: Array
     normals: Array
     turned: Array
     offsets: Array
+
+    def points(self, generators: Array) -> ComplexArray | None:
+        """Return generators and sentinels about the origin, (n + 3,) m; None when a generator is far out."""
+        z = np.concatenate([_complex(generators), self.sentinels])
+        z[:-SENTINELS] -= self.origin
+        size = np.maximum.reduce(np.abs(z[:-SENTINELS].view(np.float64)), initial=0.0)
+        # not a number fails too
+        return z if size <= self.farthest else None
 
     def limits(self, middles: ComplexArray, directions: ComplexArray) -> Array | None:
         """Return how far one can go from m along i d and along -i d, (2, e), in |d| / 2; None outside.
@@ -217,63 +239,19 @@ def _frame(region: Region) -> _Frame:
     angles = np.arctan2(corners.imag, corners.real)
     order = angles.argsort()
     normals = region.normals
+    radius = float(np.abs(corners).max())
     return _Frame(
         origin=complex(*region.centroid),
         area=region.area,
         closest=(_CLOSEST * region.diameter) ** 2,
+        farthest=_ROBOTS_WITHIN * radius / math.sqrt(2.0),
+        sentinels=_SENTINELS_AT * radius * np.exp(1j * (0.3 + 2.0 * np.pi / 3.0 * np.arange(3))),
         corners=corners[order],
         angles=angles[order],
         normals=normals,
         turned=np.column_stack([normals[:, 1], -normals[:, 0]]),
         offsets=2.0 * (region.offsets - normals @ region.centroid)[:, None],
     )
-
-
-@lru_cache(maxsize=8)
-def _half_edge_tables(capacity: int) -> tuple[IntArray, NDArray[np.uint32]]:
-    """Return, for the half-edge opposite corner k of triangle t, number 3 t + k, its ends and its triangle.
-
-    The ends are numbers of corners, (2, 3 capacity): the next and the last corner counter-clockwise.
-    """
-    corner = np.arange(3 * capacity)
-    triangle = corner // 3 * 3
-    ends = np.stack([triangle + (corner + 1) % 3, triangle + (corner + 2) % 3])
-    return ends, (corner // 3).astype(np.uint32).reshape(-1, 3)
-
-
-def _paired_edges(
-    simplices: NDArray[np.int32], neighbours: NDArray[np.int32]
-) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
-    """Return each Delaunay edge once: its ends (2, e), the apexes left and right of it (2, e), the hull (e,).
-
-    Scipy's triangles are counter-clockwise, and neighbour k lies beyond the edge opposite corner k.
-    The apex right of a hull edge means nothing, and may be no index at all.
-    """
-    count = len(simplices)
-    table, triangle = _half_edge_tables(1 << count.bit_length())
-    # of the two half-edges of an edge the one in the triangle of lower number; -1 as unsigned is the largest
-    half = (neighbours.view(np.uint32) > triangle[:count]).ravel().nonzero()[0]
-    corners = simplices.astype(np.intp)
-    flat = corners.ravel()
-    ends = flat.take(table.take(half, axis=1))
-    apexes = np.empty_like(ends)
-    flat.take(half, out=apexes[0], mode="clip")
-    across = neighbours.ravel().take(half)
-    total = corners[:, 0] + corners[:, 1]
-    total += corners[:, 2]
-    far = total.take(across)
-    far -= ends[0]
-    np.subtract(far, ends[1], out=apexes[1])
-    return ends, apexes, across < 0
-
-
-def _cotangents(p: ComplexArray, apexes: ComplexArray) -> Array:
-    """Return the cotangents of the angles at the apexes, (2, e); overwrites `apexes`."""
-    first = p - apexes
-    second = np.subtract(p[::-1], apexes, out=apexes)
-    np.conjugate(first, out=first)
-    first *= second
-    return np.asarray(first.real / np.maximum(first.imag, _SMALLEST_CROSS))
 
 
 def _boundary_pieces(

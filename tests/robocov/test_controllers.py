@@ -170,7 +170,8 @@ def test_lloyd_drives_within_its_limits() -> None:
     goal = REGION.centroid
     heading = (goal - positions[0]) / np.hypot(*(goal - positions[0]))
     seen = Observations(positions, heading[None] * 1.0, Neighbours(1), np.full((1, 2), np.nan), REGION)
-    force = Lloyd().decide(seen, Team.homogeneous(1)).forces
+    law = Lloyd()
+    force = law.decide(seen, law.begin(REGION, Team.homogeneous(1))).forces
     np.testing.assert_allclose(force, 2.0 * heading[None], rtol=1e-9)
 
 

@@ -26,20 +26,6 @@ def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:
         assert_same_ring(a, b, 1e-9)
 
 
-def test_a_triangulation_that_is_not_delaunay_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = np.array([[1.0, 3.0], [3.0, 2.0], [5.0, 3.0], [3.0, 4.0]])
-    assert delaunay_cells(points, SQUARE) is not None
-
-    class LongDiagonal:
-        simplices = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-        neighbors = np.array([[-1, 1, -1], [-1, -1, 0]], dtype=np.int32)
-
-        def __init__(self, *_: object, **__: object) -> None: ...
-
-    monkeypatch.setattr("robocov.delaunay_cells.Delaunay", LongDiagonal)
-    assert delaunay_cells(points, SQUARE) is None
-
-
 @pytest.mark.parametrize("name", REGIONS)
 @pytest.mark.parametrize("n", [4, 6, 20, 50, 200])
 def test_both_paths_agree(n: int, name: str) -> None:

@@ -11,7 +11,24 @@ from robocov.controllers.gains import gain, validate_gains
 from robocov.observation import Decision, Observations
 from robocov.region import Region
 from robocov.robots import Team
+from robocov.triangulation import Triangulation
 from robocov.voronoi import partition
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LloydMemory:
+    """What the robots remember.
+
+    Attributes
+    ----------
+    team : Team
+        A robot knows its own mass, viscosity and largest speed.
+    triangulation : Triangulation or None
+        From which the next cells start.
+    """
+
+    team: Team
+    triangulation: Triangulation | None = None
 
 
 @dataclass(frozen=True)
@@ -35,14 +52,14 @@ class Lloyd:
     def __post_init__(self) -> None:
         validate_gains(self)
 
-    def begin(self, region: Region, team: Team) -> Team:
-        """Return the team: a robot knows its own mass, viscosity and largest speed."""
-        return team
+    def begin(self, region: Region, team: Team) -> LloydMemory:
+        """Return what the robots know of themselves."""
+        return LloydMemory(team)
 
-    def decide(self, seen: Observations, memory: Team) -> Decision:
+    def decide(self, seen: Observations, memory: LloydMemory) -> Decision:
         """Return the forces that drive each robot to its centroid."""
-        team = memory
-        cells = partition(seen.positions, seen.region, seen.neighbours)
+        team = memory.team
+        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory.triangulation)
         offset = cells.centroid - seen.positions
         distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
         speed_per_metre = np.minimum(self.k_prop, team.max_speed / np.maximum(distance, 1e-300))
@@ -50,5 +67,9 @@ class Lloyd:
         drive = (wanted - seen.velocities) * (team.mass / self.response_time)[:, None]
         forces = drive + seen.velocities * team.viscosity[:, None]
         return Decision(
-            forces=forces, goals=cells.centroid, terms={"attraction": forces}, cells=cells, memory=team
+            forces=forces,
+            goals=cells.centroid,
+            terms={"attraction": forces},
+            cells=cells,
+            memory=LloydMemory(team, cells.triangulation),
         )

@@ -11,6 +11,7 @@ from robocov.observation import Decision, Observations
 from robocov.potential import attractive_force
 from robocov.region import Region
 from robocov.robots import Team
+from robocov.triangulation import Triangulation
 from robocov.voronoi import partition
 
 
@@ -43,11 +44,11 @@ class Rapf:
         validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> None:
-        """Nothing is remembered."""
+        """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
-    def decide(self, seen: Observations, memory: None) -> Decision:
+    def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
         """Return the forces (25) + (27)."""
-        cells = partition(seen.positions, seen.region, seen.neighbours)
+        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory)
         attraction = attractive_force(cells.centroid - seen.positions, self.k_att, self.attraction_limit)
         robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
         obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
@@ -56,4 +57,5 @@ class Rapf:
             goals=cells.centroid,
             terms={"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle},
             cells=cells,
+            memory=cells.triangulation,
         )

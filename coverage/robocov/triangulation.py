@@ -1,0 +1,264 @@
+"""The Delaunay triangulation that the cells are read from, carried from step to step and mended by flips.
+
+Robots move little between two steps, and few Delaunay edges change. So the last triangulation is tried
+on the new places: where the two angles opposite an edge sum to more than pi, the edge is flipped to the
+other diagonal (Lawson 1977), until none is left. Only then is the result used: every edge is locally
+Delaunay and every triangle turns left, within a boundary that never moves, which makes it a Delaunay
+triangulation. Where that does not come about quickly, all is triangulated anew, by Qhull.
+
+The boundary is a triangle of three *sentinels*, far enough out to cut no cell. A robot that enters or
+leaves the convex hull of the team is then a flip like any other, no edge that counts lacks a triangle on
+either side, and n robots make 3 n edges, always (those among the sentinels are not stored).
+
+Plane vectors are complex numbers, ``x + i y``. An angle is kept as conj(a) b, of the vectors a and b along
+its sides: adding angles is multiplying these, and the imaginary part's sign tells left from right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import Delaunay, QhullError
+
+from robocov.arrays import ComplexArray, IntArray
+
+SENTINELS = 3
+"""Points beyond the robots, last in every array of points."""
+
+_QHULL_OPTIONS = "Qbb Q5"
+"""As scipy's, without the point at infinity (Qz), which only points on one circle need, without leave to
+return doubtful facets (Q12), without the list of points left out (Qc): their cells have no mass; and
+without widening the facets for printing (Q5)."""
+
+_ROUNDING = 4e-15
+"""Bound, in radians, on what rounding adds to the sum of two angles. Within it either diagonal will do:
+the Voronoi edge between the two cells has no length."""
+
+_MOST_FLIPS = 2, 1 / 25
+"""Flips, and more for each robot, beyond which Qhull is quicker."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triangulation:
+    """Which robots and sentinels an edge joins, and which see it; no places.
+
+    There is one order only: two triangulations with the same edges are the same arrays. What is
+    computed from them is then the same to the last bit, by whatever flips they came about.
+
+    Attributes
+    ----------
+    ends : (2, 3 n)
+        The ends of each edge, the lower number first. Ascending by the second, then the first; so edges
+        among robots, numbers 0 to n - 1, come before those to sentinels, numbers n to n + 2.
+    apexes : (2, 3 n)
+        The third corners of the triangles to the left and to the right of the edge.
+    """
+
+    ends: IntArray
+    apexes: IntArray
+
+    @classmethod
+    def ordered(cls, ends: IntArray, apexes: IntArray) -> Triangulation:
+        """Return the triangulation of these edges; in each column of `ends` the lower number is first."""
+        order = _keys(ends).argsort(kind="stable")
+        columns = ends[:, order], apexes[:, order]
+        for each in columns:
+            each.setflags(write=False)
+        return cls(*columns)
+
+    @property
+    def robots(self) -> int:
+        """Their number, n."""
+        return int(self.ends.shape[1]) // 3
+
+
+class Fitted(NamedTuple):
+    """A Delaunay triangulation at its places.
+
+    Attributes
+    ----------
+    triangulation : Triangulation
+    places : (2, 3 n) m
+        Of the ends of the edges.
+    angles : (2, 3 n) m²
+        At the apexes: |a| |b| times the cosine, and the sine.
+    """
+
+    triangulation: Triangulation
+    places: ComplexArray
+    angles: ComplexArray
+
+
+def triangulated(points: ComplexArray, warm: Triangulation | None = None) -> Fitted | None:
+    """Return the Delaunay triangulation of robots and sentinels; None where rounding decides too much.
+
+    Parameters
+    ----------
+    points : (n + 3,) m
+        The robots within the triangle of the sentinels, which are last and counter-clockwise.
+    warm : Triangulation or None
+        What may be nearly right. It changes how long this takes, not what comes out; among cocircular
+        points, where there is a choice, it makes the choice.
+    """
+    robots = points.size - SENTINELS
+    if warm is not None and warm.robots == robots:
+        fitted = _mended(warm, points, most_flips=_MOST_FLIPS[0] + int(_MOST_FLIPS[1] * robots))
+        if fitted is not None:
+            return fitted
+    cold = _by_qhull(points)
+    # Qhull decides the nearly cocircular at random within its own, larger tolerance
+    return None if cold is None else _mended(cold, points, most_flips=robots)
+
+
+def _mended(triangulation: Triangulation, points: ComplexArray, most_flips: int) -> Fitted | None:
+    """Return the triangulation after the flips that make it Delaunay; None after too many, or in doubt."""
+    places = points.take(triangulation.ends)
+    angles = _angles(places, points.take(triangulation.apexes))
+    wrong = _not_delaunay(angles)
+    if not wrong.size:
+        upright = np.minimum.reduce(angles.imag, axis=None) > 0.0
+        return Fitted(triangulation, places, angles) if upright else None
+
+    flips = _Flips(triangulation)
+    while wrong.size:
+        # an edge beside one that was flipped waits for the next round, which sees what became of it
+        changed: set[int] = set()
+        for edge in wrong.tolist():
+            if edge not in changed:
+                beside = flips.flip(edge) if flips.count < most_flips else None
+                if beside is None:
+                    return None
+                changed.update(beside)
+        near = np.array(sorted(changed))
+        ends, apexes = flips.ends[:, near], flips.apexes[:, near]
+        wrong = near[_not_delaunay(_angles(points.take(ends), points.take(apexes)))]
+    return _mended(Triangulation.ordered(flips.ends, flips.apexes), points, most_flips=0)
+
+
+def _angles(places: ComplexArray, apexes: ComplexArray) -> ComplexArray:
+    """Return the angles at the apexes, (2, e) m²; overwrites `apexes`."""
+    first = places - apexes
+    second = np.subtract(places[::-1], apexes, out=apexes)
+    np.conjugate(first, out=first)
+    first *= second
+    return first
+
+
+def _not_delaunay(angles: ComplexArray) -> IntArray:
+    """Return the edges, ascending, whose opposite angles sum to more than pi by more than rounding.
+
+    That one angle belongs to a triangle turned over, and counts more than pi by itself, is included.
+    """
+    sums = angles[0] * angles[1]
+    wrong: IntArray = (sums.imag < 0.0).nonzero()[0]
+    if wrong.size:
+        sums = sums[wrong]
+        wrong = wrong[sums.imag < -_ROUNDING * np.abs(sums)]
+    return wrong
+
+
+class _Flips:
+    """A triangulation while edges of it are flipped."""
+
+    def __init__(self, triangulation: Triangulation) -> None:
+        self.ends = triangulation.ends.copy()
+        self.apexes = triangulation.apexes.copy()
+        self.count = 0
+        self._robots = triangulation.robots
+        self._keys = _keys(triangulation.ends)
+        self._moved: dict[int, int] = {}
+
+    def flip(self, edge: int) -> tuple[int, ...] | None:
+        """Replace `edge` by the other diagonal of its two triangles.
+
+        Returns
+        -------
+        tuple of int, or None
+            The edge and those beside it, whose apexes have changed; None when there is such an edge
+            already: then the two triangles do not make a convex quadrilateral.
+        """
+        i, j = self.ends[:, edge].tolist()
+        left, right = self.apexes[:, edge].tolist()
+        if min(left, right) >= self._robots or self._find(left, right) >= 0:
+            return None
+        changed = [edge]
+        for a, b, old, new in (
+            (i, left, j, right),
+            (j, left, i, right),
+            (i, right, j, left),
+            (j, right, i, left),
+        ):
+            beside = self._find(a, b)
+            if beside >= 0:
+                column = self.apexes[:, beside]
+                column[int(column[0] != old)] = new
+                changed.append(beside)
+        self._moved[_key(i, j)] = -1
+        self._moved[_key(left, right)] = edge
+        # seen from the left apex towards the right one, j lies on the left
+        up = left < right
+        self.ends[:, edge] = (left, right) if up else (right, left)
+        self.apexes[:, edge] = (j, i) if up else (i, j)
+        self.count += 1
+        return tuple(changed)
+
+    def _find(self, a: int, b: int) -> int:
+        """Return the number of the edge from a to b; -1 when there is none, or it joins two sentinels."""
+        key = _key(a, b)
+        if key in self._moved:
+            return self._moved[key]
+        place = int(self._keys.searchsorted(key))
+        return place if place < self._keys.size and self._keys[place] == key else -1
+
+
+def _key(a: int, b: int) -> int:
+    """Return a number that is this pair's alone; it grows with the higher, then with the lower of the two."""
+    return a * a + b if a > b else b * b + a
+
+
+def _keys(ends: IntArray) -> IntArray:
+    return np.asarray(ends[1] * ends[1] + ends[0])
+
+
+def _by_qhull(points: ComplexArray) -> Triangulation | None:
+    """Return Qhull's triangulation; None when it left points out, or none of it is left over."""
+    robots = points.size - SENTINELS
+    try:
+        found = Delaunay(points.view(np.float64).reshape(-1, 2), qhull_options=_QHULL_OPTIONS)
+    except (QhullError, ValueError):
+        return None
+    simplices, neighbours = found.simplices, found.neighbors
+    if len(simplices) != 2 * robots + 1:
+        return None
+    # Scipy's triangles turn left, and neighbour k lies beyond the edge opposite corner k. Of the two
+    # half-edges of an edge the one in the triangle of lower number; none where there is no other (-1)
+    table, triangle = _half_edge_tables(robots)
+    half = (neighbours > triangle).ravel().nonzero()[0]
+    if half.size != 3 * robots:
+        return None
+    corners = simplices.astype(np.intp)
+    flat = corners.ravel()
+    ends = flat.take(table.take(half, axis=1))
+    total = corners[:, 0] + corners[:, 1]
+    total += corners[:, 2]
+    apexes = np.empty_like(ends)
+    flat.take(half, out=apexes[0], mode="clip")
+    np.subtract(total.take(neighbours.ravel().take(half)), ends[0] + ends[1], out=apexes[1])
+    turned = ends[0] > ends[1]
+    return Triangulation.ordered(np.where(turned, ends[::-1], ends), np.where(turned, apexes[::-1], apexes))
+
+
+@lru_cache(maxsize=8)
+def _half_edge_tables(robots: int) -> tuple[IntArray, IntArray]:
+    """Return, for the half-edge opposite corner k of triangle t, number 3 t + k, its ends and its triangle.
+
+    The ends are numbers of corners, (2, 6 n + 3): the next and the last corner counter-clockwise. The
+    triangles are numbered down the rows, (2 n + 1, 1).
+    """
+    corner = np.arange(6 * robots + 3)
+    triangle = corner // 3 * 3
+    ends = np.stack([triangle + (corner + 1) % 3, triangle + (corner + 2) % 3])
+    return ends, np.arange(2 * robots + 1)[:, None]
