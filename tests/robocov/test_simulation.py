@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -228,3 +229,50 @@ def test_impossible_control_periods_are_refused(empty: Environment, dt: float) -
 def test_team_and_starts_must_agree(empty: Environment) -> None:
     with pytest.raises(ParameterError, match="team: 3 robots, but 1 starts"):
         Simulation(empty, Rapf(), [[1.0, 1.0]], Team.homogeneous(3))
+
+
+def test_a_run_follows_the_equations_of_motion() -> None:
+    """(23)-(28) written once more, plainly, and integrated by scipy: a run converges to it with its step."""
+    from scipy.integrate import solve_ivp
+
+    side, k_rep, rho_0, k_att, nu = 6.0, 0.3, 2.0, 0.5, 2.0
+    square = shapely.box(0, 0, side, side)
+    starts = np.array([[1.0, 1.2], [1.8, 1.0], [1.5, 2.1]])
+
+    def force(points: np.ndarray, i: int) -> np.ndarray:
+        here = points[i]
+        cell = square
+        total = np.zeros(2)
+        walls = [(here[0], 0.0), (here[0], side), (0.0, here[1]), (side, here[1])]
+        sources = [min(walls, key=lambda wall: np.hypot(*(here - wall)))]
+        for j, other in enumerate(points):
+            if j != i:
+                sources.append(other)
+                middle, along = (here + other) / 2, (other - here) / np.hypot(*(other - here))
+                across = np.array([-along[1], along[0]])
+                half = [middle + 99 * across, middle - 99 * across, middle - 99 * across - 99 * along]
+                cell = cell.intersection(shapely.Polygon([*half, middle + 99 * across - 99 * along]))
+        for source in sources:
+            away = here - np.asarray(source)
+            rho = np.hypot(*away)
+            if rho < rho_0:
+                total += k_rep * (1 / rho - 1 / rho_0) * away / rho**3
+        goal = np.array(cell.centroid.coords[0])
+        return total + k_att * (goal - here) * np.hypot(*(goal - here)) ** 2
+
+    def motion(time: float, state: np.ndarray) -> np.ndarray:
+        points, velocities = state.reshape(2, 3, 2)
+        forces = np.array([force(points, i) for i in range(3)])
+        return np.concatenate([velocities.ravel(), (forces - nu * velocities).ravel()])
+
+    exact = solve_ivp(motion, (0, 3), np.concatenate([starts.ravel(), np.zeros(6)]), rtol=1e-6, atol=1e-8)
+    expected = exact.y[:6, -1].reshape(3, 2)
+    room = Environment("room", ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side)))
+    team = Team.homogeneous(3, max_speed=100.0, max_acceleration=1e4, viscosity=nu, sensing_range=5.0)
+    law = Rapf(k_rep=k_rep, rho_0=rho_0, k_att=k_att, attraction_limit=None)
+    errors = [
+        np.abs(Simulation(room, law, starts, team, dt).run(3.0).positions[-1] - expected).max()
+        for dt in (1 / 60, 1 / 240)
+    ]
+    assert errors[1] < 0.005
+    assert errors[1] < 0.4 * errors[0], "the error shrinks with the step"
