@@ -11,8 +11,8 @@ from robocov.arrays import Array, IntArray
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_LEAVES = 16
-"""Leaves in a block."""
+_FAN = 8
+"""Children of a node."""
 
 _PAIRS = 1 << 18
 """Pairs looked at in one piece, which bounds the memory."""
@@ -30,7 +30,7 @@ def coherent_order(column: IntArray, row: IntArray) -> IntArray:
 
 
 class Clusters:
-    """Points in a coherent order, `leaf` consecutive ones in a leaf, 16 leaves in a block.
+    """Points in a coherent order: runs of `leaf` of them are leaves, runs of 8 leaves nodes, and so on.
 
     Parameters
     ----------
@@ -42,27 +42,26 @@ class Clusters:
         self._count = len(x)
         self._leaf = leaf
         rows = -(-self._count // leaf)
-        blocks = -(-rows // _LEAVES)
-        # the last point and the last leaf fill up what is missing
+        # the last point fills up the last leaf, the last child the last node
         slots = np.minimum(np.arange(rows * leaf), self._count - 1).reshape(rows, leaf)
         self._x, self._y = x[slots], y[slots]
-        padded = np.minimum(np.arange(blocks * _LEAVES), rows - 1)
-        ends = [
-            side
-            for values in (self._x, self._y)
-            for side in (values.min(axis=1, initial=np.inf), values.max(axis=1, initial=-np.inf))
-        ]
-        self._leaf_box = np.array(ends)[:, padded].reshape(4, blocks, _LEAVES)
-        low_x, high_x, low_y, high_y = self._leaf_box
-        self._block_box = np.array(
-            [low_x.min(axis=1), high_x.max(axis=1), low_y.min(axis=1), high_y.max(axis=1)]
-        )
+        self._boxes: list[Array] = []
+        if rows:
+            x, y = self._x, self._y
+            boxes = np.array([x.min(axis=1), x.max(axis=1), y.min(axis=1), y.max(axis=1)])
+            while not self._boxes or boxes.shape[1] > 1:
+                children = _filled(boxes)
+                self._boxes.insert(0, children)
+                low_x, high_x, low_y, high_y = children
+                boxes = np.array(
+                    [low_x.min(axis=1), high_x.max(axis=1), low_y.min(axis=1), high_y.max(axis=1)]
+                )
 
     def nearest(self, x: Array, y: Array) -> tuple[IntArray, Array]:
         """Return each point's nearest of (n,) others, the first of equals, and its squared distance."""
         robot = np.zeros(self._x.shape, dtype=np.intp)
         best = np.full(self._x.shape, np.inf)
-        for leaf, other in self._leaves_near(x, y):
+        for leaf, other in self._descend(x, y, None):
             distance2 = (self._x[leaf] - x[other, None]) ** 2 + (self._y[leaf] - y[other, None]) ** 2
             begin = np.nonzero(np.diff(leaf, prepend=-1))[0]
             best[leaf[begin]] = np.minimum.reduceat(distance2, begin, axis=0)
@@ -70,33 +69,6 @@ class Clusters:
             pair, slot = (part[::-1] for part in np.nonzero(distance2 == best[leaf]))
             robot[leaf[pair], slot] = other[pair]
         return robot.ravel()[: self._count], best.ravel()[: self._count]
-
-    def _leaves_near(self, x: Array, y: Array) -> Iterator[tuple[IntArray, IntArray]]:
-        """Yield pairs of a leaf and an other that may be the nearest to a point of it, sorted."""
-        blocks = self._block_box.shape[1]
-        step = max(1, _PAIRS // (len(x) * _LEAVES))
-        for begin in range(0, blocks, step):
-            box = self._block_box[:, begin : begin + step, None]
-            near, far = _nearest_and_farthest(box, x, y)
-            block, other = np.nonzero(near <= far.min(axis=1)[:, None])
-            if not len(block):
-                continue
-            near, far = _nearest_and_farthest(
-                self._leaf_box[:, begin + block], x[other, None], y[other, None]
-            )
-            count = np.bincount(block)
-            least = np.minimum.reduceat(far, np.cumsum(count) - count, axis=0)
-            pair, leaf = np.nonzero(near <= least[block])
-            leaf += (begin + block[pair]) * _LEAVES
-            leaf, other = _sorted_pairs(leaf, other[pair], len(self._x))
-            count = np.cumsum(np.bincount(leaf, minlength=len(self._x)))
-            cut = 0
-            while cut < len(leaf):
-                done = cut
-                # whole leaves, as many as make a piece
-                last = int(np.searchsorted(count, done + _PAIRS // self._leaf, side="right"))
-                cut = max(int(count[last - 1]) if last else 0, int(count[leaf[done]]))
-                yield leaf[done:cut], other[done:cut]
 
     def within(self, x: Array, y: Array, bound: Array) -> tuple[IntArray, IntArray, Array]:
         """Return the pairs of a point and one of (n,) others that are less than `bound` (m,) apart.
@@ -108,43 +80,77 @@ class Clusters:
         """
         limit = np.zeros(self._x.shape)
         limit.ravel()[: self._count] = bound * bound
-        leaf_limit = np.zeros(self._leaf_box.shape[1:])
-        leaf_limit.ravel()[: len(limit)] = limit.max(axis=1, initial=0.0)
+        limits: list[Array] = []
+        largest = limit.max(axis=1, initial=0.0)
+        for _ in self._boxes:
+            limits.insert(0, _filled(largest[None])[0])
+            largest = limits[0].max(axis=1)
         pieces = [(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0))]
-        wanted = np.nonzero(leaf_limit.any(axis=1))[0]
-        step = max(1, _PAIRS // (len(x) * _LEAVES))
-        for begin in range(0, len(wanted), step):
-            blocks = wanted[begin : begin + step]
-            near = _nearest(self._block_box[:, blocks, None], x, y)
-            block, other = np.nonzero(near < leaf_limit[blocks].max(axis=1)[:, None])
-            block = blocks[block]
-            near = _nearest(self._leaf_box[:, block], x[other, None], y[other, None])
-            pair, leaf = np.nonzero(near < leaf_limit[block])
-            leaf, other = leaf + block[pair] * _LEAVES, other[pair]
-            rows = _PAIRS // self._leaf
-            for at in range(0, len(leaf), rows):
-                part, with_ = leaf[at : at + rows], other[at : at + rows]
-                distance2 = (self._x[part] - x[with_, None]) ** 2 + (self._y[part] - y[with_, None]) ** 2
-                pair, slot = np.nonzero(distance2 < limit[part])
-                pieces.append((part[pair] * self._leaf + slot, with_[pair], np.sqrt(distance2[pair, slot])))
+        for leaf, other in self._descend(x, y, limits):
+            distance2 = (self._x[leaf] - x[other, None]) ** 2 + (self._y[leaf] - y[other, None]) ** 2
+            pair, slot = np.nonzero(distance2 < limit[leaf])
+            point = leaf[pair] * self._leaf + slot
+            pieces.append((point, other[pair], np.sqrt(distance2[pair, slot])))
         point, other, distance = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         return point, other, distance
 
+    def _descend(
+        self,
+        x: Array,
+        y: Array,
+        limits: list[Array] | None,
+        above: tuple[int, IntArray, IntArray] | None = None,
+    ) -> Iterator[tuple[IntArray, IntArray]]:
+        """Yield pairs of a leaf and an other that may be near, sorted, from the pairs of the level `above`.
 
-def _sorted_pairs(leaf: IntArray, other: IntArray, leaves: int) -> tuple[IntArray, IntArray]:
-    """Return the pairs by leaf, in the order that they had, without the leaves that only fill up a block."""
-    # numpy sorts 16 bit integers in linear time
-    order = np.argsort(leaf.astype(np.uint16) if leaves < 1 << 16 else leaf, kind="stable")
-    order = order[: np.searchsorted(leaf[order], leaves)]
-    return leaf[order], other[order]
+        With limits (squared distances for every node of every level) near means nearer than that,
+        without it means that no other is surely nearer to all of the leaf.
+        """
+        level, node, other = above or (0, np.zeros(len(x), dtype=np.intp), np.arange(len(x)))
+        if level == len(self._boxes):
+            yield from ((node[part], other[part]) for part in _runs(node, _PAIRS // self._leaf) if level)
+            return
+        box = self._boxes[level]
+        for part in _runs(node, _PAIRS // _FAN):
+            parent, them = node[part], other[part]
+            near, far = _nearest_and_farthest(box[:, parent], x[them, None], y[them, None])
+            if limits is None:
+                fresh = np.diff(parent, prepend=-1) > 0
+                least = np.minimum.reduceat(far, np.nonzero(fresh)[0], axis=0)
+                pair, child = np.nonzero(near <= least[np.cumsum(fresh) - 1])
+            else:
+                pair, child = np.nonzero(near < limits[level][parent])
+            child += parent[pair] * _FAN
+            count = self._boxes[level + 1].shape[1] if level + 1 < len(self._boxes) else len(self._x)
+            # without those that only fill up the last node
+            real = child < count
+            pair, child = pair[real], child[real]
+            # numpy sorts 16 bit integers in linear time
+            order = np.argsort(child.astype(np.uint16) if count <= 1 << 16 else child, kind="stable")
+            yield from self._descend(x, y, limits, (level + 1, child[order], them[pair[order]]))
 
 
-def _nearest(box: Array, x: Array, y: Array) -> Array:
-    """Return the squared distance from points to boxes of low x, high x, low y, high y."""
-    low_x, high_x, low_y, high_y = box
-    dx = np.maximum(np.maximum(low_x - x, x - high_x), 0.0)
-    dy = np.maximum(np.maximum(low_y - y, y - high_y), 0.0)
-    return np.asarray(dx * dx + dy * dy)
+def _filled(values: Array) -> Array:
+    """Return (k, n) values as (k, nodes, children), the last one repeated to fill up the last node."""
+    fan = min(_FAN, values.shape[1])
+    nodes = -(-values.shape[1] // fan)
+    at = np.minimum(np.arange(nodes * fan), values.shape[1] - 1)
+    return values[:, at].reshape(len(values), nodes, fan)
+
+
+def _runs(node: IntArray, size: int) -> Iterator[slice]:
+    """Yield slices that hold whole runs of equal nodes, of at most `size` pairs if one run allows it."""
+    if len(node) <= size:
+        if len(node):
+            yield slice(0, len(node))
+        return
+    ends = np.append(np.nonzero(np.diff(node))[0] + 1, len(node))
+    begin = 0
+    while begin < len(node):
+        fitting = np.searchsorted(ends, begin + size, side="right") - 1
+        end = int(ends[max(fitting, np.searchsorted(ends, begin, side="right"))])
+        yield slice(begin, end)
+        begin = end
 
 
 def _nearest_and_farthest(box: Array, x: Array, y: Array) -> tuple[Array, Array]:

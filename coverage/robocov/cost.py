@@ -161,7 +161,7 @@ class CoverageCost:
         self._rank[order] = np.arange(len(order))
         self._component = component[self.cells[order]]
         self._x, self._y = np.ascontiguousarray(snapped[self.cells[order]].T)
-        self._clusters = Clusters(self._x, self._y, leaf=64)
+        self._clusters = Clusters(self._x, self._y, leaf=16)
 
     def _view(self) -> None:
         """List for each site the useful corners in view: rows of site, corner and distance."""
