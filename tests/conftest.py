@@ -9,7 +9,11 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle, Wa
 from robocov.starts import DiscStart, UniformStart
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
-settings.register_profile("robocov", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+# the same examples every time, so that a failure is the fault of the change that is tested;
+# `pytest --hypothesis-profile=explore` looks for new ones
+settings.register_profile("robocov", derandomize=True, database=None, **QUIET)
+settings.register_profile("explore", max_examples=500, print_blob=True, **QUIET)
 settings.load_profile("robocov")
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
