@@ -77,7 +77,15 @@ def simulated(
     controller = make_controller(controller_name, gains)
     start, positions = starts_of(environment, options)
     simulation = Simulation(environment, controller, positions, team_of(options), options.dt)
-    recorder = Recorder(environment, simulation.team, controller, options.dt, start=start, seed=options.seed)
+    recorder = Recorder(
+        environment,
+        simulation.team,
+        controller,
+        options.dt,
+        name=controller_name,
+        start=start,
+        seed=options.seed,
+    )
     total = round(options.duration / options.dt)
     with progress(f"simulating {controller.label}", total, quiet=options.json) as update:
         for step, snapshot in enumerate(simulation.snapshots(options.duration)):

@@ -36,7 +36,7 @@ class Record:
     environment : Environment
     team : Team
     controller : str
-        Name of the controller.
+        Name of the controller, as `make_controller` takes it.
     label : str
         Its name as shown to people.
     gains : dict of name to value
@@ -143,7 +143,7 @@ class Record:
                 environment=from_json(run["map"], f"{path}: map"),
                 team=Team.from_dict(run["team"]),
                 controller=name,
-                label=str(getattr(CONTROLLERS.get(name), "label", name)),
+                label=str(getattr(CONTROLLERS.get(name), "label", name.rpartition(":")[2])),
                 gains=run["controller"]["gains"],
                 start=run["start"],
                 seed=run["seed"],
@@ -168,7 +168,19 @@ class Record:
 
 
 class Recorder:
-    """Collects snapshots into a `Record`; what was collected can be had at any time."""
+    """Collects snapshots into a `Record`; what was collected can be had at any time.
+
+    Parameters
+    ----------
+    environment : Environment
+    team : Team
+    controller : Controller
+    dt : float, s
+    name : str
+        The controller's name where it is not its own: ``mine.py:MyController``.
+    start : str, seed : int
+        Where the starts came from.
+    """
 
     def __init__(
         self,
@@ -177,9 +189,11 @@ class Recorder:
         controller: Controller,
         dt: float,
         *,
+        name: str | None = None,
         start: str | None = None,
         seed: int | None = None,
     ) -> None:
+        self._name = controller.name if name is None else name
         self._environment, self._team, self._controller, self._dt = environment, team, controller, dt
         self._start, self._seed = start, seed
         self._time: list[float] = []
@@ -205,7 +219,7 @@ class Recorder:
         return Record(
             environment=self._environment,
             team=self._team,
-            controller=self._controller.name,
+            controller=self._name,
             label=self._controller.label,
             gains=gain_values(law),
             start=self._start,

@@ -263,7 +263,8 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
         capsys, "run", "square", *SHORT, "--controller", f"{mine}:Mine", "--set", "pull=2", "--out", str(out)
     )
     record = Record.load(out)
-    assert record.controller == "Mine"
+    assert record.controller == f"{mine}:Mine", "the run can be repeated from its record"
+    assert record.label == "Mine"
     assert record.gains == {"pull": 2.0}
     assert not np.isnan(record.goals).any()
 
