@@ -20,6 +20,9 @@ _PAD = 1e-9
 _PAIRS = 1 << 16
 """Source and wall pairs looked at in one piece, which bounds the memory."""
 
+_REST = 1 << 13
+"""Entries of bins that are few enough to be looked at all at once."""
+
 _TILES = 16
 """Tiles along a side of the grid; each lists all walls, the nearest first."""
 
@@ -184,9 +187,7 @@ class Fans:
 
         Sources at vertices see past the walls that end there: the caller looks after their sectors.
         """
-        walls = self._walls
-        px, py = self.x[source], self.y[source]
-        dx, dy = x - px, y - py
+        dx, dy = x - self.x[source], y - self.y[source]
         distance2 = dx * dx + dy * dy
         bin_ = np.minimum((pseudo_angle(dx, dy) * (self._bins / 4.0)).astype(np.intp), self._bins - 1)
         key = source * self._bins + bin_
@@ -195,21 +196,37 @@ class Fans:
         pending = np.nonzero((at < last) & (self._near[at] < distance2))[0]
         at = at[pending]
         while pending.size:
-            edge = self._edge[at]
-            qx, qy = x[pending], y[pending]
-            hidden = cross(walls.ux[edge], walls.uy[edge], qx - walls.ax[edge], qy - walls.ay[edge]) < 0.0
-            # the walls behind which the target is not need no further look
-            check = np.nonzero(hidden)[0]
-            edge, pair = edge[check], pending[check]
-            vx, vy, wx, wy = px[pair], py[pair], dx[pair], dy[pair]
-            hidden[check] = (cross(walls.ax[edge] - vx, walls.ay[edge] - vy, wx, wy) >= 0.0) & (
-                cross(wx, wy, walls.bx[edge] - vx, walls.by[edge] - vy) >= 0.0
-            )
+            count = last[pending] - at
+            rest = int(count.sum())
+            if rest <= _REST:
+                # all that is left in one go
+                at = np.repeat(at - np.cumsum(count) + count, count) + np.arange(rest)
+                pending = np.repeat(pending, count)
+                some = self._near[at] < distance2[pending]
+                pending, at = pending[some], at[some]
+            hidden = self._hides(self._edge[at], source[pending], x[pending], y[pending])
             visible[pending[hidden]] = False
+            if rest <= _REST:
+                break
             pending, at = pending[~hidden], at[~hidden] + 1
             more = (at < last[pending]) & (self._near[at] < distance2[pending])
             pending, at = pending[more], at[more]
         return visible
+
+    def _hides(self, edge: IntArray, source: IntArray, x: Array, y: Array) -> BoolArray:
+        """Return whether a wall that faces a source hides the target at (x, y); (p,) each."""
+        walls = self._walls
+        ax, ay = walls.ax[edge], walls.ay[edge]
+        hides = cross(walls.ux[edge], walls.uy[edge], x - ax, y - ay) < 0.0
+        # most walls have the target in front
+        behind = np.nonzero(hides)[0]
+        edge, source = edge[behind], source[behind]
+        px, py = self.x[source], self.y[source]
+        dx, dy = x[behind] - px, y[behind] - py
+        hides[behind] = (cross(ax[behind] - px, ay[behind] - py, dx, dy) >= 0.0) & (
+            cross(dx, dy, walls.bx[edge] - px, walls.by[edge] - py) >= 0.0
+        )
+        return hides
 
 
 def pseudo_angle(dx: Array, dy: Array) -> Array:

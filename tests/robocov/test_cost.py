@@ -131,6 +131,7 @@ def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n, few, monke
     if not few:
         for module in (visibility, clusters, cost_module):
             monkeypatch.setattr(module, "_PAIRS", 100)
+        monkeypatch.setattr(visibility, "_REST", 0)
     cost = CoverageCost(OFFICE, lattice=24)
     robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
     result = cost(robots)
