@@ -131,21 +131,24 @@ class Fans:
         self._walls = walls
         self._bins = bins
         self.x, self.y = x, y
-        nothing = np.empty(0, np.int32), np.empty(0), np.zeros(1, np.intp)
+        nothing = np.empty(0, np.int32), np.empty(0), np.zeros(1, np.intp), np.empty(0)
         pieces = [nothing, *(self._bin(*piece) for piece in walls.facing(x, y, reach))]
-        self._edge, near, count = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        self._edge, near, count, self._horizon = (
+            np.concatenate([piece[k] for piece in pieces]) for k in range(4)
+        )
         self._near = np.append(near, np.inf)
         self._first = np.cumsum(count)
 
     def _bin(
         self, begin: int, end: int, source: IntArray, edge: IntArray, near: Array
-    ) -> tuple[IntArray, Array, IntArray]:
+    ) -> tuple[IntArray, Array, IntArray, Array]:
         """Enter every wall into the bins that it spans, the nearest first in each.
 
         Returns
         -------
         edge, near : (entries,)
-        count : (bins of all sources from `begin` to `end`,)
+        count, horizon : (bins of all sources from `begin` to `end`,)
+            How many walls are in a bin, and the squared distance from which on all is hidden.
         """
         walls = self._walls
         order = np.argsort(near, kind="stable")
@@ -180,7 +183,7 @@ class Fans:
         # numpy sorts 16 bit integers in linear time
         order = np.argsort(key.astype(np.uint16) if size <= 1 << 16 else key, kind="stable")
         entry = entry[order]
-        return edge[entry], near[entry], np.bincount(key, minlength=size)
+        return edge[entry], near[entry], np.bincount(key, minlength=size), horizon
 
     def see(self, source: IntArray, x: Array, y: Array) -> BoolArray:
         """Return for (m,) pairs of a source and a target at (x, y) whether no wall hides the target.
@@ -192,8 +195,8 @@ class Fans:
         bin_ = np.minimum((pseudo_angle(dx, dy) * (self._bins / 4.0)).astype(np.intp), self._bins - 1)
         key = source * self._bins + bin_
         at, last = self._first[key], self._first[key + 1]
-        visible = np.ones(len(x), dtype=bool)
-        pending = np.nonzero((at < last) & (self._near[at] < distance2))[0]
+        visible = distance2 <= self._horizon[key]
+        pending = np.nonzero(visible & (at < last) & (self._near[at] < distance2))[0]
         at = at[pending]
         while pending.size:
             count = last[pending] - at
