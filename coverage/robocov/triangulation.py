@@ -37,8 +37,9 @@ _ROUNDING = 4e-15
 """Bound, in radians, on what rounding adds to the sum of two angles. Within it either diagonal will do:
 the Voronoi edge between the two cells has no length."""
 
-_MOST_FLIPS = 2, 1 / 25
-"""Flips, and more for each robot, beyond which Qhull is quicker."""
+_MOST_TURNED = 18
+"""Edges, three to a triangle, that see a triangle turned over. Flips right most such triangles, but not
+all: where there are more than these, Qhull will probably be needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +64,8 @@ class Triangulation:
     @classmethod
     def ordered(cls, ends: IntArray, apexes: IntArray) -> Triangulation:
         """Return the triangulation of these edges; in each column of `ends` the lower number is first."""
-        order = _keys(ends).argsort(kind="stable")
-        columns = ends[:, order], apexes[:, order]
+        order = _keys(ends).argsort()
+        columns = ends.take(order, axis=1), apexes.take(order, axis=1)
         for each in columns:
             each.setflags(write=False)
         return cls(*columns)
@@ -105,37 +106,36 @@ def triangulated(points: ComplexArray, warm: Triangulation | None = None) -> Fit
     """
     robots = points.size - SENTINELS
     if warm is not None and warm.robots == robots:
-        fitted = _mended(warm, points, most_flips=_MOST_FLIPS[0] + int(_MOST_FLIPS[1] * robots))
+        fitted = _mended(warm, points)
         if fitted is not None:
             return fitted
     cold = _by_qhull(points)
-    # Qhull decides the nearly cocircular at random within its own, larger tolerance
-    return None if cold is None else _mended(cold, points, most_flips=robots)
+    # Qhull decides between the nearly cocircular at random, within a tolerance of its own that is larger
+    return None if cold is None else _mended(cold, points)
 
 
-def _mended(triangulation: Triangulation, points: ComplexArray, most_flips: int) -> Fitted | None:
-    """Return the triangulation after the flips that make it Delaunay; None after too many, or in doubt."""
+def _mended(triangulation: Triangulation, points: ComplexArray) -> Fitted | None:
+    """Return the triangulation after the flips that make it Delaunay; None when too much is wrong."""
     places = points.take(triangulation.ends)
     angles = _angles(places, points.take(triangulation.apexes))
+    turned = np.count_nonzero(angles.imag <= 0.0)
     wrong = _not_delaunay(angles)
     if not wrong.size:
-        upright = np.minimum.reduce(angles.imag, axis=None) > 0.0
-        return Fitted(triangulation, places, angles) if upright else None
+        return Fitted(triangulation, places, angles) if not turned else None
+    if turned > _MOST_TURNED:
+        return None
 
-    flips = _Flips(triangulation)
+    ends, apexes = triangulation.ends.copy(), triangulation.apexes.copy()
+    patience = triangulation.robots
     while wrong.size:
-        # an edge beside one that was flipped waits for the next round, which sees what became of it
-        changed: set[int] = set()
-        for edge in wrong.tolist():
-            if edge not in changed:
-                beside = flips.flip(edge) if flips.count < most_flips else None
-                if beside is None:
-                    return None
-                changed.update(beside)
-        near = np.array(sorted(changed))
-        ends, apexes = flips.ends[:, near], flips.apexes[:, near]
-        wrong = near[_not_delaunay(_angles(points.take(ends), points.take(apexes)))]
-    return _mended(Triangulation.ordered(flips.ends, flips.apexes), points, most_flips=0)
+        patience -= wrong.size
+        changed = _flip(ends, apexes, wrong)
+        if changed is None or patience < 0:
+            return None
+        wrong = changed[
+            _not_delaunay(_angles(points.take(ends[:, changed]), points.take(apexes[:, changed])))
+        ]
+    return _mended(Triangulation.ordered(ends, apexes), points)
 
 
 def _angles(places: ComplexArray, apexes: ComplexArray) -> ComplexArray:
@@ -160,66 +160,54 @@ def _not_delaunay(angles: ComplexArray) -> IntArray:
     return wrong
 
 
-class _Flips:
-    """A triangulation while edges of it are flipped."""
+def _flip(ends: IntArray, apexes: IntArray, edges: IntArray) -> IntArray | None:
+    """Replace edges by the other diagonals of their two triangles, in place.
 
-    def __init__(self, triangulation: Triangulation) -> None:
-        self.ends = triangulation.ends.copy()
-        self.apexes = triangulation.apexes.copy()
-        self.count = 0
-        self._robots = triangulation.robots
-        self._keys = _keys(triangulation.ends)
-        self._moved: dict[int, int] = {}
+    Of edges that share a triangle not all are replaced, but always the first.
 
-    def flip(self, edge: int) -> tuple[int, ...] | None:
-        """Replace `edge` by the other diagonal of its two triangles.
+    Returns
+    -------
+    IntArray or None
+        The edges to be looked at again, ascending: all of `edges`, and those beside the replaced ones.
+        None when two robots have got two edges, or two sentinels one: this leads nowhere.
+    """
+    keys = _keys(ends)
+    order = keys.argsort(kind="stable")
+    keys = keys.take(order)
+    if np.count_nonzero(keys[1:] == keys[:-1]):
+        return None
+    # the quadrilaterals are i, right, j, left; beside them lie i left, j left, i right, j right
+    near = np.concatenate([ends.take(edges, axis=1)] * 2)
+    far = apexes.take(edges, axis=1).repeat(2, axis=0)
+    sought = _keys(np.stack([np.minimum(near, far), np.maximum(near, far)]))
+    place = np.minimum(keys.searchsorted(sought), keys.size - 1)
+    beside = order.take(place)
+    # what is not there joins two sentinels
+    stored = keys.take(place) == sought
 
-        Returns
-        -------
-        tuple of int, or None
-            The edge and those beside it, whose apexes have changed; None when there is such an edge
-            already: then the two triangles do not make a convex quadrilateral.
-        """
-        i, j = self.ends[:, edge].tolist()
-        left, right = self.apexes[:, edge].tolist()
-        if min(left, right) >= self._robots or self._find(left, right) >= 0:
-            return None
-        changed = [edge]
-        for a, b, old, new in (
-            (i, left, j, right),
-            (j, left, i, right),
-            (i, right, j, left),
-            (j, right, i, left),
-        ):
-            beside = self._find(a, b)
-            if beside >= 0:
-                column = self.apexes[:, beside]
-                column[int(column[0] != old)] = new
-                changed.append(beside)
-        self._moved[_key(i, j)] = -1
-        self._moved[_key(left, right)] = edge
-        # seen from the left apex towards the right one, j lies on the left
-        up = left < right
-        self.ends[:, edge] = (left, right) if up else (right, left)
-        self.apexes[:, edge] = (j, i) if up else (i, j)
-        self.count += 1
-        return tuple(changed)
+    marked = np.zeros(keys.size, dtype=np.bool_)
+    marked[edges] = True
+    waiting = (marked.take(beside) & stored & (beside < edges)).any(axis=0)
+    if np.count_nonzero(waiting):
+        edges, near, far = edges[~waiting], near[:, ~waiting], far[:, ~waiting]
+        beside, stored = beside[:, ~waiting], stored[:, ~waiting]
 
-    def _find(self, a: int, b: int) -> int:
-        """Return the number of the edge from a to b; -1 when there is none, or it joins two sentinels."""
-        key = _key(a, b)
-        if key in self._moved:
-            return self._moved[key]
-        place = int(self._keys.searchsorted(key))
-        return place if place < self._keys.size and self._keys[place] == key else -1
-
-
-def _key(a: int, b: int) -> int:
-    """Return a number that is this pair's alone; it grows with the higher, then with the lower of the two."""
-    return a * a + b if a > b else b * b + a
+    # the triangle beside has lost the corner across the old diagonal, and has the opposite apex instead
+    lost, gained, column = near[[1, 0, 1, 0]][stored], far[[2, 2, 0, 0]][stored], beside[stored]
+    apexes[(apexes[0, column] != lost).astype(np.intp), column] = gained
+    # seen from the left apex towards the right one, j lies on the left
+    i, j, left, right = near[0], near[1], far[0], far[2]
+    if np.maximum.reduce(np.minimum(left, right)) >= keys.size // 3:
+        return None
+    up = left < right
+    ends[:, edges] = np.where(up, (left, right), (right, left))
+    apexes[:, edges] = np.where(up, (j, i), (i, j))
+    marked[column] = True
+    return marked.nonzero()[0]
 
 
 def _keys(ends: IntArray) -> IntArray:
+    """Return a number for each pair that is its alone; it grows with the second, then with the first."""
     return np.asarray(ends[1] * ends[1] + ends[0])
 
 
