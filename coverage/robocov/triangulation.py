@@ -42,6 +42,10 @@ _MOST_TURNED = 18
 all: where there are more than these, Qhull will probably be needed."""
 
 
+_PATIENCE = 8
+"""Flips for each robot after which none of it makes sense; a team on one circle needs two."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangulation:
     """Which robots and sentinels an edge joins, and which see it; no places.
@@ -126,7 +130,7 @@ def _mended(triangulation: Triangulation, points: ComplexArray) -> Fitted | None
         return None
 
     ends, apexes = triangulation.ends.copy(), triangulation.apexes.copy()
-    patience = triangulation.robots
+    patience = _PATIENCE * triangulation.robots
     while wrong.size:
         patience -= wrong.size
         changed = _flip(ends, apexes, wrong)

@@ -25,7 +25,18 @@ from robocov.triangulation import SENTINELS, Fitted, Triangulation, triangulated
 from robocov.voronoi import VoronoiPartition, partition
 
 sys.path.insert(0, str(Path(__file__).parent))
-from voronoi_cases import FAMILIES, PENTAGON, REGIONS, SQUARE, Family, families, names, scattered, seeds
+from voronoi_cases import (
+    FAMILIES,
+    PENTAGON,
+    REGIONS,
+    SQUARE,
+    Family,
+    circle,
+    families,
+    names,
+    scattered,
+    seeds,
+)
 
 CORNERS = 40.0 * np.exp(2j * np.pi / 3 * np.arange(3) + 0.2j)
 
@@ -236,10 +247,26 @@ def test_a_triangulation_of_other_places_does_no_harm(seed: int, n: int) -> None
     assert_delaunay(fitted(mirrored, fitted(points).triangulation).triangulation, with_sentinels(mirrored))
 
 
-def test_a_triangulation_of_another_team_is_not_used() -> None:
-    points = scattered(SQUARE, 20, np.random.default_rng(0))
-    other = fitted(points[:-1]).triangulation
-    assert fitted(points, other).triangulation.ends.tobytes() == fitted(points).triangulation.ends.tobytes()
+@pytest.mark.parametrize("name", REGIONS)
+def test_a_team_on_a_circle_needs_no_clipping(name: str) -> None:
+    """Rounding decides every one of its edges, and a circle is how many a team starts."""
+    for n in (10, 100, 400):
+        points = circle(REGIONS[name], n, np.random.default_rng(n))
+        cells = partition(points, REGIONS[name])
+        assert cells.triangulation is not None
+        assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [19, 21])
+def test_a_triangulation_of_another_team_is_not_used(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    points = scattered(SQUARE, 20, rng)
+    other = fitted(scattered(SQUARE, size, rng)).triangulation
+    right = fitted(points).triangulation
+    assert fitted(points, other).triangulation.ends.tobytes() == right.ends.tobytes()
+    forbid_qhull(monkeypatch)
+    with pytest.raises(AssertionError, match="anew"):
+        fitted(points, other)
 
 
 def test_without_triangulation_there_is_nothing_to_hand_on() -> None:
