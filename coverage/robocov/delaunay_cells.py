@@ -6,8 +6,7 @@ partition, so each call counts; plane vectors are complex numbers, ``x + i y``, 
 Let i, j be the ends of a Delaunay edge, d = p_j - p_i, and m their midpoint. The bisector is the line
 m + t i d / 2, and the circumcentre of a triangle on either side lies on it, as far out as the cotangent
 of the angle opposite the edge says: t = dot / cross of the two sides at that apex. So no circumcentre
-is computed, a sliver's lies far away on the right side, and what a rounding error in t shifts is weighed
-by the length |d|² that belongs to it. A hull edge has one side only: t is infinite on the other.
+is computed, and what a rounding error in t shifts is weighed by the length |d|² that belongs to it.
 
 The convex region limits t (Cyrus-Beck), and the points where it does so divide the region's boundary
 into pieces. Each Voronoi edge, and each piece, adds to its cell the triangle that it spans with the

@@ -41,7 +41,6 @@ _MOST_TURNED = 18
 """Edges, three to a triangle, that see a triangle turned over. Flips right most such triangles, but not
 all: where there are more than these, Qhull will probably be needed."""
 
-
 _PATIENCE = 8
 """Flips for each robot after which none of it makes sense; a team on one circle needs two."""
 
@@ -136,9 +135,9 @@ def _mended(triangulation: Triangulation, points: ComplexArray) -> Fitted | None
         changed = _flip(ends, apexes, wrong)
         if changed is None or patience < 0:
             return None
-        wrong = changed[
-            _not_delaunay(_angles(points.take(ends[:, changed]), points.take(apexes[:, changed])))
-        ]
+        places = points.take(ends.take(changed, axis=1))
+        angles = _angles(places, points.take(apexes.take(changed, axis=1)))
+        wrong = changed[_not_delaunay(angles)]
     return _mended(Triangulation.ordered(ends, apexes), points)
 
 

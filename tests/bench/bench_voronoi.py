@@ -2,12 +2,15 @@
 
     python tests/bench/bench_voronoi.py [rounds]
 
-The calls are interleaved and medians compared, so that the machine's moods fall on all alike.
+The calls are interleaved and medians compared, so that the machine's moods fall on all alike. The last
+table is for robots on the move, as a simulation has them: each partition starts from the triangulation
+of the one before.
 """
 
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -59,5 +62,38 @@ def main(budget: int) -> None:
         print(row, f"{(taken['polygons'] - taken['partition']) * 1e6:9.0f} µs")
 
 
+def on_the_move(budget: int) -> None:
+    """Print one row a team size: robots that cross 1/60 s in straight lines, 10 m² a robot."""
+    rng = np.random.default_rng(0)
+    print(f"\n{'robots':>6} {'Delaunay':>12} {'anew':>18} {'on the move':>18} {'goal':>6}")
+    for n, goal in ((12, None), (50, None), (200, 0.6), (1000, 0.35)):
+        side = np.sqrt(10.0 * n)
+        region = Region(side * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
+        points = rng.uniform(0.1, side - 0.1, (n, 2))
+        heading = rng.uniform(0.0, 2.0 * np.pi, n)
+        stride = rng.uniform(0.0, 1.0 / 60.0, n)[:, None] * np.column_stack(
+            [np.cos(heading), np.sin(heading)]
+        )
+        warm = partition(points, region).triangulation
+        taken: list[list[float]] = []
+        for _ in range(max(60, budget // n)):
+            stride[(points + stride < 0.1) | (points + stride > side - 0.1)] *= -1.0
+            points = points + stride
+            times = [perf_counter()]
+            Delaunay(points)
+            times.append(perf_counter())
+            partition(points, region)
+            times.append(perf_counter())
+            warm = partition(points, region, warm=warm).triangulation
+            times.append(perf_counter())
+            taken.append([stop - start for start, stop in pairwise(times)])
+        floor, anew, moving = np.median(taken, axis=0)
+        row = f"{n:6d} {floor * 1e6:9.0f} µs"
+        for each in (anew, moving):
+            row += f" {each * 1e6:9.0f} µs {each / floor:4.2f}x"
+        print(row, f"{goal:5.2f}x" if goal else f"{'-':>6}")
+
+
 if __name__ == "__main__":
     main(int(sys.argv[1]) if len(sys.argv) > 1 else 20000)
+    on_the_move(int(sys.argv[1]) if len(sys.argv) > 1 else 20000)
