@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import controller_kind, gains_of
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.output import finite, write_csv, write_json
-from robocov_app.run import COST_SIZE, FILM_HOLD, Run, frames_of, save_figures, save_moving
+from robocov_app.run import COST_SIZE, FILM_HOLD, Run, save_figures, save_moving
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
 
     from robocov_app.interruption import Interruption
     from robocov_app.options import RunOptions
-
-PANE_WIDTH = 640
-"""Width in pixels of one controller's picture in a film, where no size is asked for."""
-
-_AROUND = 100
-"""Pixels of a pane's height for legend, scale bar and status."""
 
 _FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
 
@@ -102,22 +96,28 @@ def save_comparison_moving(
     runs: Mapping[str, Run], folder: Path, options: RunOptions, stop: Interruption
 ) -> None:
     """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
-    from robocov_app.recording import frame_rows, side_by_side
+    from robocov_app.panes import comparison_frames, pane_layout
+    from robocov_app.recording import frame_rows
 
-    first = next(iter(runs.values())).record
-    asked = options.picture_size()
-    if asked is None:
-        low_x, low_y, high_x, high_y = first.environment.region.bounds
-        tall = PANE_WIDTH * (high_y - low_y) / (high_x - low_x) + _AROUND
-        pane = (PANE_WIDTH, 2 * round(min(max(tall, 320), 960) / 2))
-    else:
-        pane = (max(asked[0] // len(runs), 240), asked[1])
-    total = len(frame_rows(first.time, options.fps, options.film_speed, FILM_HOLD))
-
+    records = [run.record for run in runs.values()]
+    if not (options.frames or options.video):
+        return
+    layout = pane_layout(records, options.theme, options.colours, options.picture_size())
+    longest = max(records, key=len)
+    total = len(frame_rows(longest.time, options.fps, options.film_speed, FILM_HOLD))
     save_moving(
         folder,
         "comparison.mp4",
-        lambda: side_by_side([frames_of(run, options, pane) for run in runs.values()]),
+        lambda: comparison_frames(
+            records,
+            [(run.history.time, run.history.mean_distance) for run in runs.values()],
+            layout,
+            theme=options.theme,
+            colours=options.colours,
+            fps=options.fps,
+            speed=options.film_speed,
+            hold=FILM_HOLD,
+        ),
         total,
         options,
         stop,

@@ -63,7 +63,7 @@ class RunOptions:
     theme: Literal["light", "dark"] = "light"
     """Colours of pictures and films."""
     colours: Literal["paper", "robots"] = "paper"
-    """Trajectories in the paper's red, or a colour for each robot."""
+    """Trajectories in the paper's red, or a colour for each robot; in films too."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size in pixels; by default 1280x720 for films, and what suits the map for pictures."""
     json: bool = False

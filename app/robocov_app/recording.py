@@ -20,6 +20,7 @@ from robocov.errors import OutputError, ParameterError, shown
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
     from robocov.record import Record
+    from robocov_app.view.layers import Layer
 
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB picture, (height, width, 3), 0 to 255."""
@@ -77,7 +78,9 @@ def iter_frames(
     fps: float = 30.0,
     speed: float = 1.0,
     hold: float = 0.0,
+    colours: str = "robots",
     show: Iterable[str] | None = None,
+    layers: Sequence[Layer] | None = None,
     scale: float | None = None,
     cost: tuple[Array, Array] | None = None,
     rows: IntArray | None = None,
@@ -91,8 +94,12 @@ def iter_frames(
     theme : {"light", "dark"}
     fps, speed, hold
         See `frame_rows`.
+    colours : {"robots", "paper"}
+        Trajectories in a hue for each robot, or all in the paper's red.
     show : names of layers or None
         None shows those that are shown by default.
+    layers : list of Layer or None
+        From the lowest to the topmost; None for `standard_layers`.
     scale : float or None
         Of text and lines; None for what suits the size.
     cost : ((k,) s, (k,) m) or None
@@ -105,11 +112,12 @@ def iter_frames(
     (height, width, 3) RGB
         The array is the caller's own.
     """
-    from robocov_app.view.picture import Painter
+    from robocov_app.view.picture import Painter, standard_layers
     from robocov_app.view.scene import Scene
     from robocov_app.view.theme import theme_named
 
-    painter = Painter(record.environment, size, theme_named(theme), scale=scale)
+    layers = standard_layers(colours) if layers is None else layers
+    painter = Painter(record.environment, size, theme_named(theme), layers, scale)
     if show is not None:
         painter.show(show)
     if rows is None:
@@ -138,34 +146,6 @@ def _cost_text(time: float, cost: tuple[Array, Array] | None) -> str:
     if known < 0 or not np.isfinite(cost[1][known]):
         return ""
     return f"mean distance {cost[1][known]:.3f} m"
-
-
-def side_by_side(films: Sequence[Iterator[Frame]], gap: int = 2, grey: int = 128) -> Iterator[Frame]:
-    """Join the frames of several films of one height into frames that show them in a row.
-
-    Parameters
-    ----------
-    films : sequence of iterators of frames
-        Ends when all have ended; those that end before the others stay on their last frame.
-    gap : int, px
-        Width of the line between two.
-    grey : int
-        Its shade, 0 to 255.
-    """
-    current: list[Frame | None] = [None] * len(films)
-    while True:
-        fresh = [next(film, None) for film in films]
-        if all(frame is None for frame in fresh):
-            return
-        current = [new if new is not None else old for new, old in zip(fresh, current, strict=True)]
-        parts: list[Frame] = []
-        for frame in current:
-            if frame is None:
-                raise ParameterError(_NO_FRAMES)
-            if parts:
-                parts.append(np.full((frame.shape[0], gap, 3), grey, dtype=np.uint8))
-            parts.append(frame)
-        yield np.concatenate(parts, axis=1)
 
 
 def png_bytes(frame: Frame) -> bytes:

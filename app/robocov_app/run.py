@@ -206,6 +206,7 @@ def frames_of(run: Run, options: RunOptions, size: tuple[int, int]) -> Iterator[
         run.record,
         size=size,
         theme=options.theme,
+        colours=options.colours,
         fps=options.fps,
         speed=options.film_speed,
         hold=FILM_HOLD,

@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 from robocov.environment import Environment, PolygonObstacle
 from robocov.robots import Team
 from robocov.starts import UniformStart
+from robocov_app.view.canvas import Canvas
+from robocov_app.view.layers import drawn_radii
 from robocov_app.view.picture import Painter, standard_layers
-from robocov_app.view.theme import DARK, LIGHT, readable_on
+from robocov_app.view.theme import DARK, LIGHT, readable_on, robot_hues
 from robocov_app.view.trajectories import Trajectories
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -151,12 +153,86 @@ def test_starts_are_green_rings():
 
 
 def test_centroids_are_plus_signs():
-    scene = explained(TWO)
+    scene = explained(TWO, goals=TWO + 1)
     frame, painter = drawn(scene, "centroids")
     for center in painter.camera.to_pixels(scene.centroids):
         assert nearest(frame, center, LIGHT.ink) < 60
         assert nearest(frame, center + np.array([3.0, 0.0]), LIGHT.ink) < 60
         assert nearest(frame, center + np.array([0.0, 3.0]), LIGHT.ink) < 60
+
+
+def test_centroids_are_those_that_the_controller_knows():
+    """RPF has no goals: neither crosses nor their entry in the legend."""
+    for goals, words in ((TWO + 1, ["cell centroid"]), (None, [])):
+        scene = explained(TWO, goals=goals)
+        pixels, painter = changed(scene, "centroids")
+        assert bool(len(pixels)) == bool(words)
+        assert painter.legend(scene) == words
+
+
+@pytest.mark.parametrize("size", [SIZE, (1920, 1440)])
+def test_the_boundary_has_clean_corners(size):
+    pixels, painter = changed(explained(TWO), "boundary", size=size)
+    low, high = painter.camera.to_pixels(np.array([[0.0, 8.0], [8.0, 0.0]]))
+    half = LIGHT.boundary_line * painter.scale / 2
+    assert (pixels > low - half - 1.5).all() and (pixels < high + half + 1.5).all()
+    found = {tuple(pixel) for pixel in pixels.tolist()}
+    for x, y in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])):
+        assert (round(x), round(y)) in found
+
+
+class TestCrowds:
+    def radii(self, positions, size=SIZE, radius=0.1):
+        scene = replace(explained(positions), team=Team.homogeneous(len(positions), radius=radius))
+        painter = Painter(SQUARE, size)
+        painter.frame(scene)
+        canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, robot_hues(0))
+        return np.array(drawn_radii(canvas, scene)), painter
+
+    def test_discs_keep_apart_where_the_smallest_ones_can(self):
+        positions = 4.0 + np.random.default_rng(0).normal(size=(150, 2)) * 0.9
+        radii, painter = self.radii(positions)
+        pixels = painter.camera.to_pixels(positions)
+        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2)
+        least = np.maximum(0.1 * painter.camera.zoom, 2.4 * painter.scale)
+        crowded = np.maximum(radii[:, None], radii[None]) > least + 0.5
+        np.fill_diagonal(crowded, False)
+        assert crowded.sum() > 1000
+        assert (apart - radii[:, None] - radii[None])[crowded].min() > -0.5 - 0.5 * least
+
+    def test_a_few_far_apart_are_readable_whatever_the_others_do(self):
+        positions = np.vstack([4.0 + 0.01 * np.arange(8).reshape(4, 2), [[1.0, 1.0]]])
+        radii, painter = self.radii(positions, radius=0.004)
+        assert radii[-1] == pytest.approx(9.0 * painter.scale, abs=0.25)
+        assert radii[:4].max() <= 2.4 * painter.scale + 0.5
+
+    def test_numbers_only_where_they_have_room(self, monkeypatch):
+        from robocov_app.view import sprites
+
+        seen = {}
+        disc = sprites.disc
+
+        def watched(radius, fill, ring, width, edge, text, shift):
+            seen[text] = radius - width
+            return disc(radius, fill, ring, width, edge, text, shift)
+
+        monkeypatch.setattr(sprites, "disc", watched)
+        positions = np.vstack([4.0 + 0.06 * np.arange(16).reshape(8, 2), [[1.0, 1.0], [7.0, 1.0]]])
+        scene = explained(positions)
+        scene = replace(scene, team=Team.homogeneous(10, radius=0.01))
+        _, painter = drawn(scene, "robots")
+        assert set(seen) == {"", "9", "10"}
+        assert seen["9"] > 5 * painter.scale > seen[""]
+
+    def test_marks_shrink_in_a_crowd(self):
+        near = replace(explained(TWO), starts=4.0 + 0.02 * np.arange(20).reshape(10, 2))
+        far = replace(explained(TWO), starts=np.array([[2.0, 2.0], [6.0, 6.0]]))
+        sizes = []
+        for scene in (near, far):
+            pixels, painter = changed(scene, "starts", size=(800, 800))
+            first = painter.camera.to_pixels(scene.starts)[0]
+            sizes.append((first[0] - pixels[:, 0].min()) / painter.scale)
+        assert sizes[0] < 4.0 < 4.5 < sizes[1]
 
 
 class TestRobots:

@@ -182,8 +182,8 @@ def test_unknown_layers_are_named_with_the_nearest():
 
 
 def test_the_scale_grows_with_the_picture():
-    assert scale_for((1280, 720)) == 1.0
-    assert scale_for((2560, 1440)) == 2.0
+    assert scale_for((1280, 720)) == 1.25
+    assert scale_for((2560, 1440)) == 2.5
     assert 0.8 <= scale_for((320, 240)) < 1.0
 
 

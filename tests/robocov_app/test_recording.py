@@ -23,7 +23,6 @@ from robocov_app.recording import (
     png_bytes,
     save_film,
     save_frames,
-    side_by_side,
 )
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -104,14 +103,6 @@ class TestFrames:
             next(iter_frames(record, theme="pink"))
         with pytest.raises(ParameterError, match="layer"):
             next(iter_frames(record, show=["robot"]))
-
-
-def test_side_by_side_waits_for_the_longest():
-    joined = list(side_by_side([plain(2), plain(4, width=32)], gap=3, grey=99))
-    assert [frame.shape for frame in joined] == [(48, 64 + 3 + 32, 3)] * 4
-    assert [int(frame[0, 0, 0]) for frame in joined] == [0, 20, 20, 20]
-    assert [int(frame[0, 80, 0]) for frame in joined] == [0, 20, 40, 60]
-    assert (joined[0][:, 64:67] == 99).all()
 
 
 @settings(deadline=None, max_examples=30)

@@ -52,11 +52,25 @@ class TestReadability:
             assert contrast(theme.trajectory, theme.cell(hue)) >= 2.0
             assert contrast(theme.start, theme.cell(hue)) >= 2.0
 
+    def test_trails_can_be_followed_on_their_cells_and_differ(self, theme):
+        trails = [theme.trail(hue) for hue in range(ONE_HUE_EACH)]
+        assert len(set(trails)) == ONE_HUE_EACH
+        for hue, trail in enumerate(trails):
+            assert contrast(trail, theme.cell(hue)) >= 2.4
+            assert contrast(trail, theme.background) >= 2.4
+
+    def test_controllers_of_ones_own_differ_from_all_others(self, theme):
+        curves = [*theme.controllers.values(), *theme.others]
+        apart = np.abs(np.array(curves, dtype=float)[:, None] - curves).max(axis=2)
+        assert (apart + 1000 * np.eye(len(curves))).min() >= 60
+        for curve in curves:
+            assert contrast(curve, theme.background) >= 4.5
+
     def test_hues_differ(self, theme):
         assert len(set(theme.robots)) == ONE_HUE_EACH
         cells = np.array([theme.cell(hue) for hue in range(MAP_COLOURS)], dtype=float)
         apart = np.abs(cells[:, None] - cells[None]).max(axis=2) + 1000 * np.eye(MAP_COLOURS)
-        assert apart.min() >= 8
+        assert apart.min() >= 9
 
     def test_the_papers_colours(self, theme):
         red, green, blue = theme.controller("rapf")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -71,8 +72,7 @@ class Canvas:
             self.line(start, end, colour, width)
         if width > 2:  # lines have straight ends: fill the corners' notches
             for point in points:
-                if not self._far_off(point):
-                    pygame.draw.circle(self.surface, colour, point, width / 2)
+                self.stamp(partial(sprites.dot, width / 2, colour), point)
 
     def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
         """Draw a smooth line between two pixels."""

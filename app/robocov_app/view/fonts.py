@@ -58,14 +58,14 @@ def text_width(text: str, size: int, bold: bool = False) -> int:
     return label(text, size, (0, 0, 0), bold).get_width()
 
 
-def shortened(text: str, size: int, width: float) -> str:
+def shortened(text: str, size: int, width: float, bold: bool = False) -> str:
     """Return `text`, cut and ended with an ellipsis where it is wider than `width` pixels."""
-    if text_width(text, size) <= width:
+    if text_width(text, size, bold) <= width:
         return text
     low, high = 0, len(text)
     while low < high:
         middle = (low + high + 1) // 2
-        if text_width(text[:middle].rstrip() + "…", size) <= width:
+        if text_width(text[:middle].rstrip() + "…", size, bold) <= width:
             low = middle
         else:
             high = middle - 1

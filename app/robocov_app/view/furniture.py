@@ -9,7 +9,7 @@ import pygame
 
 from robocov_app.view.camera import length_label, round_length
 from robocov_app.view.canvas import Canvas
-from robocov_app.view.fonts import shortened
+from robocov_app.view.fonts import shortened, text_width
 from robocov_app.view.layers import Layer, LegendEntry
 from robocov_app.view.scene import Scene
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 MARGIN = 14.0
+EDGE = MARGIN + 2.0
 LEGEND_ROW = 22.0
 STRIP = 34.0
 _GLYPH = 28.0
@@ -34,7 +35,7 @@ class ScaleBar(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         length = bar_length(canvas)
         pixels = length * canvas.camera.zoom
-        left = MARGIN * canvas.scale
+        left = EDGE * canvas.scale
         y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
         tick, width = 4.0 * canvas.scale, canvas.width(1.5)
         ink = canvas.theme.ink
@@ -51,30 +52,67 @@ def bar_length(canvas: Canvas) -> float:
     return round_length(room / canvas.camera.zoom)
 
 
+class Caption(Layer):
+    """The controller's name and the cost above the arena, where several pictures stand side by side."""
+
+    name = "caption"
+    title = "Caption"
+    in_world = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
+        y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
+        size = 1.15 * canvas.theme.text
+        name = shortened(scene.label, canvas.text_size(size), right - left, bold=True)
+        left += canvas.text(name, (left, y), size=size, bold=True) + 12 * canvas.scale
+        if canvas.text_width(scene.cost) <= right - left:
+            canvas.text(scene.cost, (right, y), anchor="right")
+
+
 class Status(Layer):
-    """Time, controller and cost in the strip below the arena."""
+    """Controller, time and cost in the strip below the arena.
+
+    Parameters
+    ----------
+    brief : bool
+        Leave out what a `Caption` says: the controller and the cost.
+    """
 
     name = "status"
     title = "Status line"
     in_world = False
 
+    def __init__(self, brief: bool = False) -> None:
+        self.brief = brief
+
     def draw(self, canvas: Canvas, scene: Scene) -> None:
+        if self.brief:
+            scene = replace(scene, label="", cost="")
         bar = bar_length(canvas)
         taken = (
-            (MARGIN + 8 + 16) * canvas.scale
+            (EDGE + 8 + 16) * canvas.scale
             + bar * canvas.camera.zoom
             + canvas.text_width(length_label(bar), bold=True)
         )
-        right = canvas.surface.get_width() - MARGIN * canvas.scale
+        right = canvas.surface.get_width() - EDGE * canvas.scale
         y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
-        text = shortened(status_text(scene), canvas.text_size(canvas.theme.text), right - taken)
-        canvas.text(text, (right, y), anchor="right", colour=canvas.theme.ink)
+        size = canvas.text_size(canvas.theme.text)
+        name = shortened(scene.label, size, right - taken, bold=True)
+        room = right - taken - canvas.text_width(name, bold=True)
+        text = fitting_status(scene, size, room)
+        canvas.text(text, (right, y), anchor="right")
+        left = right - canvas.text_width(text) if text else right
+        canvas.text(name, (left, y), anchor="right", bold=True)
 
 
-def status_text(scene: Scene) -> str:
-    """Return what the status line says, what may be cut last: the map's name."""
+def fitting_status(scene: Scene, size: int, room: float) -> str:
+    """Return what follows the controller's name, whole facts only: first the map's name is left out."""
     time = f"t = {scene.snapshot.time:.1f} s" if scene.snapshot is not None else ""
-    return "   ·   ".join(text for text in (scene.label, time, scene.cost, scene.environment.name) if text)
+    facts = [text for text in (time, scene.cost, scene.environment.name) if text]
+    lead = "   ·   " if scene.label else ""
+    while len(facts) > 1 and text_width(lead + "   ·   ".join(facts), size) > room:
+        facts.pop()
+    return shortened(lead + "   ·   ".join(facts), size, room) if facts else ""
 
 
 class Legend(Layer):
@@ -94,22 +132,25 @@ class Legend(Layer):
         words = tuple((entry.text, entry.style) for entry in self.entries)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist())
         if self._strip is None or key != self._key:
-            rows = legend_rows(canvas, self.entries)
-            height = round((6.0 + LEGEND_ROW * len(rows)) * canvas.scale)
-            self._strip, self._key = pygame.Surface((width, height), 0, 32), key
-            self._strip.fill(canvas.theme.background)
-            self._fill(replace(canvas, surface=self._strip), rows)
+            self._strip, self._key = legend_strip(self.entries, canvas), key
         canvas.surface.blit(self._strip, (0, 0))
 
-    @staticmethod
-    def _fill(canvas: Canvas, rows: list[list[LegendEntry]]) -> None:
-        for number, row in enumerate(rows):
-            x = MARGIN * canvas.scale
-            y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale
-            for entry in row:
-                entry.draw(canvas, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
-                x += _GLYPH * canvas.scale
-                x += canvas.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
+
+def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:
+    """Return a strip as wide as the canvas's surface with these entries, for several pictures at once."""
+    rows = legend_rows(canvas, entries)
+    height = round((6.0 + LEGEND_ROW * max(len(rows), 1)) * canvas.scale)
+    strip = pygame.Surface((canvas.surface.get_width(), height), 0, 32)
+    strip.fill(canvas.theme.background)
+    own = replace(canvas, surface=strip)
+    for number, row in enumerate(rows):
+        x = MARGIN * canvas.scale
+        y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale
+        for entry in row:
+            entry.draw(own, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
+            x += _GLYPH * canvas.scale
+            x += own.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
+    return strip
 
 
 def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:

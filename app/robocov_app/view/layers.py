@@ -20,10 +20,17 @@ from robocov_app.view import sprites
 from robocov_app.view.camera import round_length
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.scene import Scene
+from robocov_app.view.spacing import fitted_radii, mark_size
 from robocov_app.view.theme import mix
 
 READABLE = 9.0
-"""Least radius of a drawn robot in pixels at scale 1: a number can be read in it."""
+"""Radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it."""
+
+SMALLEST_NUMBER = 6.6
+"""Least size of a robot's number in pixels at scale 1."""
+
+SMALLEST = 2.4
+"""Radius below which no robot is drawn in pixels at scale 1."""
 
 GRID_GAP = 34.0
 """Least distance between the lines of the grid in pixels at scale 1."""
@@ -226,13 +233,15 @@ class Starts(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.starts is None:
             return
-        for center in canvas.camera.to_pixels(scene.starts).tolist():
-            self._ring(canvas, center[0], center[1])
+        centers = canvas.camera.to_pixels(scene.starts)
+        radius = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
+        for center in centers.tolist():
+            self._ring(canvas, center[0], center[1], radius)
 
     @staticmethod
-    def _ring(canvas: Canvas, x: float, y: float) -> None:
-        radius, width = 4.5 * canvas.scale, 1.6 * canvas.scale
-        colour = canvas.theme.start
+    def _ring(canvas: Canvas, x: float, y: float, radius: float | None = None) -> None:
+        radius = 4.5 * canvas.scale if radius is None else radius
+        width, colour = min(1.6 * canvas.scale, 0.4 * radius), canvas.theme.start
         canvas.stamp(lambda shift: sprites.ring(radius, colour, width, shift), (x, y))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
@@ -240,30 +249,37 @@ class Starts(Layer):
 
 
 class Centroids(Layer):
-    """A plus at the centroid of each cell, where the laws of the paper are drawn to."""
+    """A plus at the centroid of each cell, where RAPF and Lloyd's algorithm head for.
+
+    Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them.
+    """
 
     name = "centroids"
     title = "Centroids"
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.centroids is None:
+        if scene.centroids is None or not scene.has_goals:
             return
-        for center in canvas.camera.to_pixels(scene.centroids).tolist():
-            self._plus(canvas, center[0], center[1])
+        centers = canvas.camera.to_pixels(scene.centroids)
+        arm = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 11.0 * canvas.scale))
+        for center in centers.tolist():
+            self._plus(canvas, center[0], center[1], arm)
 
     @staticmethod
-    def _plus(canvas: Canvas, x: float, y: float) -> None:
-        arm, width, theme = 5.5 * canvas.scale, 1.3 * canvas.scale, canvas.theme
+    def _plus(canvas: Canvas, x: float, y: float, arm: float | None = None) -> None:
+        arm = 5.5 * canvas.scale if arm is None else arm
+        width, theme = min(1.3 * canvas.scale, 0.3 * arm), canvas.theme
         canvas.stamp(
             lambda shift: sprites.cross(arm, theme.ink, theme.background, width, False, shift), (x, y)
         )
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
-        return [LegendEntry("cell centroid", self._plus)] if scene.centroids is not None else []
+        shown = scene.centroids is not None and scene.has_goals
+        return [LegendEntry("cell centroid", self._plus)] if shown else []
 
 
 class Robots(Layer):
-    """The robots: discs of their true size, or as small as can be read, each with its number."""
+    """The robots: discs with numbers; in a crowd smaller ones, down to their true size, without."""
 
     name = "robots"
     title = "Robots"
@@ -272,13 +288,15 @@ class Robots(Layer):
         if scene.snapshot is None:
             return
         radii = drawn_radii(canvas, scene)
-        ring = 1.6 * canvas.scale
         edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
         centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
         theme = canvas.theme
         for robot, (center, radius) in enumerate(zip(centers, radii, strict=True)):
             fill = theme.robots[canvas.hues[robot]]
-            text = str(robot + 1) if radius >= 6.5 * canvas.scale else ""
+            ring = min(1.6 * canvas.scale, _rounded(0.3 * radius))
+            text = str(robot + 1)
+            if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * canvas.scale:
+                text = ""
             canvas.stamp(partial(sprites.disc, radius, fill, theme.robot_ring, ring, edge, text), center)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
@@ -298,13 +316,20 @@ class Robots(Layer):
 def drawn_radii(canvas: Canvas, scene: Scene) -> list[float]:
     """Return the radius in pixels at which each robot is drawn, in steps of half a pixel.
 
-    True to scale, but not below what can be read; in a dense crowd that least size shrinks.
+    Large enough for a number where there is room; in a crowd smaller, so that discs keep apart, but
+    never below the true size.
     """
-    area = scene.environment.region.area * canvas.camera.zoom**2
-    crowd = 0.3 * float(np.sqrt(area / len(scene.team)))
-    least = min(max(crowd, 3.0 * canvas.scale), READABLE * canvas.scale)
-    radii = np.maximum(scene.team.radius * canvas.camera.zoom, least)
-    return [float(radius) for radius in np.round(np.minimum(radii, 400.0) * 2) / 2]
+    if scene.snapshot is None:
+        return []
+    centers = canvas.camera.to_pixels(scene.snapshot.positions)
+    true = scene.team.radius * canvas.camera.zoom
+    radii = fitted_radii(centers, true, SMALLEST * canvas.scale, READABLE * canvas.scale)
+    return [_rounded(radius) for radius in np.minimum(radii, 400.0).tolist()]
+
+
+def _rounded(pixels: float) -> float:
+    """Return a size in steps of half a pixel, so that few sprites are made."""
+    return round(pixels * 2) / 2
 
 
 def _premultiplied(colour: tuple[int, int, int], alpha: float) -> tuple[int, int, int, int]:

@@ -13,8 +13,27 @@ from robocov.errors import ParameterError, unknown_name
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.forces import ForceTerm, Goals, Links, ObstaclePoints, Ranges, Velocities
-from robocov_app.view.furniture import LEGEND_ROW, MARGIN, STRIP, Legend, ScaleBar, Status, legend_rows
-from robocov_app.view.layers import Boundary, Cells, Centroids, Grid, Layer, Obstacles, Robots, Starts
+from robocov_app.view.furniture import (
+    LEGEND_ROW,
+    MARGIN,
+    STRIP,
+    Caption,
+    Legend,
+    ScaleBar,
+    Status,
+    legend_rows,
+)
+from robocov_app.view.layers import (
+    Boundary,
+    Cells,
+    Centroids,
+    Grid,
+    Layer,
+    LegendEntry,
+    Obstacles,
+    Robots,
+    Starts,
+)
 from robocov_app.view.theme import LIGHT, Theme, robot_hues
 from robocov_app.view.trajectories import Trajectories
 
@@ -25,8 +44,14 @@ if TYPE_CHECKING:
     from robocov_app.view.scene import Scene
 
 
-def standard_layers() -> list[Layer]:
-    """Return one of each layer, from the lowest to the topmost."""
+def standard_layers(trails: str = "robots") -> list[Layer]:
+    """Return one of each layer, from the lowest to the topmost.
+
+    Parameters
+    ----------
+    trails : {"robots", "paper"}
+        Colours of the trajectories, see `Trajectories`.
+    """
     return [
         Cells(),
         Grid(),
@@ -35,7 +60,7 @@ def standard_layers() -> list[Layer]:
         Ranges("sensing"),
         Ranges("communication"),
         Links(),
-        Trajectories(),
+        Trajectories(trails),
         Starts(),
         ObstaclePoints(),
         Goals(),
@@ -52,9 +77,18 @@ def standard_layers() -> list[Layer]:
     ]
 
 
+def pane_layers(trails: str = "robots") -> list[Layer]:
+    """Return the layers of one picture among several: a caption in place of the legend, which they share."""
+    layers = [layer for layer in standard_layers(trails) if not isinstance(layer, Legend | Status)]
+    return [*layers, Caption(), Status(brief=True)]
+
+
 def scale_for(size: tuple[int, int]) -> float:
-    """Return the scale at which text and lines suit a picture of `size` pixels: 1 for 1280 x 720."""
-    fitting = min(size[0] / 1280, size[1] / 720)
+    """Return the scale at which text and lines suit a picture of `size` pixels: 1.25 for 1280 x 720.
+
+    Films are watched from the last row of a lecture hall: their text is a little larger than a window's.
+    """
+    fitting = min(size[0] / 1024, size[1] / 576)
     return min(max(round(fitting * 8) / 8, 0.875), 6.0)
 
 
@@ -137,20 +171,26 @@ class Painter:
 
     def legend(self, scene: Scene) -> list[str]:
         """Return the words of the legend: exactly those of the layers that draw something of `scene`."""
-        return [entry.text for layer in self._shown() for entry in layer.legend(scene)]
+        return [entry.text for entry in self.legend_entries(scene)]
+
+    def legend_entries(self, scene: Scene) -> list[LegendEntry]:
+        """Return the legend's entries for what is drawn of `scene`."""
+        return [entry for layer in self._shown() for entry in layer.legend(scene)]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw `scene` on the whole of `surface`, which has this painter's size."""
         if surface.get_size() != self.size:
             self.resize(surface.get_size(), self.scale)
         self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
-        entries = [entry for layer in self._shown() for entry in layer.legend(scene)]
+        entries = self.legend_entries(scene)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues)
         rows = 0
         for layer in self._shown():
             if isinstance(layer, Legend):
                 layer.entries = entries
                 rows = len(legend_rows(canvas, entries))
+            elif isinstance(layer, Caption):
+                rows = 1
         self._place_view(rows)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues)
         surface.fill(self.theme.background)

@@ -51,6 +51,11 @@ class Scene:
     label: str = ""
     cost: str = ""
 
+    @property
+    def has_goals(self) -> bool:
+        """Whether the controller draws robots to goals, as RAPF does and RPF does not."""
+        return self.snapshot is not None and self.snapshot.decision.goals is not None
+
     @classmethod
     def of(
         cls,

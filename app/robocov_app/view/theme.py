@@ -60,9 +60,12 @@ def readable_on(colour: Colour) -> Colour:
     return light if contrast(colour, light) >= contrast(colour, dark) else dark
 
 
-# Paul Tol's "muted" scheme: nine hues that colour-blind readers tell apart. The first six lie
-# farthest from each other and serve as map colours.
-_MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "AA4499", "999933", "117733", "882255", "332288")
+# Paul Tol's "muted" scheme: nine hues that colour-blind readers tell apart. The first six are also
+# far apart as tints of cells, where sand and olive would be one, and serve as map colours.
+_MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
+
+TRAIL_CONTRAST = 2.4
+"""Least contrast of a robot's trajectory with its own cell."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,8 @@ class Theme:
         The paper's green, blue and red.
     controllers : dict of name to Colour
         Colours of cost curves: the paper's blue for RAPF and red for RPF.
-    other : Colour
-        Curves of controllers that have no colour of their own.
+    others : colours
+        Curves of controllers that have no colour of their own, in turn.
     forces : dict of term name to Colour
     robots : nine colours
         One for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one.
@@ -103,14 +106,14 @@ class Theme:
     trajectory: Colour
     velocity: Colour
     controllers: dict[str, Colour]
-    other: Colour
+    others: tuple[Colour, ...]
     forces: dict[str, Colour]
     robots: tuple[Colour, ...]
     tint: float
     text: float = 12.0
     small_text: float = 11.0
     line: float = 1.0
-    trajectory_line: float = 1.6
+    trajectory_line: float = 1.8
     boundary_line: float = 2.0
     arrow_line: float = 2.0
 
@@ -121,6 +124,18 @@ class Theme:
     def controller(self, name: str) -> Colour:
         """Return the colour of a controller's curves and labels."""
         return self.controllers.get(name, self.other)
+
+    @property
+    def other(self) -> Colour:
+        """The colour of the first controller that has none of its own."""
+        return self.others[0]
+
+    def trail(self, hue: int) -> Colour:
+        """Return the colour of a robot's trajectory: its hue, but never too pale to be followed."""
+        part = 0.12
+        while contrast(colour := mix(self.robots[hue], self.ink, part), self.cell(hue)) < TRAIL_CONTRAST:
+            part += 0.04
+        return colour
 
 
 LIGHT = Theme(
@@ -144,7 +159,7 @@ LIGHT = Theme(
         "rpf": rgb("D62222"),
         "lloyd": rgb("118038"),
     },
-    other=rgb("8A3FA8"),
+    others=(rgb("8A3FA8"), rgb("7A5C00"), rgb("28303C")),
     forces={
         "attraction": rgb("0B7A6F"),
         "repulsion_robots": rgb("D9480F"),
@@ -176,7 +191,7 @@ DARK = Theme(
         "rpf": rgb("FF6B63"),
         "lloyd": rgb("46C46A"),
     },
-    other=rgb("CF8BE8"),
+    others=(rgb("CF8BE8"), rgb("F0A94A"), rgb("E8ECF2")),
     forces={
         "attraction": rgb("2DD4BF"),
         "repulsion_robots": rgb("FF9354"),

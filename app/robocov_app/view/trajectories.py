@@ -10,6 +10,7 @@ from robocov_app.view.canvas import Canvas
 from robocov_app.view.clipping import bounded
 from robocov_app.view.layers import Layer, LegendEntry
 from robocov_app.view.scene import Scene
+from robocov_app.view.spacing import line_crowding
 from robocov_app.view.sprites import Sketch
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, mix
 
@@ -48,7 +49,7 @@ class Trajectories(Layer):
         if trail is None or len(trail) == 0:
             return
         colours = self._of_robots(canvas)
-        width = canvas.scale * (canvas.theme.trajectory_line if trail.shape[1] <= ONE_HUE_EACH else 1.1)
+        width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
         if self.fade is not None and scene.trail_time is not None:
             self._faded(canvas, trail, scene.trail_time, colours, canvas.width(width / canvas.scale))
             return
@@ -134,7 +135,7 @@ class Trajectories(Layer):
             return [theme.trajectory] * n
         if n > ONE_HUE_EACH:
             return [mix(theme.trajectory, theme.background, 0.25)] * n
-        return [mix(theme.robots[hue], theme.ink, 0.12) for hue in canvas.hues.tolist()]
+        return [theme.trail(hue) for hue in canvas.hues.tolist()]
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:

@@ -1,0 +1,89 @@
+"""How large marks may be drawn where many stand close together, and how panels share a page."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from robocov.arrays import Array
+
+
+def nearest_distance(points: Array) -> Array:
+    """Return how far each of (n, 2) points is from the nearest other: (n,), infinite for a single one.
+
+    >>> nearest_distance(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])).tolist()
+    [3.0, 1.0, 1.0]
+    """
+    if len(points) < 2:
+        return np.full(len(points), np.inf)
+    distances: Array = np.asarray(KDTree(points).query(points, k=2)[0])
+    return np.asarray(distances[:, 1])
+
+
+def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
+    """Return radii for discs that stay readable where there is room and keep apart where there is none.
+
+    Each disc wants the radius `most`. It shrinks to half of the way to its nearest neighbour, so that
+    no two overlap, but neither below its `true` size nor below `least`.
+
+    Parameters
+    ----------
+    centers : (n, 2)
+    true : (n,)
+        Radii true to scale.
+    least, most : float
+
+    Returns
+    -------
+    (n,)
+
+    Examples
+    --------
+    >>> fitted_radii(np.array([[0.0, 0.0], [8.0, 0.0], [99.0, 0.0]]), np.ones(3), 2.0, 9.0).tolist()
+    [4.0, 4.0, 9.0]
+    """
+    return np.asarray(np.maximum(true, np.clip(nearest_distance(centers) / 2, least, most)))
+
+
+def mark_size(points: Array, least: float, most: float) -> float:
+    """Return one size for marks at (n, 2) points: `most`, but what keeps half of them apart in a crowd.
+
+    >>> mark_size(np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [90.0, 0.0]]), 2.0, 9.0)
+    5.0
+    """
+    return float(np.clip(np.median(nearest_distance(points)), least, most)) if len(points) else most
+
+
+def line_crowding(count: int) -> float:
+    """Return by what the width of lines is multiplied where `count` of them are drawn: 1 to 0.5.
+
+    >>> [line_crowding(n) for n in (6, 20, 80, 1000)]
+    [1.0, 1.0, 0.5, 0.5]
+    """
+    return float(np.clip(np.sqrt(20 / max(count, 1)), 0.5, 1.0))
+
+
+def columns_for(count: int, aspect: float, size: tuple[float, float], around: float = 0.0) -> int:
+    """Return the number of columns that lets `count` panels of one aspect be largest on a page.
+
+    Parameters
+    ----------
+    count : int
+    aspect : float
+        Width by height of each panel.
+    size : (width, height), px
+    around : float, px
+        Height that each row needs above and below its panels.
+
+    Examples
+    --------
+    >>> columns_for(3, 1.4, (1920, 1080)), columns_for(3, 10.0, (1920, 1080))
+    (3, 1)
+    """
+
+    def worth(columns: int) -> float:
+        rows = -(-count // columns)
+        width = min(size[0] / columns, (size[1] / rows - around) * aspect)
+        return width * count / (rows * columns)  # a gap in the last row looks like something missing
+
+    return max(range(1, count + 1), key=lambda columns: (round(worth(columns), 6), columns))

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov.errors import ParameterError
+from robocov_app.panes import comparison_frames, pane_layout, side_by_side
+from robocov_app.recording import frame_rows
+from robocov_app.view.theme import DARK, LIGHT
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
+
+
+def plain(count, width=64, height=48, start=0):
+    """Give frames of one grey each."""
+    for k in range(count):
+        yield np.full((height, width, 3), 20 * (k + start), dtype=np.uint8)
+
+
+def film(records, theme="light", colours="robots", size=None, speed=4.0):
+    layout = pane_layout(records, theme, colours, size)
+    costs = [(record.time[:1], np.array([1.0])) for record in records]
+    return layout, comparison_frames(
+        records, costs, layout, theme=theme, colours=colours, fps=5, speed=speed, hold=0.0
+    )
+
+
+class TestSideBySide:
+    def test_it_waits_for_the_longest(self):
+        joined = list(side_by_side([plain(2), plain(4, width=32)], gap=3, line=(99, 98, 97)))
+        assert [frame.shape for frame in joined] == [(48, 64 + 3 + 32, 3)] * 4
+        assert [int(frame[0, 0, 0]) for frame in joined] == [0, 20, 20, 20]
+        assert [int(frame[0, 80, 0]) for frame in joined] == [0, 20, 40, 60]
+        assert (joined[0][:, 64:67] == (99, 98, 97)).all()
+
+    def test_rows_and_a_free_place(self):
+        films = [plain(1, start=k) for k in range(1, 6)]
+        (frame,) = side_by_side(films, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
+        assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
+        for k in range(5):
+            row, column = divmod(k, 3)
+            pane = frame[row * 50 : row * 50 + 48, column * 66 : column * 66 + 64]
+            assert (pane == 20 * (k + 1)).all()
+        assert (frame[48:50] == (99, 98, 97)).all()
+        assert (frame[50:, 132:] == (1, 2, 3)).all()
+
+    def test_a_film_without_frames(self):
+        with pytest.raises(ParameterError, match="frames: none"):
+            next(side_by_side([plain(1), plain(0)]))
+
+
+class TestLayout:
+    @pytest.mark.parametrize(
+        ("environment", "count", "columns"),
+        [(ROOMS, 1, 1), (ROOMS, 2, 2), (ROOMS, 3, 3), (ROOMS, 4, 2), (CORRIDOR, 3, 1), (SHAFT, 4, 4)],
+    )
+    def test_wide_maps_stand_below_each_other(self, environment, count, columns):
+        layout = pane_layout([run_of(environment, 3)] * count, "light")
+        assert layout.columns == columns
+        assert layout.size[0] <= 1920 and layout.size[1] <= 1090
+        assert layout.size[0] % 2 == layout.size[1] % 2 == 0
+
+    def test_a_wide_map_is_drawn_nearly_as_wide_as_the_film(self):
+        layout, frames = film([run_of(CORRIDOR, 3)] * 3)
+        frame = next(frames)
+        assert layout.pane[0] == 1920
+        obstacles_or_boundary = (frame == np.array(LIGHT.boundary)).all(axis=2)
+        assert np.nonzero(obstacles_or_boundary.any(axis=0))[0].size > 1800
+
+    @pytest.mark.parametrize("size", [(640, 400), (1280, 720), (1281, 719), (320, 240)])
+    @pytest.mark.parametrize("count", [1, 3, 5])
+    def test_frames_have_exactly_the_size_asked_for(self, size, count):
+        _, frames = film([run_of(ROOMS, 3)] * count, size=size)
+        assert next(frames).shape == (size[1], size[0], 3)
+
+    @pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+    @pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+    def test_without_a_size_it_is_what_the_layout_says(self, environment, count):
+        layout, frames = film([run_of(environment, 2)] * count, theme="dark")
+        frame = next(frames)
+        assert frame.shape == (layout.size[1], layout.size[0], 3)
+        rows = -(-count // layout.columns)
+        assert len(layout.header) + rows * layout.pane[1] <= layout.size[1]
+        assert (frame[-1, 0] == DARK.background).all()
+
+
+class TestFrames:
+    def test_the_longest_run_ends_it(self):
+        short, long = run_of(ROOMS, 2, steps=11), run_of(ROOMS, 2, steps=41)
+        _, frames = film([short, long], size=(640, 300), speed=1.0)
+        assert sum(1 for _ in frames) == len(frame_rows(long.time, 5))
+
+    def test_one_legend_explains_what_any_of_them_shows(self):
+        without = run_of(ROOMS, 3, controller="rpf")
+        with_goals = replace(without, goals=without.positions + 0.1)
+        plain_header = pane_layout([without, without], "light").header
+        both = pane_layout([without, with_goals], "light").header
+        assert plain_header.shape == both.shape
+        ink = [int((header != 255).any(axis=2).sum()) for header in (plain_header, both)]
+        assert ink[1] > ink[0] + 100  # the cell centroid
+        twice = pane_layout([with_goals, with_goals], "light").header
+        assert (twice == both).all()
+
+    def test_trajectories_have_the_colours_asked_for(self):
+        record = run_of(ROOMS, 4)
+        reds = []
+        for colours in ("paper", "robots"):
+            _, frames = film([record, record], colours=colours, size=(1280, 640))
+            last = list(frames)[-1].astype(int)
+            body = last[100:]
+            reds.append(int((np.abs(body - np.array(LIGHT.trajectory)).max(axis=2) < 12).sum()))
+        assert reds[0] > 500 > 20 > reds[1]
