@@ -96,7 +96,9 @@ def close_pairs(positions: Array, reach: float) -> tuple[IntArray, IntArray, Arr
         square[np.arange(n), np.arange(n)] = np.inf
         first, second = np.nonzero(square <= reach * reach)
         return first, second, np.sqrt(square[first, second])
-    pairs = cKDTree(positions).query_pairs(reach, output_type="ndarray")
+    # asked only once, the tree need be neither balanced nor tight
+    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
+    pairs = tree.query_pairs(reach, output_type="ndarray")
     first = np.concatenate([pairs[:, 0], pairs[:, 1]]).astype(np.intp, copy=False)
     second = np.concatenate([pairs[:, 1], pairs[:, 0]]).astype(np.intp, copy=False)
     order = np.argsort(first * n + second)

