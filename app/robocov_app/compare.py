@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import controller_kind, gains_of
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.output import finite, write_csv, write_json
-from robocov_app.run import COST_SIZE, FILM_HOLD, Run, save_figures, save_moving
+from robocov_app.run import COST_SIZE, FILM_HOLD, Run, cost_title, save_figures, save_moving
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -86,7 +86,9 @@ def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) 
             "trajectories": lambda: plot_comparison(
                 records, theme=theme, colours=options.colours, size=size, mean_distances=finals
             ),
-            "cost": lambda: plot_cost(curves, theme=theme, size=size or COST_SIZE),
+            "cost": lambda: plot_cost(
+                curves, theme=theme, size=size or COST_SIZE, title=cost_title(records[0])
+            ),
         },
         quiet=options.json,
     )

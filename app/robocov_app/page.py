@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from robocov_app.view.camera import length_label, round_length
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
     from robocov_app.view.theme import Colour, Theme
 
-TITLE, TEXT, SMALL = 12.5, 9.5, 8.5
+HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5
 """Text sizes in points."""
 
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, width and height in pixels."""
+
+Place: TypeAlias = Literal["upper left", "upper center", "center right"]
+"""Which part of a legend is where it is put."""
 
 
 def plain_style() -> AbstractContextManager[None]:
@@ -34,23 +42,28 @@ def tone(colour: Colour) -> tuple[float, float, float]:
 
 
 class Page:
-    """A figure with a title and a legend that keep clear of what is plotted.
+    """A figure with titles and a legend that keep clear of what is plotted.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    theme : Theme
+    scale : float or None
+        Of texts and lines, 1 for 100 dots an inch; None for what suits the size.
 
     Attributes
     ----------
     figure : matplotlib.figure.Figure
-    size : (width, height), px
-    scale : float
-        Pixels for what is one pixel on a page of 1200 x 800.
     """
 
-    def __init__(self, size: tuple[int, int], theme: Theme) -> None:
+    def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         self.size = size
         self.theme = theme
-        self.scale = min(max(min(size[0] / 1200, size[1] / 800), 0.8), 4.0)
+        fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
+        self.scale = fitting if scale is None else scale
         dpi = 100.0 * self.scale
         # the pixels are counted by truncation: a hair more keeps 899.9999 at 900
         inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
@@ -72,7 +85,9 @@ class Page:
         x, y = self.at(left, top + height)
         return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]))
 
-    def panels(self, count: int, columns: int, aspect: float, words: float) -> list[tuple[Box, float]]:
+    def panels(
+        self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
+    ) -> list[tuple[Box, float]]:
         """Return equal boxes in rows, and how wide the lines above each may be.
 
         Parameters
@@ -82,17 +97,21 @@ class Page:
             Width by height of each box.
         words : float, px
             How wide the lines above would be; slots grow for them as far as there is room.
+        above : float, px
+            Height of those lines.
+        top, below : float, px
+            What stays free of panels at the page's upper and lower edge.
         """
         rows = -(-count // columns)
-        above, gap, below = 52 * self.scale, 6 * self.scale, 70 * self.scale
+        gap = 14 * self.scale
         widest = (self.size[0] - self.margin) / columns - self.margin
-        highest = (self.size[1] - below - self.margin / 2) / rows - above - gap
+        highest = (self.size[1] - top - below + gap) / rows - above - gap
         width = min(widest, highest * aspect)
         height = width / aspect
         slot = min(max(width, words), widest)
         left = (self.size[0] - columns * slot - (columns - 1) * self.margin) / 2
         block = above + height + gap
-        top = max((self.size[1] - below - rows * block) / 2, self.margin / 2)
+        top += max((self.size[1] - top - below + gap - rows * block) / 2, 0.0)
         boxes = []
         for number in range(count):
             row, column = divmod(number, columns)
@@ -122,7 +141,8 @@ class Page:
             ha=align,
             va="center",
         )
-        while room is not None and len(text) > 1 and self.width_of(written) > room:
+        # the same words are up to a pixel wider in one place than in another
+        while room is not None and len(text) > 1 and self.width_of(written) > room + 1:
             text = text[:-1]
             written.set_text(text.rstrip(" ·") + "…")
 
@@ -137,26 +157,89 @@ class Page:
         """Return how wide a text or legend is, in pixels."""
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
-    def legend(self, handles: list[Artist], top: float) -> float:
-        """Put the legend in rows in the middle, its upper edge at `top`; return its height in pixels."""
-        room = self.size[0] - self.margin
-        for columns in range(len(handles), 0, -1):
-            legend = self.figure.legend(
-                handles=handles,
-                loc="upper center",
-                bbox_to_anchor=self.at(self.size[0] / 2, top),
-                ncols=columns,
-                frameon=False,
-                fontsize=SMALL,
-                labelcolor=tone(self.theme.ink),
-                borderaxespad=0.0,
-                borderpad=0.0,
-                columnspacing=1.8,
-                handletextpad=0.6,
-                handlelength=1.6,
-            )
+    def footer_height(self, handles: Sequence[Artist]) -> float:
+        """Return how much room `footer` needs below what is plotted, in pixels."""
+        columns, width, height = self._legend_extent(handles)
+        if columns == len(handles) and width <= self._beside_bar:
+            return 46 * self.scale
+        return 36 * self.scale + height + 14 * self.scale
+
+    def footer(
+        self, handles: Sequence[Artist], left: float, right: float, bottom: float, zoom: float
+    ) -> None:
+        """Draw the scale bar and the legend: beside each other where that fits, else below each other.
+
+        Parameters
+        ----------
+        handles : sequence of artists
+            The legend's entries.
+        left, right, bottom : float, px
+            Edges of what is plotted above.
+        zoom : float, px/m
+        """
+        columns, width, _ = self._legend_extent(handles)
+        middle = bottom + 24 * self.scale
+        if columns == len(handles) and width <= self._beside_bar:
+            end = self.size[0] - self.margin
+            start = min(left, end - width - (self.size[0] - 2 * self.margin - self._beside_bar))
+            taken = self._scale_bar(max(start, self.margin), middle, zoom)
+            x = min(max(right, taken + 24 * self.scale + width), end)
+            self._legend(handles, columns, "center right", (x, middle))
+        else:
+            self._scale_bar(left, bottom + 20 * self.scale, zoom)
+            self._legend(handles, columns, "upper center", (self.size[0] / 2, bottom + 38 * self.scale))
+
+    @property
+    def _longest_bar(self) -> float:
+        return max(min(120 * self.scale, self.size[0] / 7), 20.0)
+
+    @property
+    def _beside_bar(self) -> float:
+        """Width that the longest scale bar, with its words, leaves a legend in the same line."""
+        return self.size[0] - 2 * self.margin - self._longest_bar - 80 * self.scale
+
+    def _scale_bar(self, left: float, y: float, zoom: float) -> float:
+        """Draw a bar of a round length; return where its words end."""
+        from matplotlib.lines import Line2D
+
+        length = round_length(self._longest_bar / zoom)
+        tick, right = 4 * self.scale, left + length * zoom
+        for (x1, y1), (x2, y2) in (
+            ((left, y), (right, y)),
+            ((left, y - tick), (left, y + tick)),
+            ((right, y - tick), (right, y + tick)),
+        ):
+            (a, b), (c, d) = self.at(x1, y1), self.at(x2, y2)
+            self.figure.add_artist(Line2D([a, c], [b, d], color=tone(self.theme.ink), linewidth=1.3))
+        words = right + 8 * self.scale
+        self.text(length_label(length), words, y, points=SMALL, bold=True)
+        return words + self.text_width(length_label(length), points=SMALL, bold=True)
+
+    def _legend_extent(self, handles: Sequence[Artist]) -> tuple[int, float, float]:
+        """Return columns in which the legend fits the page in the fewest rows, and its width and height."""
+        for rows in range(1, len(handles) + 1):
+            columns = -(-len(handles) // rows)
+            legend = self._legend(handles, columns, "upper left", (0.0, 0.0))
             extent = legend.get_window_extent(self.figure.canvas.get_renderer())  # type: ignore[attr-defined]
-            if extent.width <= room or columns == 1:
-                return float(extent.height)
             legend.remove()
-        return 0.0
+            if extent.width <= self.size[0] - self.margin or columns == 1:
+                break
+        return columns, float(extent.width), float(extent.height)
+
+    def _legend(
+        self, handles: Sequence[Artist], columns: int, place: Place, at: tuple[float, float]
+    ) -> Legend:
+        return self.figure.legend(
+            handles=list(handles),
+            loc=place,
+            bbox_to_anchor=self.at(*at),
+            ncols=columns,
+            frameon=False,
+            fontsize=SMALL,
+            labelcolor=tone(self.theme.ink),
+            borderaxespad=0.0,
+            borderpad=0.0,
+            columnspacing=1.6,
+            handletextpad=0.6,
+            handlelength=1.6,
+        )

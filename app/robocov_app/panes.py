@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pygame
 
 from robocov.errors import ParameterError
 from robocov_app.recording import Frame, iter_frames
-from robocov_app.view.camera import Camera
-from robocov_app.view.canvas import Canvas
-from robocov_app.view.furniture import LEGEND_ROW, MARGIN, STRIP, legend_strip
+from robocov_app.view.furniture import LEGEND_ROW, MARGIN, STRIP, legend_picture
 from robocov_app.view.picture import Painter, pane_layers, scale_for
 from robocov_app.view.scene import Scene
 from robocov_app.view.spacing import columns_for
-from robocov_app.view.theme import Colour, robot_hues, theme_named
+from robocov_app.view.theme import Colour, theme_named
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
@@ -224,10 +221,4 @@ def _legend(records: Sequence[Record], theme: str, colours: str, width: int, sca
         found.append(painter.legend_entries(scene))
     # the longest first: its order is kept, and mostly nothing is missing
     entries = {(entry.text, entry.style): entry for part in sorted(found, key=len)[::-1] for entry in part}
-    surface = pygame.Surface((width, 1), 0, 32)
-    canvas = Canvas(
-        surface, Camera((0.0, 0.0), 1.0, (0, 0, width, 1)), look, scale, robot_hues(len(records[0].team))
-    )
-    strip = legend_strip(entries.values(), canvas)
-    pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
-    return pixels.reshape(strip.get_height(), strip.get_width(), 3)
+    return legend_picture(list(entries.values()), width, look, scale)

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov_app.page import tone
+from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
 if TYPE_CHECKING:
@@ -15,6 +17,12 @@ if TYPE_CHECKING:
 
     from robocov.environment import Environment
     from robocov.record import Record
+
+_DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
+"""Radius of a robot where it has room and in the densest crowd, and least size of its number, in points."""
+
+_START, _CENTROID = 6.2, 8.0
+"""Sizes of marks where they have room, in points."""
 
 
 def draw_map(axes: Axes, environment: Environment, theme: Theme) -> None:
@@ -59,30 +67,31 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     cells = partition(last, record.environment.region)
     hues = robot_hues(n, cells.adjacency)
     paper = colours == "paper"
-    tint = 0.12 if paper else 0.9 * theme.tint
+    tint = theme.paper_tint if paper else theme.tint
     polygons = [(cell, hue) for cell, hue in zip(cells.polygons, hues.tolist(), strict=True) if len(cell) > 2]
     axes.add_collection(
         PolyCollection(
             [cell for cell, _ in polygons],
             facecolors=[tone(mix(theme.background, theme.robots[hue], tint)) for _, hue in polygons],
-            edgecolors=tone(mix(theme.background, theme.cell_edge, 0.75)),
-            linewidths=0.7,
+            edgecolors=tone(theme.cell_edge),
+            linewidths=0.8,
             zorder=1,
         ),
         autolim=False,
     )
-    crowd = min(1.0, (30 / n) ** 0.5)
+    crowd = line_crowding(n)
     lines = LineCollection(
         list(np.moveaxis(record.positions, 1, 0)),
         colors=[tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)],
-        linewidths=max(1.4 * crowd, 0.6),
+        linewidths=1.6 * crowd,
         capstyle="round",
         joinstyle="round",
         zorder=4,
     )
     axes.add_collection(lines, autolim=False)
     begin = record.positions[0]
-    axes.plot(*begin.T, zorder=5, **_start_style(theme, crowd))
+    starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
+    axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
     radius = _disc_points(axes, record)
     fills = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     axes.scatter(
@@ -91,15 +100,19 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
         s=[(2 * r) ** 2 for r in radius],
         c=[tone(fill) for fill in fills],
         edgecolors=tone(theme.robot_ring),
-        linewidths=max(1.1 * crowd, 0.5),
+        linewidths=[min(1.1, 0.25 * r) for r in radius],
         zorder=7,
         clip_on=False,
     )
-    axes.plot(*cells.centroid.T, zorder=6, **_centroid_style(theme, crowd))
+    if has_goals(record):
+        apart = mark_size(_in_points(axes, cells.centroid), 3.2, _CENTROID)
+        away = np.hypot(*(_in_points(axes, cells.centroid) - _in_points(axes, last)).T)
+        # where a robot has arrived, only the ends of the cross would stick out from under its disc
+        axes.plot(*cells.centroid[away > radius].T, zorder=6, **_centroid_style(theme, apart))
     for robot, (point, r, fill) in enumerate(zip(last, radius, fills, strict=True), start=1):
         digits = len(str(robot))
         size = r * (1.25, 1.1, 0.85, 0.65)[min(digits, 4) - 1]
-        if size >= 2.8:
+        if size >= _SMALLEST_NUMBER:
             axes.text(
                 float(point[0]),
                 float(point[1]),
@@ -118,37 +131,46 @@ def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Co
         return [theme.trajectory] * n
     if n > ONE_HUE_EACH:
         return [mix(theme.trajectory, theme.background, 0.25)] * n
-    return [mix(theme.robots[hue], theme.ink, 0.12) for hue in hues]
+    return [theme.trail(hue) for hue in hues]
 
 
 def _disc_points(axes: Axes, record: Record) -> list[float]:
-    """Return each robot's radius in points: true to scale, but not below what can be read."""
+    """Return each robot's radius in points: readable where there is room, in a crowd down to true size."""
+    unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    true = record.team.radius * float(unit[1, 0] - unit[0, 0])
+    radii = fitted_radii(_in_points(axes, record.positions[-1]), true, _SMALLEST_DISC, _DISC)
+    return [float(radius) for radius in radii]
+
+
+def _in_points(axes: Axes, places: Array) -> Array:
+    """Return where (n, 2) m places are drawn, in points."""
     axes.apply_aspect()
-    corners = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
-    zoom = float(corners[1, 0] - corners[0, 0]) * 72 / axes.figure.dpi
-    area = record.environment.region.area * zoom**2
-    least = float(np.clip(0.3 * np.sqrt(area / len(record.team)), 2.2, 6.4))
-    return [float(max(r * zoom, least)) for r in record.team.radius]
+    return np.asarray(axes.transData.transform(places)) * (72 / axes.figure.dpi)
 
 
-def _start_style(theme: Theme, crowd: float = 1.0) -> dict[str, Any]:
+def has_goals(record: Record) -> bool:
+    """Whether the controller draws robots to goals: only then cells' centroids explain anything."""
+    return bool(np.isfinite(record.goals[-1]).any())
+
+
+def _start_style(theme: Theme, size: float) -> dict[str, Any]:
     return {
         "linestyle": "none",
         "marker": "o",
-        "markersize": 6.0 * max(crowd, 0.5),
+        "markersize": size,
         "markerfacecolor": "none",
         "markeredgecolor": tone(theme.start),
-        "markeredgewidth": 1.4 * max(crowd, 0.6),
+        "markeredgewidth": min(1.5, 0.25 * size),
     }
 
 
-def _centroid_style(theme: Theme, crowd: float = 1.0) -> dict[str, Any]:
+def _centroid_style(theme: Theme, size: float) -> dict[str, Any]:
     return {
         "linestyle": "none",
         "marker": "+",
-        "markersize": 7.5 * max(crowd, 0.5),
+        "markersize": size,
         "markeredgecolor": tone(theme.ink),
-        "markeredgewidth": 1.1 * max(crowd, 0.6),
+        "markeredgewidth": min(1.2, 0.2 * size),
     }
 
 
@@ -183,11 +205,12 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
         "markerfacecolor": tone(theme.final if paper else theme.robots[0]),
         "markeredgecolor": tone(theme.robot_ring),
     }
+    centroid = Line2D([], [], label="cell centroid", **_centroid_style(theme, _CENTROID))
     return [
-        Line2D([], [], label="start", **_start_style(theme)),
-        Line2D([], [], color=tone(line), linewidth=1.4, label="trajectory"),
+        Line2D([], [], label="start", **_start_style(theme, _START)),
+        Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         Line2D([], [], label="final position", **final),
-        Line2D([], [], label="cell centroid", **_centroid_style(theme)),
+        *([centroid] if has_goals(record) else []),
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.page import SMALL, TEXT, tone
-from robocov_app.view.theme import Theme
+from robocov_app.view.theme import Colour, Theme
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,18 @@ if TYPE_CHECKING:
 Curve: TypeAlias = tuple[str, str, Array, Array]
 """Label, controller's name, times (T,) s and mean distances (T,) m."""
 
-_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)), (0, (10, 3)))
+_KNOWN: dict[str, tuple[Any, str]] = {
+    "rapf": ("-", "o"),
+    "rpf": ((0, (5, 1.6)), "s"),
+    "lloyd": ((0, (1.6, 1.2)), "^"),
+}
+"""Dashes and end mark of the paper's controllers: the same in every picture."""
+
+_OTHERS: tuple[tuple[Any, str], ...] = (
+    ((0, (6, 1.6, 1.6, 1.6)), "D"),
+    ((0, (9, 2.5)), "v"),
+    ((0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), "P"),
+)
 _FROM_ZERO = 0.4
 """The axis begins at zero when the lowest value is below this part of the highest."""
 
@@ -29,15 +40,21 @@ def end_label(curve: Curve) -> str:
 
 
 def draw_curves(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
-    """Draw curves with their labels at their right ends, pushed apart where they would overlap."""
+    """Draw curves with their labels at their right ends, pushed apart where they would overlap.
+
+    The first is the widest and lowest: curves that lie on each other are still all seen.
+    """
     _frame(axes, curves, theme)
     ends = []
-    for number, curve in enumerate(curves):
-        _, controller, time, values = curve
-        colour = tone(theme.controller(controller))
-        axes.plot(time, values, color=colour, linewidth=1.8, linestyle=_DASHES[number % len(_DASHES)])
+    for below, (curve, (shade, dashes, mark)) in enumerate(zip(curves, _styles(curves, theme), strict=True)):
+        _, _, time, values = curve
+        colour, above = tone(shade), min(len(curves) - 1 - below, 3)
+        width = 2.2 + 0.9 * above
+        dashes = dashes if isinstance(dashes, str) else (0, tuple(2.2 / width * part for part in dashes[1]))
+        axes.plot(time, values, color=colour, linewidth=width, linestyle=dashes, dash_capstyle="butt")
         last = int(np.nonzero(np.isfinite(values))[0][-1])
-        axes.plot(time[last], values[last], "o", color=colour, markersize=5, clip_on=False, zorder=5)
+        size = 6.5 + 2.0 * above
+        axes.plot(time[last], values[last], mark, color=colour, markersize=size, clip_on=False, zorder=5)
         ends.append((float(time[last]), float(values[last]), colour, end_label(curve)))
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -71,8 +88,23 @@ def draw_curves(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
             )
 
 
+def _styles(curves: Sequence[Curve], theme: Theme) -> list[tuple[Colour, Any, str]]:
+    """Return each curve's colour, dashes and mark: never a colour alone tells two apart."""
+    styles: list[tuple[Colour, Any, str]] = []
+    own = 0
+    for _, controller, _, _ in curves:
+        if controller in _KNOWN:
+            styles.append((theme.controller(controller), *_KNOWN[controller]))
+        else:
+            styles.append((theme.others[own % len(theme.others)], *_OTHERS[own % len(_OTHERS)]))
+            own += 1
+    return styles
+
+
 def _frame(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
     """Set limits, units and a quiet grid."""
+    from matplotlib.ticker import MaxNLocator
+
     ink, faint = tone(theme.ink), tone(theme.faint)
     values = np.concatenate([np.asarray(curve[3])[np.isfinite(curve[3])] for curve in curves])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
@@ -81,14 +113,21 @@ def _frame(axes: Axes, curves: Sequence[Curve], theme: Theme) -> None:
     axes.set_ylim(0.0 if low < _FROM_ZERO * high else low - room, high + room)
     axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
     axes.set_facecolor(tone(theme.background))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("time (s)", fontsize=TEXT, color=ink)
+    # level words are read more easily than words on their side
     axes.set_ylabel("mean distance to the nearest robot (m)", fontsize=TEXT, color=ink)
-    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.7, alpha=0.6)
+    axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
+    axes.yaxis.set_label_coords(0.0, 1.03)
+    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
     axes.set_axisbelow(True)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
     axes.spines["bottom"].set_color(faint)
-    axes.tick_params(colors=faint, labelsize=SMALL, left=False)
+    axes.tick_params(colors=tone(theme.faint), labelcolor=ink, labelsize=SMALL, left=False)
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:

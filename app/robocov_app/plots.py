@@ -13,10 +13,10 @@ import numpy as np
 
 from robocov.atomic import written
 from robocov.errors import ParameterError, shown
-from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_arena import draw_map, draw_run, map_handles, run_handles
+from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style, tone
+from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles
 from robocov_app.plot_curves import Curve, draw_curves, end_label
-from robocov_app.view.camera import length_label, round_length
+from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
 
 if TYPE_CHECKING:
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
     from robocov.environment import Environment
     from robocov.record import Record
+
+_SCALE = 1.3
+"""Of texts and lines on a page of the usual width: its legend stands beside the scale bar."""
 
 
 def plot_environment(
@@ -55,14 +58,11 @@ def plot_environment(
             _ticks(axes, environment, theme)
             draw_map(axes, environment, theme)
             return _figure_of(axes)
-        page = Page(size or _size_for(environment), theme)
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        box = _arena_box(page, environment)
-        axes = _arena(page, box, environment)
+        page, axes = _map_page(
+            environment, theme, size, environment.name, facts, map_handles(environment, theme)
+        )
         draw_map(axes, environment, theme)
-        _titles(page, box, environment.name, facts)
-        _scale_bar(page, box[0], box[1] + box[3], _zoom(box, environment))
-        page.legend(map_handles(environment, theme), box[1] + box[3] + 34 * page.scale)
         return page.figure
 
 
@@ -100,15 +100,16 @@ def plot_trajectories(
             _ticks(axes, record.environment, theme)
             draw_run(axes, record, theme, colours)
             return _figure_of(axes)
-        page = Page(size or _size_for(record.environment), theme)
-        box = _arena_box(page, record.environment)
-        axes = _arena(page, box, record.environment)
+        facts = [_distance(mean_distance), _time(record), _robots(record)]
+        page, axes = _map_page(
+            record.environment,
+            theme,
+            size,
+            _line(record.label, record.environment.name),
+            _line(*facts),
+            run_handles(record, theme, colours),
+        )
         draw_run(axes, record, theme, colours)
-        n = len(record.team)
-        facts = f"{_facts(record, mean_distance)}  ·  {n} robot{'s' if n > 1 else ''}"
-        _titles(page, box, f"{record.label}  ·  {record.environment.name}", facts)
-        _scale_bar(page, box[0], box[1] + box[3], _zoom(box, record.environment))
-        page.legend(run_handles(record, theme, colours), box[1] + box[3] + 34 * page.scale)
         return page.figure
 
 
@@ -153,33 +154,53 @@ def plot_comparison(
         bounds = np.array([record.environment.region.bounds for record in records])
         limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
         aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
-        if size is not None:
-            columns = _columns(len(records), aspect, size)
-        else:
-            in_a_row = len(records) <= 3 and aspect < 2.5
-            columns = len(records) if in_a_row else _columns(len(records), aspect, (1400, 800))
-            rows, wide = -(-len(records) // columns), 1400 if columns < 3 else 1800
-            size = (wide, int(np.clip(rows * ((wide - 36) / columns / aspect + 62) + 70, 320, 2400)))
-        page = Page(size, theme)
-        facts = [_facts(record, cost) for record, cost in zip(records, costs, strict=True)]
-        words = max(page.text_width(text) for text in facts)
-        panels = page.panels(len(records), columns, aspect, words)
-        for record, text, (box, room) in zip(records, facts, panels, strict=True):
+        shared, captions = _captions(records, costs)
+        handles: dict[str, Artist] = {}
+        for record in sorted(records, key=has_goals, reverse=True):
+            handles |= {str(h.get_label()): h for h in run_handles(record, theme, colours)}
+        entries = [*handles.values()]
+
+        scale = 1.5 if size is None else None
+        page = Page(size or (1600, 1000), theme, scale)
+        above, top = 54 * page.scale, 50 * page.scale if shared else 8 * page.scale
+        words = [
+            (page.text_width(record.label, points=TITLE, bold=True), page.text_width(text))
+            for record, text in zip(records, captions, strict=True)
+        ]
+        columns = columns_for(len(records), aspect, (page.size[0], page.size[1] - 2 * top), above)
+        fitting = (page.size[0] - page.margin) / (max(max(both) for both in words) + page.margin)
+        columns = max(min(columns, int(fitting)), 1)
+        slot = (page.size[0] - page.margin) / columns - page.margin
+        one_line = all(name + text + 16 * page.scale <= slot for name, text in words)
+        above = (30 if one_line else 54) * page.scale
+        if size is None:
+            rows = -(-len(records) // columns)
+            tall = top + rows * (above + slot / aspect + 14 * page.scale) + page.footer_height(entries)
+            page = Page((page.size[0], int(np.clip(tall, 320, 1800))), theme, scale)
+        wide = max((name + text + 16 * page.scale if one_line else max(name, text)) for name, text in words)
+        below = page.footer_height(entries)
+        panels = page.panels(len(records), columns, aspect, wide, above, top, below)
+        first, room = panels[0]
+        for record, text, (box, _) in zip(records, captions, panels, strict=True):
             axes = page.axes(box)
             axes.set_xlim(limits[0], limits[2])
             axes.set_ylim(limits[1], limits[3])
             axes.set_axis_off()
             draw_run(axes, record, theme, colours)
-            left, top = box[0], box[1]
-            page.text(record.label, left, top - 38 * page.scale, points=TITLE, bold=True, room=room)
-            page.text(text, left, top - 16 * page.scale, colour=theme.faint, room=room)
-        (left, _, width, _), _ = panels[0]
+            left, edge, up = box[0], box[1], 16 * page.scale
+            if one_line:
+                page.text(record.label, left, edge - up, points=TITLE, bold=True)
+                right = left + max(box[2], min(room, wide))
+                page.text(text, right, edge - up, colour=theme.faint, align="right")
+            else:
+                page.text(record.label, left, edge - 38 * page.scale, points=TITLE, bold=True, room=room)
+                page.text(text, left, edge - up, colour=theme.faint, room=room)
+        if shared:
+            y = first[1] - above - 20 * page.scale
+            page.text(shared, first[0], y, points=HEADING, bold=True, room=page.size[0] - 2 * page.margin)
+        right = max(box[0] + max(box[2], room if one_line else 0.0) for box, _ in panels)
         bottom = max(box[1] + box[3] for box, _ in panels)
-        _scale_bar(page, left, bottom, width / (limits[2] - limits[0]))
-        handles: dict[str, Artist] = {}
-        for record in records:
-            handles |= {str(h.get_label()): h for h in run_handles(record, theme, colours)}
-        page.legend(list(handles.values()), bottom + 34 * page.scale)
+        page.footer(entries, first[0], right, bottom, first[2] / (limits[2] - limits[0]))
         return page.figure
 
 
@@ -223,14 +244,16 @@ def plot_cost(
     theme = _theme(theme)
     with plain_style():
         size = size or (1000, 560)
-        page = Page(size, theme) if axes is None else None
+        # few things are on it: they may be large
+        scale = float(np.clip(min(size[0] / 800, size[1] / 450), 0.8, 6.0))
+        page = Page(size, theme, scale) if axes is None else None
         if axes is None:
             assert page is not None
             s = page.scale
             longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
-            right = min(36 * s + longest, 0.45 * size[0])
-            box = (74 * s, 58 * s, size[0] - 74 * s - right, size[1] - 58 * s - 62 * s)
-            page.text(title, page.margin, 28 * s, points=TITLE, bold=True, room=size[0] - 2 * page.margin)
+            right = min(40 * s + longest, 0.45 * size[0])
+            box = (52 * s, 86 * s, size[0] - 52 * s - right, size[1] - 86 * s - 56 * s)
+            page.text(title, 52 * s, 30 * s, points=TITLE, bold=True, room=size[0] - 52 * s - page.margin)
             axes = page.axes(box)
         draw_curves(axes, curves, theme)
         return _figure_of(axes)
@@ -287,35 +310,37 @@ def _ticks(axes: Axes, environment: Environment, theme: Theme) -> None:
     axes.set_facecolor(tone(theme.background))
 
 
-def _size_for(environment: Environment) -> tuple[int, int]:
-    """Return a page's size that suits the map's shape: about a million pixels, neither side too short."""
+def _map_page(
+    environment: Environment,
+    theme: Theme,
+    size: tuple[int, int] | None,
+    title: str,
+    facts: str,
+    handles: Sequence[Artist],
+) -> tuple[Page, Axes]:
+    """Return a page with titles, scale bar and legend, and the axes for one map in the room between."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
-    if aspect >= 1.0:
-        return 1400, int(np.clip(1364 / aspect + 155, 290, 1400))
-    return int(np.clip(1130 * aspect + 60, 800, 1300)), 1300
-
-
-def _arena_box(page: Page, environment: Environment) -> Box:
-    """Return the largest box for the map that leaves room for titles above, scale bar and legend below."""
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    aspect = (high_x - low_x) / (high_y - low_y)
-    above, below = 58 * page.scale, 74 * page.scale
+    if size is None:
+        page = Page((1400, 1000), theme, _SCALE)
+        around = 58 * page.scale + page.footer_height(handles)
+        width = float(np.clip((1300 - around) * aspect + 2 * page.margin, 840, 1400))
+        height = float(np.clip((width - 2 * page.margin) / aspect + around, 300, 1300))
+        page = Page((int(width), int(height)), theme, _SCALE)
+    else:
+        page = Page(size, theme)
+    above, below = 58 * page.scale, page.footer_height(handles)
     room_x, room_y = page.size[0] - 2 * page.margin, page.size[1] - above - below
     width = min(room_x, room_y * aspect)
     height = width / aspect
-    top = above + (room_y - height) / 2
-    return (page.size[0] - width) / 2, top, width, height
-
-
-def _arena(page: Page, box: Box, environment: Environment) -> Axes:
-    """Return axes that show exactly the region's bounds, without ticks: the page has a scale bar."""
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    axes = page.axes(box)
+    left, top = (page.size[0] - width) / 2, above + (room_y - height) / 2
+    axes = page.axes((left, top, width, height))
     axes.set_xlim(low_x, high_x)
     axes.set_ylim(low_y, high_y)
     axes.set_axis_off()
-    return axes
+    _titles(page, (left, top, width, height), title, facts)
+    page.footer(handles, left, left + width, top + height, width / (high_x - low_x))
+    return page, axes
 
 
 def _titles(page: Page, box: Box, title: str, facts: str) -> None:
@@ -331,41 +356,37 @@ def _titles(page: Page, box: Box, title: str, facts: str) -> None:
         page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
 
 
-def _facts(record: Record, mean_distance: float | None) -> str:
-    """Return the mean distance and the time: first what may not be cut."""
-    facts = [f"t = {record.time[-1]:.1f} s"]
-    if mean_distance is not None and np.isfinite(mean_distance):
-        facts.insert(0, f"mean distance {mean_distance:.3f} m")
-    return "  ·  ".join(facts)
+def _captions(records: Sequence[Record], costs: Sequence[float | None]) -> tuple[str, list[str]]:
+    """Return what is true of all runs, for the page's title, and of each, what is not."""
+    same: list[str] = []
+    own = [[_distance(cost)] for cost in costs]
+    for fact in (_map, _robots, _time):
+        found = [fact(record) for record in records]
+        if len(set(found)) == 1:
+            same.append(found[0])
+        else:
+            for facts, text in zip(own, found, strict=True):
+                facts.append(text)
+    return _line(*same), [_line(*facts) for facts in own]
 
 
-def _scale_bar(page: Page, left: float, bottom: float, zoom: float) -> None:
-    """Draw a bar of a round length under the left end of an arena; `zoom` is in pixels per metre."""
-    from matplotlib.lines import Line2D
-
-    length = round_length(max(min(140 * page.scale, page.size[0] / 6), 20.0) / zoom)
-    y, tick = bottom + 17 * page.scale, 4 * page.scale
-    right = left + length * zoom
-    for (x1, y1), (x2, y2) in (
-        ((left, y), (right, y)),
-        ((left, y - tick), (left, y + tick)),
-        ((right, y - tick), (right, y + tick)),
-    ):
-        (a, b), (c, d) = page.at(x1, y1), page.at(x2, y2)
-        page.figure.add_artist(Line2D([a, c], [b, d], color=tone(page.theme.ink), linewidth=1.3))
-    page.text(length_label(length), right + 8 * page.scale, y, points=SMALL, bold=True)
+def _line(*facts: str) -> str:
+    return "  ·  ".join(fact for fact in facts if fact)
 
 
-def _zoom(box: Box, environment: Environment) -> float:
-    low_x, _, high_x, _ = environment.region.bounds
-    return box[2] / (high_x - low_x)
+def _map(record: Record) -> str:
+    return record.environment.name
 
 
-def _columns(count: int, aspect: float, size: tuple[int, int]) -> int:
-    """Return the number of columns that lets `count` panels of this aspect be largest on a page."""
+def _robots(record: Record) -> str:
+    n = len(record.team)
+    return f"{n} robot{'s' if n > 1 else ''}"
 
-    def width(columns: int) -> float:
-        rows = -(-count // columns)
-        return min(size[0] / columns, (size[1] - 90) / rows * aspect)
 
-    return max(range(1, count + 1), key=lambda columns: (width(columns), columns))
+def _time(record: Record) -> str:
+    return f"t = {record.time[-1]:.1f} s"
+
+
+def _distance(mean_distance: float | None) -> str:
+    known = mean_distance is not None and np.isfinite(mean_distance)
+    return f"mean distance {mean_distance:.3f} m" if known else ""

@@ -141,10 +141,16 @@ def save_pictures(run: Run, folder: Path, options: RunOptions) -> None:
             "trajectories": lambda: plot_trajectories(
                 record, theme=theme, colours=options.colours, size=size, mean_distance=final
             ),
-            "cost": lambda: plot_cost([curve], theme=theme, size=size or COST_SIZE),
+            "cost": lambda: plot_cost([curve], theme=theme, size=size or COST_SIZE, title=cost_title(record)),
         },
         quiet=options.json,
     )
+
+
+def cost_title(record: Record) -> str:
+    """Return the title of a picture of cost curves: of what map and how many robots."""
+    n = len(record.team)
+    return f"Coverage cost  ·  {record.environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
 
 
 def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:

@@ -46,6 +46,7 @@ def run_of(
     positions = np.clip(positions, low + 0.1, high - 0.1)
     time = np.arange(steps) * 0.1
     nothing = np.full_like(positions, np.nan)
+    goals = nothing if controller == "rpf" else np.broadcast_to(end, positions.shape)
     return Record(
         environment=environment,
         team=Team.homogeneous(n),
@@ -59,7 +60,7 @@ def run_of(
         positions=positions,
         velocities=np.gradient(positions, time, axis=0),
         forces=np.ones_like(positions),
-        goals=nothing,
+        goals=goals,
         obstacle_points=nothing,
     )
 

@@ -4,6 +4,7 @@ import errno
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -151,8 +152,49 @@ class TestTrajectories:
         marks = next(line for line in axes.lines if line.get_marker() == "+")
         assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroid)
 
+    def test_no_centroid_peeps_out_from_under_a_robot(self):
+        record = run_of(ROOMS, 5)
+        last = partition(record.positions[-1], ROOMS.region).centroid
+        for _ in range(60):
+            last = partition(last, ROOMS.region).centroid
+        arrived = replace(record, positions=np.concatenate([record.positions, last[None]]))
+        axes = plot_trajectories(arrived).axes[0]
+        marks = next(line for line in axes.lines if line.get_marker() == "+")
+        assert len(marks.get_xydata()) == 0
+
+    def test_a_controller_without_goals_has_no_centroids(self):
+        figure = plot_trajectories(run_of(ROOMS, 5, controller="rpf"))
+        assert not any(line.get_marker() == "+" for line in figure.axes[0].lines)
+        (legend,) = figure.legends
+        assert "cell centroid" not in [text.get_text() for text in legend.get_texts()]
+        mixed = plot_comparison([run_of(ROOMS, 5, controller="rpf"), run_of(ROOMS, 5)])
+        (legend,) = mixed.legends
+        words = [text.get_text() for text in legend.get_texts()]
+        assert words[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
+
+    def test_a_crowd_stays_readable(self):
+        record = run_of(ROOMS, 120)
+        last = record.positions[-1].copy()
+        last[:100] = 2.0 + 0.21 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
+        record = replace(record, positions=np.concatenate([record.positions[:-1], last[None]]))
+        axes = plot_trajectories(record, size=(1000, 700)).axes[0]
+        (finals,) = [c for c in axes.collections if type(c) is PathCollection]
+        radius = np.sqrt(finals.get_sizes()) / 2 * axes.figure.dpi / 72
+        pixels = axes.transData.transform(last)
+        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2) + 1e9 * np.eye(120)
+        assert (radius[:, None] + radius[None] <= apart + 1e-6)[:100, :100].all()
+        assert radius[100:].max() > 1.2 * radius[:100].max()
+        numbered = {int(text.get_text()) for text in axes.texts}
+        assert not numbered & set(range(12, 90)) and numbered & set(range(101, 121))
+        few = plot_trajectories(run_of(ROOMS, 6), size=(1000, 700)).axes[0]
+        widths = [
+            next(c for c in a.collections if isinstance(c, LineCollection)).get_linewidths()[0]
+            for a in (axes, few)
+        ]
+        assert widths[0] < 0.7 * widths[1]
+
     def test_every_robot_has_its_number(self):
-        record = run_of(ROOMS, 12)
+        record = run_of(ROOMS, 12, seed=4)
         texts = plot_trajectories(record).axes[0].texts
         assert [text.get_text() for text in texts] == [str(k) for k in range(1, 13)]
         assert [text.get_position() for text in texts] == [tuple(p) for p in record.positions[-1].tolist()]
@@ -195,7 +237,70 @@ class TestTrajectories:
         assert not figure.legends
 
 
+class TestText:
+    """Sizes in pixels of what is read: it grows with the page."""
+
+    def heights(self, figure):
+        return [text.get_fontsize() * figure.dpi / 72 for text in figure.findobj(Text) if text.get_text()]
+
+    @pytest.mark.parametrize(
+        "draw", [plot_trajectories, lambda record, size: plot_comparison([record] * 3, size=size)]
+    )
+    def test_it_grows_with_the_page(self, draw):
+        small, large = (draw(run_of(ROOMS, 3), size=size) for size in ((960, 640), (2880, 1920)))
+        assert min(self.heights(large)) == pytest.approx(3 * min(self.heights(small)), rel=0.35)
+
+    def test_a_comparison_is_read_when_it_is_shown_at_half_its_size(self):
+        figure = plot_comparison([run_of(ROOMS, 3)] * 3)
+        assert figure.bbox.width == pytest.approx(1600, abs=0.1)
+        assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
+
+    def test_what_all_runs_share_is_said_once(self):
+        figure = plot_comparison([run_of(ROOMS, 3), run_of(ROOMS, 3, controller="rpf")])
+        words = [text.get_text() for text in figure.texts]
+        assert sum("t = 3.9 s" in text for text in words) == 1
+        different = plot_comparison([run_of(ROOMS, 3, steps=40), run_of(ROOMS, 3, steps=21)])
+        words = " ".join(text.get_text() for text in different.texts)
+        assert "t = 3.9 s" in words and "t = 2.0 s" in words
+
+    @pytest.mark.parametrize(("environment", "rows"), [(ROOMS, 1), (CORRIDOR, 3)])
+    def test_wide_maps_stand_below_each_other(self, environment, rows):
+        figure = plot_comparison([run_of(environment, 3)] * 3)
+        assert len({round(axes.get_position().y0, 6) for axes in figure.axes}) == rows
+
+
 class TestCost:
+    def test_curves_on_each_other_are_all_seen(self):
+        """Each is wider than the next, which lies on it, and has dashes and a mark of its own."""
+        figure = plot_cost(curves(1.0, 1.0, 1.0, 1.0))
+        long = [line for line in figure.axes[0].lines if len(line.get_xdata()) == len(T)]
+        widths = [line.get_linewidth() for line in long]
+        assert (np.diff(widths) < -0.5).all()
+        assert [line.get_zorder() for line in long] == sorted(line.get_zorder() for line in long)
+        dashes = {str(line._dash_pattern) for line in long}
+        marks = {line.get_marker() for line in figure.axes[0].lines if len(line.get_xdata()) == 1}
+        assert len(dashes) == len(marks) == 4
+
+    def test_a_controller_looks_alike_in_every_company(self):
+        time, values = T, 1.0 + np.exp(-T)
+        alone = plot_cost([("LA", "lloyd", time, values)]).axes[0].lines
+        among = plot_cost([("mine", "mine", time, values), ("LA", "lloyd", time, values)]).axes[0].lines
+        assert alone[0].get_color() == among[2].get_color()
+        assert alone[0]._dash_pattern == among[2]._dash_pattern
+        assert alone[1].get_marker() == among[3].get_marker()
+
+    def test_two_controllers_of_ones_own_differ(self):
+        first, _, second, *_ = plot_cost([("a", "a", T, T + 1), ("b", "b", T, T + 2)]).axes[0].lines
+        assert first.get_color() != second.get_color()
+
+    @pytest.mark.parametrize("end", [1.0, 20.0, 60.0, 90.0])
+    def test_times_are_round_numbers(self, end):
+        figure = plot_cost([("A", "rapf", np.linspace(0, end, 9), np.linspace(2, 1, 9))])
+        figure.canvas.draw()
+        words = [text.get_text() for text in figure.axes[0].get_xticklabels()]
+        assert len(words) >= 3
+        assert all(re.fullmatch(r"\d+|0\.\d", word) for word in words)
+
     def test_values_units_and_the_papers_colours(self):
         given_curves = curves(1.0, 1.4)
         figure = plot_cost(given_curves)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pygame
+from numpy.typing import NDArray
 
-from robocov_app.view.camera import length_label, round_length
+from robocov_app.view.camera import Camera, length_label, round_length
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.fonts import shortened, text_width
 from robocov_app.view.layers import Layer, LegendEntry
 from robocov_app.view.scene import Scene
+from robocov_app.view.theme import Theme, robot_hues
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 MARGIN = 14.0
 EDGE = MARGIN + 2.0
@@ -151,6 +154,16 @@ def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surfa
             x += _GLYPH * canvas.scale
             x += own.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
     return strip
+
+
+def legend_picture(
+    entries: Sequence[LegendEntry], width: int, theme: Theme, scale: float
+) -> NDArray[np.uint8]:
+    """Return these entries as an RGB picture of a width, (height, width, 3), 0 to 255."""
+    camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
+    strip = legend_strip(entries, Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1)))
+    pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
+    return pixels.reshape(strip.get_height(), width, 3)
 
 
 def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:

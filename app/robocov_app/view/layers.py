@@ -251,18 +251,20 @@ class Starts(Layer):
 class Centroids(Layer):
     """A plus at the centroid of each cell, where RAPF and Lloyd's algorithm head for.
 
-    Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them.
+    Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them. Nor where a
+    robot has arrived: only the ends of the plus would stick out from under its disc.
     """
 
     name = "centroids"
     title = "Centroids"
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.centroids is None or not scene.has_goals:
+        if scene.centroids is None or scene.snapshot is None or not scene.has_goals:
             return
         centers = canvas.camera.to_pixels(scene.centroids)
         arm = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 11.0 * canvas.scale))
-        for center in centers.tolist():
+        away = np.hypot(*(centers - canvas.camera.to_pixels(scene.snapshot.positions)).T)
+        for center in centers[away > drawn_radii(canvas, scene)].tolist():
             self._plus(canvas, center[0], center[1], arm)
 
     @staticmethod

@@ -86,8 +86,8 @@ class Theme:
     forces : dict of term name to Colour
     robots : nine colours
         One for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one.
-    tint : float
-        How much of a robot's colour its cell takes on.
+    tint, paper_tint : float
+        How much of a robot's colour its cell takes on; less in plots in the paper's colours.
     """
 
     name: str
@@ -110,6 +110,7 @@ class Theme:
     forces: dict[str, Colour]
     robots: tuple[Colour, ...]
     tint: float
+    paper_tint: float
     text: float = 12.0
     small_text: float = 11.0
     line: float = 1.0
@@ -168,6 +169,7 @@ LIGHT = Theme(
     },
     robots=tuple(rgb(code) for code in _MUTED),
     tint=0.25,
+    paper_tint=0.13,
 )
 
 DARK = Theme(
@@ -203,6 +205,7 @@ DARK = Theme(
         mix(rgb(code), (255, 255, 255), 0.38 if luminance(rgb(code)) < 0.16 else 0.0) for code in _MUTED
     ),
     tint=0.26,
+    paper_tint=0.19,
 )
 
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
