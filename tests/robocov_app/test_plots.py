@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from robocov.errors import OutputError, ParameterError
+from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.page import tone
 from robocov_app.plot_curves import spread
@@ -175,8 +176,12 @@ class TestTrajectories:
     def test_a_crowd_stays_readable(self):
         record = run_of(ROOMS, 120)
         last = record.positions[-1].copy()
-        last[:100] = 2.0 + 0.21 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
-        record = replace(record, positions=np.concatenate([record.positions[:-1], last[None]]))
+        last[:100] = 2.0 + 0.12 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
+        record = replace(
+            record,
+            positions=np.concatenate([record.positions[:-1], last[None]]),
+            team=Team.homogeneous(120, radius=0.03),
+        )
         axes = plot_trajectories(record, size=(1000, 700)).axes[0]
         (finals,) = [c for c in axes.collections if type(c) is PathCollection]
         radius = np.sqrt(finals.get_sizes()) / 2 * axes.figure.dpi / 72
