@@ -48,5 +48,7 @@ def test_every_command_and_map_that_it_names_exists() -> None:
 
 
 def test_pictures_are_there() -> None:
-    for name in re.findall(r"!\[[^]]*\]\(([^)]+)\)", README):
+    names = re.findall(r'(?:src|srcset)="([^"]+)"|!\[[^]]*\]\(([^)]+)\)', README)
+    assert len(names) >= 2
+    for name in ("".join(pair) for pair in names):
         assert (Path(__file__).parents[1] / name).is_file()
