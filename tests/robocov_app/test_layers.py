@@ -170,15 +170,23 @@ def test_centroids_are_those_that_the_controller_knows():
         assert painter.legend(scene) == words
 
 
-@pytest.mark.parametrize("size", [SIZE, (1920, 1440)])
+@pytest.mark.parametrize("size", [SIZE, (1279, 961), (1920, 1440), (1366, 1000)])
 def test_the_boundary_has_clean_corners(size):
-    pixels, painter = changed(explained(TWO), "boundary", size=size)
-    low, high = painter.camera.to_pixels(np.array([[0.0, 8.0], [8.0, 0.0]]))
-    half = LIGHT.boundary_line * painter.scale / 2
-    assert (pixels > low - half - 1.5).all() and (pixels < high + half + 1.5).all()
-    found = {tuple(pixel) for pixel in pixels.tolist()}
-    for x, y in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])):
-        assert (round(x), round(y)) in found
+    """Nothing sticks out there: the corners reach as far as the sides between them."""
+    frame, painter = drawn(explained(TWO), "boundary", size=size)
+    ink = np.abs(frame - np.array(LIGHT.background)).max(axis=2) > 50
+    for picture in (ink, ink.T):
+        whole = np.nonzero(picture.any(axis=0))[0]
+        middle = np.nonzero(picture[picture.shape[0] // 2])[0]
+        assert (whole.min(), whole.max()) == (middle.min(), middle.max())
+    for x, y in painter.camera.to_pixels(SQUARE.region.vertices).round().astype(int):
+        assert ink[y, x]
+
+
+def test_a_centroid_is_not_marked_where_its_robot_has_arrived():
+    centroids = explained(TWO).centroids
+    pixels, _ = changed(explained(centroids, goals=centroids), "centroids")
+    assert len(pixels) == 0
 
 
 class TestCrowds:
@@ -270,7 +278,7 @@ class TestRobots:
         scene = scene_of(run_of(SQUARE, 9, seed=3))
         frame, painter = drawn(scene, "robots")
         for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
-            quarters = np.rint(pixel * sprites.FINE).astype(int)
+            quarters = np.rint((pixel + 0.5) * sprites.FINE).astype(int)
             (x, y), shift = quarters // sprites.FINE, tuple((quarters % sprites.FINE).tolist())
             fill = LIGHT.robots[painter._hues[robot]]
             misses = []

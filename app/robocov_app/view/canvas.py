@@ -72,7 +72,7 @@ class Canvas:
             self.line(start, end, colour, width)
         if width > 2:  # lines have straight ends: fill the corners' notches
             for point in points:
-                self.stamp(partial(sprites.dot, width / 2, colour), point)
+                self.stamp(partial(sprites.dot, width / 2 - 0.5, colour), point)
 
     def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
         """Draw a smooth line between two pixels."""
@@ -130,7 +130,8 @@ class Canvas:
         """Put a sprite where it belongs to a quarter of a pixel."""
         if self._far_off(center):
             return
-        quarters_x, quarters_y = round(center[0] * sprites.FINE), round(center[1] * sprites.FINE)
+        # as for lines, whole numbers are the middles of pixels
+        quarters_x, quarters_y = (round((place + 0.5) * sprites.FINE) for place in center)
         (x, shift_x), (y, shift_y) = divmod(quarters_x, sprites.FINE), divmod(quarters_y, sprites.FINE)
         picture = sprite((shift_x, shift_y))
         half = picture.get_width() // 2
