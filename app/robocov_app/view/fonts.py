@@ -42,20 +42,24 @@ def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Su
     size : int, px
         Height of the letters' box.
     """
+    return _living(size, bold).render(text, True, colour)
+
+
+def _living(size: int, bold: bool) -> pygame.font.Font:
+    """Return the font; a new one where the font module was shut down in between: its fonts are dead."""
     if not pygame.font.get_init():
         pygame.font.init()
         _font.cache_clear()
     try:
-        return _font(size, bold).render(text, True, colour)
+        _font(size, bold).get_height()
     except pygame.error:
-        # the font module was shut down and started again in between: its fonts are dead
         _font.cache_clear()
-        return _font(size, bold).render(text, True, colour)
+    return _font(size, bold)
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    """Return the width of `text` in pixels."""
-    return label(text, size, (0, 0, 0), bold).get_width()
+    """Return the width of `text` in pixels, without drawing it."""
+    return _living(size, bold).size(text)[0]
 
 
 def shortened(text: str, size: int, width: float, bold: bool = False) -> str:
