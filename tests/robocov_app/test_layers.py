@@ -16,8 +16,10 @@ from robocov.environment import Environment, PolygonObstacle
 from robocov.robots import Team
 from robocov.starts import UniformStart
 from robocov_app.view.canvas import Canvas
+from robocov_app.view.fonts import label, text_width
+from robocov_app.view.furniture import fitting_status
 from robocov_app.view.layers import drawn_radii
-from robocov_app.view.picture import Painter, standard_layers
+from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.theme import DARK, LIGHT, readable_on, robot_hues
 from robocov_app.view.trajectories import Trajectories
 
@@ -469,6 +471,40 @@ def test_the_status_line_says_what_it_is_given():
     assert len(rows) > 3
     assert rows.min() > SIZE[1] - 34
     assert np.ptp(columns) < 12  # one digit
+
+
+def test_the_status_leaves_out_whole_facts_the_least_important_first():
+    scene = scene_of(run_of(SQUARE, 3), cost="mean distance 1.234 m")
+    size = 14
+    found = []
+    for room in range(600, 0, -5):
+        text = fitting_status(scene, size, room)
+        assert text_width(text, size) <= room
+        if not found or found[-1] != text:
+            found.append(text)
+    lead = "   ·   "
+    assert found[0] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m", "square"])
+    assert found[1] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m"])
+    assert found[2] == lead + "t = 3.9 s"
+
+
+def test_the_width_of_a_text_is_that_of_its_picture():
+    for text in ("", "RAPF", "mean distance 1.234 m · Museum", "…"):
+        for bold in (False, True):
+            assert text_width(text, 17, bold) == label(text, 17, (0, 0, 0), bold).get_width()
+
+
+def test_a_caption_has_what_the_brief_status_leaves_out():
+    """In a pane, controller and cost stand above the arena, and nothing of them below it."""
+    record = run_of(SQUARE, 3)
+    frames = []
+    for cost, label_ in (("1.23 m", "RAPF"), ("9.87 m", "RAPF"), ("1.23 m", "RPF")):
+        scene = replace(scene_of(record, cost=cost), label=label_)
+        frames.append(drawn(scene, "caption", "status", layers=pane_layers())[0])
+    for frame, side in ((frames[1], slice(SIZE[0] // 2, None)), (frames[2], slice(0, SIZE[0] // 2))):
+        rows, columns = np.nonzero((frame != frames[0]).any(axis=2))
+        assert len(rows) > 5 and rows.max() < 34
+        assert set(columns.tolist()) <= set(range(SIZE[0])[side])
 
 
 def test_a_long_status_is_cut_before_the_scale_bar():
