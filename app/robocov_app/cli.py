@@ -8,10 +8,12 @@ imported: asking for help must not pay for plotting.
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import sys
 import traceback
 from difflib import get_close_matches
+from pathlib import Path
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -36,6 +38,7 @@ _EXAMPLES = (
 
 def main(arguments: list[str] | None = None) -> int:
     """Run `robocov` with the given arguments and return its exit status."""
+    _prepare_output()
     given = sys.argv[1:] if arguments is None else arguments
     if not given or given[0] in ("-h", "--help", "help"):
         print(_overview())
@@ -81,6 +84,16 @@ def _guarded(name: str, rest: list[str]) -> int:
         print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
         return FAILED
     return int(status or OK)
+
+
+def _prepare_output() -> None:
+    """Make sure that answers can be written whatever the terminal, with a ? where it knows no ²."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by the caller
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115 - it stays open to the end
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _complain(message: str) -> int:

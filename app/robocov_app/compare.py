@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from robocov.controllers import controller_kind, gains_of
@@ -43,6 +44,22 @@ def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, 
         for k in takers:
             chosen[k][gain] = value
     return chosen
+
+
+def folder_names(names: Sequence[str]) -> list[str]:
+    """Return a folder name for each controller: its own name, made fit for a folder and different for all.
+
+    >>> folder_names(["rapf", "mine.py:Mine", "other/mine.py:Mine"])
+    ['rapf', 'Mine', 'Mine-2']
+    """
+    taken: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-") or "controller"
+        number = 1 + sum(
+            other == stem or re.fullmatch(re.escape(stem) + r"-\d+", other) is not None for other in taken
+        )
+        taken.append(stem if number == 1 else f"{stem}-{number}")
+    return taken
 
 
 def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:

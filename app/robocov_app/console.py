@@ -13,7 +13,7 @@ PIPED_WIDTH = 140
 
 
 def console() -> Console:
-    """Return the console of answers, on stdout."""
+    """Return the console of answers, on stdout; names may hold brackets, so none are taken for markup."""
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False)
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False)

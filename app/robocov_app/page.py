@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from robocov_app.view.camera import length_label, round_length
@@ -27,12 +29,24 @@ Place: TypeAlias = Literal["upper left", "upper center", "center right"]
 """Which part of a legend is where it is put."""
 
 
-def plain_style() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib draws alike whatever style its user has set."""
+@contextmanager
+def plain_style() -> Iterator[None]:
+    """Give a context in which matplotlib draws alike whatever style its user has set.
+
+    Names of maps and controllers are words: dollars in them are no formula, and letters that the font
+    has not are boxes and no reason for a warning.
+    """
     import matplotlib.style
 
-    style: dict[str, Any] = {"font.family": "DejaVu Sans", "text.usetex": False, "axes.unicode_minus": True}
-    return matplotlib.style.context(["default", style])
+    style: dict[str, Any] = {
+        "font.family": "DejaVu Sans",
+        "text.usetex": False,
+        "text.parse_math": False,
+        "axes.unicode_minus": True,
+    }
+    with matplotlib.style.context(["default", style]), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
 
 
 def tone(colour: Colour) -> tuple[float, float, float]:

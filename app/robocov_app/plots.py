@@ -281,6 +281,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
     metadata: dict[str, str | None] = {"Date": None} if kind == "svg" else {"Software": None}
     with (
         written(path) as part,
+        plain_style(),
         matplotlib.rc_context({"svg.hashsalt": "robocov", "svg.fonttype": "path", "savefig.bbox": None}),
     ):
         figure.savefig(part, format=kind, dpi=figure.dpi, metadata=metadata, facecolor=figure.get_facecolor())

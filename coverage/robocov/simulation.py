@@ -132,11 +132,13 @@ class Simulation:
     def observe(self) -> Observations:
         """Return what each robot knows now."""
         positions = self._world.positions
+        points = self._sensor.nearest(positions, self.team.sensing_range)
+        points.setflags(write=False)
         return Observations(
             positions=positions,
             velocities=self._world.velocities,
             neighbours=Neighbours.within(positions, self.team.communication_range),
-            obstacle_points=self._sensor.nearest(positions, self.team.sensing_range),
+            obstacle_points=points,
             region=self.environment.region,
             time=self.time,
         )

@@ -83,6 +83,7 @@ class World:
         self._velocities = np.zeros_like(self._positions)
         if velocities is not None:
             self._velocities[:] = velocities
+        self._protect()
         self._write_state()
 
         self._mass = team.mass[:, None]
@@ -157,6 +158,7 @@ class World:
         speed_limited = _limited(self._velocities, self.team.max_speed)
         if speed_limited is not self._velocities:
             self._velocities = speed_limited
+            self._protect()
         self._write_state()
 
     def _forget_contacts(self) -> None:
@@ -180,12 +182,18 @@ class World:
         self._state[:-1, 2:] = self._velocities
         batch.set_space_bodies(self._space, _STATE, self._state_buffer)
 
+    def _protect(self) -> None:
+        """Keep whoever gets the state (a controller, a record) from changing it."""
+        self._positions.setflags(write=False)
+        self._velocities.setflags(write=False)
+
     def _read_state(self) -> None:
         self._read_buffer.clear()
         batch.get_space_bodies(self._space, _STATE, self._read_buffer)
         state = np.frombuffer(self._read_buffer.float_buf(), dtype=np.float64).reshape(-1, 4)
         self._positions = state[:-1, :2].copy()
         self._velocities = state[:-1, 2:].copy()
+        self._protect()
 
 
 def _limited(vectors: Array, limit: Array) -> Array:

@@ -276,3 +276,15 @@ def test_a_run_follows_the_equations_of_motion() -> None:
     ]
     assert errors[1] < 0.005
     assert errors[1] < 0.4 * errors[0], "the error shrinks with the step"
+
+
+def test_a_controller_cannot_change_the_world(cluttered: Environment) -> None:
+    seen = Simulation(cluttered, Lloyd(), cluttered.start().sample(4)).observe()
+    for array in (seen.positions, seen.velocities, seen.obstacle_points, seen.region.vertices):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    simulation = Simulation(cluttered, Lloyd(), cluttered.start().sample(4))
+    for _ in range(300):  # Lloyd's robots touch walls here
+        simulation.step()
+        assert not simulation.positions.flags.writeable
+        assert not simulation.velocities.flags.writeable

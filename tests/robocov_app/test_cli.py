@@ -553,6 +553,72 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
     assert frames > 3
 
 
+@pytest.mark.parametrize("command", ["controllers", "maps", "check rooms", "schema"])
+def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
+    done = subprocess.run(
+        [*COMMAND, *command.split()],
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert done.stderr == b""
+    assert len(done.stdout) > 100
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
+def test_nobody_listening_is_no_error(tmp_path: Path) -> None:
+    words = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
+    done = subprocess.run(f"{' '.join([*COMMAND, *words])} >&-", shell=True, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run" / "trajectories.png").exists()
+
+
+def test_a_controller_for_the_whole_team_needs_no_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "import robocov as rc\n"
+        "@dataclass(frozen=True)\n"
+        "class Still:\n"
+        "    def begin(self, region, team):\n"
+        "        return 0\n"
+        "    def decide(self, seen, memory):\n"
+        "        assert memory == round(60 * seen.time)\n"
+        "        return rc.Decision(0 * seen.positions, memory=memory + 1)\n"
+    )
+    out = tmp_path / "out"
+    words = ("compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Still", "--out", str(out))
+    assert [row["label"] for row in answer(capsys, *words)["runs"]] == ["RAPF", "Still"]
+    assert (Record.load(out / "Still").forces == 0).all()
+
+
+def test_names_with_brackets_are_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    label = '[bold]R[/] [/] $x'\n"
+        "    def force(self, own):\n"
+        "        return own.centroid - own.position\n"
+    )
+    words = (
+        "compare",
+        "square",
+        *SHORT,
+        "--controllers",
+        "rapf",
+        f"{mine}:Mine",
+        "--out",
+        str(tmp_path / "out"),
+    )
+    assert main(list(words)) == 0
+    assert "[bold]R[/] [/] $x" in capsys.readouterr().out
+
+
 def test_a_reader_that_has_had_enough_is_no_error() -> None:
     done = subprocess.run(
         f"{sys.executable} -m robocov_app schema | head -c 10",

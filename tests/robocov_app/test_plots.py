@@ -422,3 +422,14 @@ def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
         [sys.executable, "-c", _LAZY, str(Path(__file__).parent)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["cost $x^2$ and $y$", "$\\frac$ [/] {", "倉庫 🤖"])
+def test_names_are_words_whatever_is_in_them(name, tmp_path):
+    """No formula, and no warning (an error here) of letters that the font has not."""
+    record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
+    save_figure(plot_trajectories(record), tmp_path / "a.png")
+    figure = plot_trajectories(record)
+    assert any(name in text.get_text() for text in figure.texts)
+    assert not any(text.get_parse_math() for text in figure.texts)
+    save_figure(plot_cost([(name, "mine", record.time, record.time)]), tmp_path / "b.svg")

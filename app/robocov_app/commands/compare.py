@@ -36,7 +36,7 @@ def command(options: Arguments) -> int:
     from robocov.controllers import make_controller
     from robocov.cost import CoverageCost
     from robocov.mapfile import load_map
-    from robocov_app.compare import gains_for, rows_of, save_comparison, save_comparison_moving
+    from robocov_app.compare import folder_names, gains_for, rows_of, save_comparison, save_comparison_moving
     from robocov_app.interruption import Interruption
     from robocov_app.output import finite, prepared, results
     from robocov_app.run import evaluated, save_numbers, simulated, starts_of, team_of
@@ -49,14 +49,15 @@ def command(options: Arguments) -> int:
     gains = gains_for(names, parsed_gains(options.gains))
     environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
-    folders = [make_controller(name, chosen).name for name, chosen in zip(names, gains, strict=True)]
+    for name, chosen in zip(names, gains, strict=True):
+        make_controller(name, chosen)
     starts_of(environment, options)
     team_of(options)
     target = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = CoverageCost(environment, lattice=options.lattice)
     runs: dict[str, Run] = {}
     with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
-        for name, chosen, folder in zip(names, gains, folders, strict=True):
+        for name, chosen, folder in zip(names, gains, folder_names(names), strict=True):
             run = evaluated(simulated(environment, name, chosen, options, stop), cost, quiet=options.json)
             save_numbers(run, prepared(out / folder, overwrite=True))
             runs[folder] = run

@@ -34,6 +34,7 @@ def command(options: Arguments) -> int:
     from robocov.controllers import make_controller
     from robocov.cost import CoverageCost
     from robocov.mapfile import load_map
+    from robocov_app.compare import folder_names
     from robocov_app.interruption import Interruption
     from robocov_app.output import finite, results
     from robocov_app.run import (
@@ -49,10 +50,10 @@ def command(options: Arguments) -> int:
     gains = parsed_gains(options.gains)
     environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
-    controller = make_controller(options.controller, gains)
+    make_controller(options.controller, gains)
     starts_of(environment, options)
     team_of(options)
-    out = options.out or Path(f"{Path(options.map).stem}-{controller.name}")
+    out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
         run = evaluated(record, CoverageCost(environment, lattice=options.lattice), quiet=options.json)

@@ -18,4 +18,4 @@ class Arguments:
 
 def command(options: Arguments) -> None:
     """Print the schema."""
-    print(json.dumps(map_schema(), indent=1, ensure_ascii=False))
+    print(json.dumps(map_schema(), indent=1))

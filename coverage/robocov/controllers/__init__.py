@@ -137,6 +137,13 @@ def _kind_in_file(name: str) -> type[Any]:
             )
         raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
     kind = kinds[class_name]
+    for attribute, default in (
+        ("name", class_name),
+        ("label", class_name),
+        ("summary", (kind.__doc__ or "").strip().split("\n")[0]),
+    ):
+        if not hasattr(kind, attribute):
+            setattr(kind, attribute, default)
     if not hasattr(kind, "__dataclass_fields__"):
         raise ParameterError(
             f"controller {shown(name)}: {class_name} is not a dataclass; "
