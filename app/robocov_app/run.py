@@ -34,6 +34,9 @@ COST_SIZE = (1000, 560)
 FILM_HOLD = 1.0
 """Seconds for which a film stays on its last moment."""
 
+STOPPED_SAMPLES = 200
+"""Samples of the coverage cost of a run that was stopped."""
+
 COST_RATE = 10.0
 """Samples of the coverage cost per simulated second."""
 
@@ -97,9 +100,16 @@ def simulated(
     return recorder.record()
 
 
-def evaluated(record: Record, cost: CoverageCost, *, quiet: bool) -> Run:
-    """Evaluate the coverage cost along a record and sum the run up."""
-    total = len(sample_moments(record, COST_RATE))
+def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
+    """Evaluate the coverage cost along a record and sum the run up.
+
+    Whoever has stopped a long run does not want to wait for all of its cost: after Ctrl-C it is
+    evaluated at `STOPPED_SAMPLES` moments at the most.
+    """
+    rate = COST_RATE
+    if stop.requested and record.time[-1] > 0:
+        rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
+    total = len(sample_moments(record, rate))
     with progress("coverage cost", total, quiet=quiet) as update:
         done = 0
 
@@ -108,7 +118,7 @@ def evaluated(record: Record, cost: CoverageCost, *, quiet: bool) -> Run:
             done += 1
             update(done)
 
-        history = cost_history(record, cost, COST_RATE, count)
+        history = cost_history(record, cost, rate, count)
     return Run(record, history, summarise(record, history))
 
 

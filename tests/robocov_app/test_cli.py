@@ -511,6 +511,8 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
     assert 10 < len(record) < 180_000
     run = json.loads((out / "run.json").read_text())
     assert run["duration_s"] == pytest.approx(record.time[-1])
+    assert run["summary"]["mean_distance_m"] > 0
+    assert len((out / "cost.csv").read_text().splitlines()) < 300, "nobody waits for all of the cost"
     assert (out / "trajectories.png").exists()
 
 

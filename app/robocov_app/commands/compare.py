@@ -58,8 +58,10 @@ def command(options: Arguments) -> int:
     runs: dict[str, Run] = {}
     with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
         for name, chosen, folder in zip(names, gains, folder_names(names), strict=True):
-            run = evaluated(simulated(environment, name, chosen, options, stop), cost, quiet=options.json)
-            save_numbers(run, prepared(out / folder, overwrite=True))
+            record = simulated(environment, name, chosen, options, stop)
+            record.save(prepared(out / folder, overwrite=True))
+            run = evaluated(record, cost, stop, quiet=options.json)
+            save_numbers(run, out / folder)
             runs[folder] = run
             if stop.requested:
                 break

@@ -56,7 +56,9 @@ def command(options: Arguments) -> int:
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
-        run = evaluated(record, CoverageCost(environment, lattice=options.lattice), quiet=options.json)
+        record.save(folder)  # what took long is safe, whatever happens to the evaluation
+        cost = CoverageCost(environment, lattice=options.lattice)
+        run = evaluated(record, cost, stop, quiet=options.json)
         save_numbers(run, folder)
         save_pictures(run, folder, options)
         save_run_moving(run, folder, options, stop)
