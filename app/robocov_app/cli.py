@@ -97,7 +97,8 @@ def _prepare_output() -> None:
 
 
 def _complain(message: str) -> int:
-    print(f"robocov: error: {message}", file=sys.stderr)
+    # names of files and gains may hold line breaks; an error is one line all the same
+    print(f"robocov: error: {' '.join(message.splitlines())}", file=sys.stderr)
     return BAD_INPUT
 
 

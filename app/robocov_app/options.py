@@ -126,7 +126,7 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     gains: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if not equals or not name:
+        if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
             raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
         if name in gains:
             raise ParameterError(f"--set: {name} is given twice")
