@@ -239,13 +239,13 @@ def _frame(region: Region) -> _Frame:
     order = angles.argsort()
     normals = region.normals
     radius = float(np.abs(corners).max())
-    turns = np.array(1j * (0.3 + 2.0 * np.pi / 3.0 * np.arange(3)), dtype=np.complex128)
+    turns = 1j * (0.3 + 2.0 * np.pi / 3.0 * np.arange(3))
     return _Frame(
         origin=complex(*region.centroid),
         area=region.area,
         closest=(_CLOSEST * region.diameter) ** 2,
         farthest=_ROBOTS_WITHIN * radius / math.sqrt(2.0),
-        sentinels=_SENTINELS_AT * radius * np.exp(turns),
+        sentinels=np.asarray(_SENTINELS_AT * radius * np.exp(turns), dtype=np.complex128),
         corners=corners[order],
         angles=angles[order],
         normals=normals,
