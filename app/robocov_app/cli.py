@@ -77,6 +77,10 @@ def _guarded(name: str, rest: list[str]) -> int:
         # the reader (head, say) has had enough; keep the interpreter from complaining at its end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        return _complain(f"the answer cannot be written: {error.strerror or error}")
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
     except Exception:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from robocov_app.interruption import Interruption
     from robocov_app.options import RunOptions
 
+_HEAD = {"format": "robocov-comparison", "version": 1}
+
 _FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
 
 
@@ -54,7 +56,7 @@ def folder_names(names: Sequence[str]) -> list[str]:
     """
     taken: list[str] = []
     for name in names:
-        stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-") or "controller"
+        stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-")[:64] or "controller"
         number = 1 + sum(
             other == stem or re.fullmatch(re.escape(stem) + r"-\d+", other) is not None for other in taken
         )
@@ -78,15 +80,19 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
     ]
 
 
+def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
+    """Write which folders belong to the comparison, so that also one that is killed can be replaced."""
+    write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
+
+
 def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) -> None:
     """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
     from robocov_app.plots import plot_comparison, plot_cost
     from robocov_app.view.theme import theme_named
 
     rows = rows_of(runs)
-    write_json(
-        folder / "comparison.json", finite({"format": "robocov-comparison", "version": 1, "runs": rows})
-    )
+    content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
+    write_json(folder / "comparison.json", finite(content))
     columns = [name for name in rows[0] if name not in ("label", "gains")]
     write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
 

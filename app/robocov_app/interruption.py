@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType
 
 
@@ -32,3 +34,5 @@ class Interruption:
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
+        with suppress(OSError):
+            os.write(2, b"\nstopping; Ctrl-C again ends at once\n")

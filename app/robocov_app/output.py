@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,44 +13,20 @@ from typing import Any
 from robocov.atomic import written
 from robocov.errors import InputError, OutputError
 
-_OURS = (
+_OF_A_RUN = (
     *("run.json", "record.npz", "cost.csv", "run.mp4"),
     *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
-    *("comparison.json", "comparison.csv", "comparison.mp4"),
 )
-"""Files that an earlier result in the same folder may have left; `--overwrite` removes these."""
-
-
-def prepared(folder: Path, *, overwrite: bool) -> Path:
-    """Create `folder`, or empty it of an earlier result.
-
-    Files that are not robocov's stay.
-
-    Raises
-    ------
-    InputError
-        When the folder is not empty and `overwrite` is not given.
-    OutputError
-        When it cannot be made or written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            if not overwrite:
-                raise InputError(
-                    f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted"
-                )
-            _clear(folder)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder}: cannot be used for results: Permission denied")
-    return folder
+_OF_A_COMPARISON = (
+    *("comparison.json", "comparison.csv", "comparison.mp4"),
+    *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
+)
+"""Files that a result consists of, beside ``frames/`` and the folders of a comparison's runs."""
 
 
 @contextmanager
 def results(folder: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Give a prepared folder; where the work in it fails with nothing written, it goes again.
+    """Give a folder for results; where the work in it fails with nothing written, it goes again.
 
     Raises
     ------
@@ -69,20 +44,91 @@ def results(folder: Path, *, overwrite: bool) -> Iterator[Path]:
         raise
 
 
+def prepared(folder: Path, *, overwrite: bool) -> Path:
+    """Create `folder`, or make sure that its content may be replaced; nothing is removed yet.
+
+    Raises
+    ------
+    InputError
+        When the folder is not empty and `overwrite` is not given, or what is in it is no result.
+    OutputError
+        When it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        used = any(folder.iterdir())
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
+    if used and not overwrite:
+        raise InputError(f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted")
+    if used and not _holds_result(folder):
+        raise InputError(
+            f"{folder}: what is in the folder is no result of robocov, so --overwrite leaves it alone; "
+            f"another --out was wanted"
+        )
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"{folder}: cannot be used for results: Permission denied")
+    return folder
+
+
+def cleared(folder: Path) -> Path:
+    """Remove the earlier result in `folder`, and nothing else; call it when there is a new one to write.
+
+    Folders are removed only when they belong to that result and are empty then; links are not followed.
+
+    Raises
+    ------
+    OutputError
+        When something cannot be removed.
+    """
+    try:
+        _clear(folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
+    return folder
+
+
+def _holds_result(folder: Path) -> bool:
+    return _content(folder / "run.json", "robocov-run") is not None or (
+        _content(folder / "comparison.json", "robocov-comparison") is not None
+    )
+
+
+def _content(path: Path, kind: str) -> dict[str, Any] | None:
+    """Return the JSON object in a file of ours of this kind, None where it is something else."""
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) and content.get("format") == kind else None
+
+
 def _clear(folder: Path) -> None:
-    for name in _OURS:
+    comparison = _content(folder / "comparison.json", "robocov-comparison")
+    if comparison is not None:
+        for name in comparison.get("folders", ()):
+            part = folder / Path(str(name)).name
+            if part.is_dir() and not part.is_symlink() and _holds_result(part):
+                _clear(part)
+                with suppress(OSError):
+                    part.rmdir()
+    elif _content(folder / "run.json", "robocov-run") is None:
+        return
+    for name in _OF_A_RUN if comparison is None else _OF_A_COMPARISON:
         (folder / name).unlink(missing_ok=True)
     for part in folder.glob(".*.part.*"):  # of a run that was killed
         part.unlink()
     frames = folder / "frames"
-    if frames.is_dir():
+    if frames.is_dir() and not frames.is_symlink():
         for picture in frames.glob("[0-9]*.png"):
             picture.unlink()
-    for part in folder.iterdir():
-        if part.is_dir() and (part / "run.json").is_file():
-            _clear(part)
-            if not any(part.iterdir()):
-                shutil.rmtree(part)
+        with suppress(OSError):
+            frames.rmdir()
+
+
+def listed(folder: Path) -> str:
+    """Return the names of what a result consists of, for people."""
+    return ", ".join(sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")))
 
 
 def write_json(path: Path, content: Any) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,7 +92,9 @@ def simulated(
         seed=options.seed,
     )
     total = round(options.duration / options.dt)
-    with progress(f"simulating {controller.label}", total, quiet=options.json) as update:
+    # what a user's controller prints must not get among the answer
+    chatter = redirect_stdout(sys.stderr) if options.json else nullcontext()
+    with chatter, progress(f"simulating {controller.label}", total, quiet=options.json) as update:
         for step, snapshot in enumerate(simulation.snapshots(options.duration)):
             recorder.add(snapshot)
             if step % 10 == 0 or step == total:
@@ -122,9 +126,9 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
     return Run(record, history, summarise(record, history))
 
 
-def save_numbers(run: Run, folder: Path) -> None:
-    """Write ``record.npz``, ``run.json`` and ``cost.csv``."""
-    run.record.save(folder, finite(run.summary))
+def save_numbers(run: Run, folder: Path, lattice: int) -> None:
+    """Write ``record.npz``, ``run.json`` and ``cost.csv``; the summary depends on the lattice."""
+    run.record.save(folder, finite(run.summary), lattice=lattice)
     history = run.history
     rows = zip(
         history.time.tolist(),

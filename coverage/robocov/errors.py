@@ -45,12 +45,12 @@ class OutputError(RobocovError):
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """Return `value` as it is quoted in messages: its repr, cut to `limit` characters.
+    """Return `value` as it is quoted in messages: its repr on one line, cut to `limit` characters.
 
     >>> shown("x" * 100, limit=12)
     "'xxxxxxxx..."
     """
-    text = repr(value)
+    text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
@@ -62,5 +62,5 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    hint = f": did you mean {near[0]!r}?" if near else ":"
+    hint = f": did you mean {near[0]!r}?" if near else ""
     return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(names)})"

@@ -87,8 +87,13 @@ class Record:
         goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
         return Snapshot(seen, Decision(forces=self.forces[k], goals=goals))
 
-    def to_json(self, summary: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary."""
+    def to_json(
+        self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> dict[str, Any]:
+        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary.
+
+        `lattice` is the one on which the summary's cost was evaluated.
+        """
         from robocov.mapfile import to_json
 
         return {
@@ -102,11 +107,14 @@ class Record:
             "seed": self.seed,
             "dt_s": self.dt,
             "duration_s": float(self.time[-1]),
+            "lattice": lattice,
             "versions": versions(),
             "summary": dict(summary or {}),
         }
 
-    def save(self, folder: Path, summary: Mapping[str, Any] | None = None) -> None:
+    def save(
+        self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> None:
         """Write ``record.npz`` and ``run.json`` to `folder`; each appears whole or not at all.
 
         Raises
@@ -114,15 +122,16 @@ class Record:
         OutputError
             When they cannot be written.
         """
+        folder = Path(folder)
         arrays = {name: getattr(self, name) for name in ARRAYS}
         with written(folder / "record.npz") as part, part.open("wb") as file:
             np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
         with written(folder / "run.json") as part:
-            text = json.dumps(self.to_json(summary), indent=1, allow_nan=False)
+            text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
             part.write_text(text + "\n", encoding="utf-8")
 
     @classmethod
-    def load(cls, folder: Path) -> Record:
+    def load(cls, folder: Path | str) -> Record:
         """Return the record that `save` wrote to `folder`.
 
         Raises
@@ -132,6 +141,7 @@ class Record:
         """
         from robocov.mapfile import from_json
 
+        folder = Path(folder)
         path = folder / "run.json"
         try:
             run = json.loads(path.read_text(encoding="utf-8"))
@@ -196,6 +206,7 @@ class Recorder:
         self._name = controller.name if name is None else name
         self._environment, self._team, self._controller, self._dt = environment, team, controller, dt
         self._start, self._seed = start, seed
+        self._gains = gain_values(getattr(controller, "law", controller))
         self._time: list[float] = []
         self._rows: dict[str, list[Array]] = {name: [] for name in ARRAYS[1:]}
 
@@ -215,13 +226,12 @@ class Recorder:
 
     def record(self) -> Record:
         """Return what was collected so far."""
-        law = getattr(self._controller, "law", self._controller)
         return Record(
             environment=self._environment,
             team=self._team,
             controller=self._name,
             label=self._controller.label,
-            gains=gain_values(law),
+            gains=self._gains,
             start=self._start,
             seed=self._seed,
             dt=self._dt,

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -75,6 +78,10 @@ class Simulation:
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
         check_dt(dt)
+        if isinstance(controller, type) or not isinstance(controller, Controller):
+            raise ParameterError(
+                f"controller: {shown(controller)}, but a controller, as in Rapf(), was wanted"
+            )
         _check_starts(environment, positions, self.team)
         self.environment = environment
         self.controller = controller
@@ -82,8 +89,8 @@ class Simulation:
         pieces = solid_pieces(environment)
         self._sensor = RangeSensor(pieces)
         self._world = World(pieces, self.team, positions)
-        self._memory = controller.begin(environment.region, self.team)
         self._steps = 0
+        self._memory = self._asked(lambda: controller.begin(environment.region, self.team))
         self._snapshot: Snapshot | None = None
 
     @property
@@ -115,18 +122,24 @@ class Simulation:
         return self._snapshot
 
     def _decide(self, seen: Observations) -> Decision:
+        decision = self._asked(lambda: self.controller.decide(seen, self._memory))
+        return self._checked(decision, seen.time)
+
+    def _asked(self, question: Callable[[], Any]) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
         try:
-            return self.controller.decide(seen, self._memory)
+            return question()
         except RobocovError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if type(self.controller) in CONTROLLERS.values():
                 raise
-            last = traceback.extract_tb(error.__traceback__)[-1]
+            frames = traceback.extract_tb(error.__traceback__)
+            home = str(Path(__file__).parent)
+            theirs = [frame for frame in frames if not frame.filename.startswith(home)] or frames
             raise ParameterError(
                 f"controller {self.controller.name!r}: {type(error).__name__}: {error} "
-                f"({Path(last.filename).name}, line {last.lineno}) at {self.time:.3f} s"
+                f"({Path(theirs[-1].filename).name}, line {theirs[-1].lineno}) at {self.time:.3f} s"
             ) from error
 
     def observe(self) -> Observations:
@@ -152,7 +165,6 @@ class Simulation:
             When the controller returns anything but finite forces of shape (n, 2).
         """
         decision = self.snapshot.decision
-        self._check_forces(decision)
         self._world.step(decision.forces, self.dt)
         self._memory = decision.memory
         self._steps += 1
@@ -160,6 +172,8 @@ class Simulation:
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
         """Yield the present snapshot and one after every step, until `duration` seconds have passed."""
+        if not 0.0 <= duration < np.inf:
+            raise ParameterError(f"duration: {shown(duration)} s, but a finite number from 0 was wanted")
         yield self.snapshot
         for _ in range(round(duration / self.dt)):
             self.step()
@@ -195,22 +209,37 @@ class Simulation:
         twin = object.__new__(Simulation)
         twin.__dict__.update(self.__dict__)
         twin._world = self._world.copy()
+        twin._memory = deepcopy(self._memory)
+        twin._snapshot = None  # it holds the memory that the step after it will hand on
         return twin
 
-    def _check_forces(self, decision: Decision) -> None:
-        forces = decision.forces
-        expected = (len(self.team), 2)
-        if forces.shape != expected:
-            raise ParameterError(
-                f"controller {self.controller.name!r}: forces of shape {forces.shape}, "
-                f"but {expected} was wanted"
-            )
+    def _checked(self, made: Any, time: float) -> Decision:
+        """Return the decision when it is one that can be carried out and recorded."""
+        where = f"controller {self.controller.name!r}"
+        if not isinstance(made, Decision):
+            raise ParameterError(f"{where}: decide gave {shown(made)}, but a Decision was wanted")
+        decision: Decision = made
+        forces = self._rows(decision.forces, f"{where}: forces")
+        goals = None if decision.goals is None else self._rows(decision.goals, f"{where}: goals")
+        if forces is not decision.forces or goals is not decision.goals:
+            decision = replace(decision, forces=forces, goals=goals)
         if not np.isfinite(forces).all():
             robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
             raise ParameterError(
-                f"controller {self.controller.name!r}: force {forces[robot].tolist()} on robot {robot + 1} "
-                f"at {self.time:.3f} s, but finite newtons were wanted"
+                f"{where}: force {forces[robot].tolist()} on robot {robot + 1} "
+                f"at {time:.3f} s, but finite newtons were wanted"
             )
+        return decision
+
+    def _rows(self, values: Any, what: str) -> Array:
+        """Return two numbers for each robot as an array, the same one where it is one already."""
+        try:
+            array = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"{what}: {shown(values)}, but numbers were wanted") from None
+        if array.shape != (len(self.team), 2):
+            raise ParameterError(f"{what} of shape {array.shape}, but {(len(self.team), 2)} was wanted")
+        return array
 
 
 def check_dt(dt: float) -> None:

@@ -84,6 +84,15 @@ class Start:
         StartError
             When the robots do not fit.
         """
+        for name, value in (("robots", n), ("seed", seed)):
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, int | np.integer)
+                or value < (name == "robots")
+            ):
+                raise StartError(f"start {self.name!r}: {name}: {value!r}, but a whole number was wanted")
+        if not 0.0 < radius < math.inf:
+            raise StartError(f"start {self.name!r}: radius: {radius!r} m, but a number above 0 was wanted")
         spacing = 2.0 * radius * (1.0 + GAP)
         room = self._room(radius * (1.0 + GAP))
         where = f"start {self.name!r}"

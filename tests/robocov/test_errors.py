@@ -18,7 +18,7 @@ def test_the_tree_of_errors() -> None:
     [
         ("rappf", "unknown controller 'rappf': did you mean 'rapf'? (known: lloyd, rapf, rpf)"),
         ("RAPF", "unknown controller 'RAPF': did you mean 'rapf'? (known: lloyd, rapf, rpf)"),
-        ("zzzz", "unknown controller 'zzzz': (known: lloyd, rapf, rpf)"),
+        ("zzzz", "unknown controller 'zzzz' (known: lloyd, rapf, rpf)"),
     ],
 )
 def test_unknown_names_get_the_nearest(name: str, message: str) -> None:

@@ -190,7 +190,9 @@ class Wild:
 @pytest.mark.parametrize(
     ("forces", "message"),
     [
-        (np.zeros((3, 2)), r"forces of shape \(3, 2\), but \(2, 2\) was wanted"),
+        (np.zeros((3, 2)), r"'wild': forces of shape \(3, 2\), but \(2, 2\) was wanted"),
+        ("east", r"'wild': forces: 'east', but numbers were wanted"),
+        (None, r"'wild': forces of shape \(\), but \(2, 2\) was wanted"),
         (np.array([[0.0, 0.0], [np.nan, 1.0]]), r"force \[nan, 1.0\] on robot 2 at 0.000 s"),
     ],
 )
@@ -224,6 +226,56 @@ def test_impossible_starts_are_refused(
 def test_impossible_control_periods_are_refused(empty: Environment, dt: float) -> None:
     with pytest.raises(ParameterError, match="dt: "):
         Simulation(empty, Rapf(), [[1.0, 1.0]], dt=dt)
+
+
+def test_a_decision_must_be_one(empty: Environment) -> None:
+    class Array(Wild):
+        def decide(self, seen: Observations, memory: object) -> Decision:
+            return self.forces  # type: ignore[return-value]
+
+    class Goals(Wild):
+        def decide(self, seen: Observations, memory: object) -> Decision:
+            return Decision(self.forces, goals=np.zeros((1, 2)))
+
+    class Late(Wild):
+        def begin(self, region: object, team: object) -> None:
+            raise KeyError("late")
+
+    starts = [[2.0, 2.0], [4.0, 4.0]]
+    with pytest.raises(ParameterError, match=r"decide gave .*, but a Decision was wanted"):
+        Simulation(empty, Array(np.zeros((2, 2))), starts).step()
+    with pytest.raises(ParameterError, match=r"goals of shape \(1, 2\), but \(2, 2\) was wanted"):
+        Simulation(empty, Goals(np.zeros((2, 2))), starts).step()
+    with pytest.raises(ParameterError, match=r"'wild': KeyError: 'late' \(test_simulation.py, line \d+\)"):
+        Simulation(empty, Late(np.zeros((2, 2))), starts)
+    for wrong in (Rapf, "rapf"):
+        with pytest.raises(ParameterError, match=r"but a controller, as in Rapf\(\), was wanted"):
+            Simulation(empty, wrong, starts)  # type: ignore[arg-type]
+    simulation = Simulation(empty, Wild([[0, 0], [0, 0]]), starts)  # type: ignore[arg-type]
+    simulation.step()
+    for duration in (float("nan"), float("inf"), -1.0):
+        with pytest.raises(ParameterError, match="duration"):
+            simulation.run(duration)
+
+
+def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
+    class Counting(Wild):
+        def begin(self, region: object, team: object) -> list[int]:  # type: ignore[override]
+            return [0]
+
+        def decide(self, seen: Observations, memory: list[int]) -> Decision:  # type: ignore[override]
+            memory[0] += 1  # in place, as one should not
+            return Decision(np.full((1, 2), 0.1 * memory[0]), memory=memory)
+
+    simulation = Simulation(empty, Counting(np.zeros((1, 2))), [[2.0, 2.0]])
+    for _ in range(3):
+        simulation.step()
+    twin = simulation.copy()
+    for _ in range(5):
+        simulation.step()
+    for _ in range(5):
+        twin.step()
+    np.testing.assert_array_equal(twin.positions, simulation.positions)
 
 
 def test_team_and_starts_must_agree(empty: Environment) -> None:

@@ -36,9 +36,16 @@ def command(options: Arguments) -> int:
     from robocov.controllers import make_controller
     from robocov.cost import CoverageCost
     from robocov.mapfile import load_map
-    from robocov_app.compare import folder_names, gains_for, rows_of, save_comparison, save_comparison_moving
+    from robocov_app.compare import (
+        begin_comparison,
+        folder_names,
+        gains_for,
+        rows_of,
+        save_comparison,
+        save_comparison_moving,
+    )
     from robocov_app.interruption import Interruption
-    from robocov_app.output import finite, prepared, results
+    from robocov_app.output import cleared, finite, listed, prepared, results
     from robocov_app.run import evaluated, save_numbers, simulated, starts_of, team_of
 
     names = options.controllers
@@ -51,17 +58,19 @@ def command(options: Arguments) -> int:
     # everything that the user gave is checked before a folder is made
     for name, chosen in zip(names, gains, strict=True):
         make_controller(name, chosen)
-    starts_of(environment, options)
     team_of(options)
+    starts_of(environment, options)
     target = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = CoverageCost(environment, lattice=options.lattice)
     runs: dict[str, Run] = {}
     with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
         for name, chosen, folder in zip(names, gains, folder_names(names), strict=True):
             record = simulated(environment, name, chosen, options, stop)
-            record.save(prepared(out / folder, overwrite=True))
+            if not runs:
+                begin_comparison(cleared(out), folder_names(names))
+            record.save(cleared(prepared(out / folder, overwrite=options.overwrite)))
             run = evaluated(record, cost, stop, quiet=options.json)
-            save_numbers(run, out / folder)
+            save_numbers(run, out / folder, options.lattice)
             runs[folder] = run
             if stop.requested:
                 break
@@ -72,7 +81,7 @@ def command(options: Arguments) -> int:
     else:
         print_table(runs)
         done = "stopped; what was done is in" if stop.requested else "saved in"
-        print(f"{done} {out}/: {', '.join(sorted(path.name for path in out.iterdir()))}")
+        print(f"{done} {out}/: {listed(out)}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -41,10 +41,15 @@ def command(options: Arguments) -> None:
     """Evaluate and print."""
     if not 2 <= options.lattice <= 2048:
         raise ParameterError(f"--lattice: {options.lattice}, but a whole number from 2 to 2048 was wanted")
+    if options.sites is not None and (options.sites.is_dir() or not options.sites.name):
+        raise InputError(f"--sites: {str(options.sites)!r}, but the name of a file was wanted")
     environment = load_map(options.map)
     robots = read_positions(options.positions)
     cost = CoverageCost(environment, lattice=options.lattice)
-    result = cost(robots)
+    try:
+        result = cost(robots)
+    except InputError as error:
+        raise InputError(f"{options.positions}: {error}") from error
     if options.sites is not None:
         with written(options.sites) as part, part.open("wb") as file:
             np.savez(file, points=cost.points, distances=result.distances, owner=result.owner)

@@ -36,7 +36,7 @@ def command(options: Arguments) -> int:
     from robocov.mapfile import load_map
     from robocov_app.compare import folder_names
     from robocov_app.interruption import Interruption
-    from robocov_app.output import finite, results
+    from robocov_app.output import cleared, finite, listed, results
     from robocov_app.run import (
         evaluated,
         save_numbers,
@@ -51,15 +51,15 @@ def command(options: Arguments) -> int:
     environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
     make_controller(options.controller, gains)
-    starts_of(environment, options)
     team_of(options)
+    starts_of(environment, options)
+    cost = CoverageCost(environment, lattice=options.lattice)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
-        record.save(folder)  # what took long is safe, whatever happens to the evaluation
-        cost = CoverageCost(environment, lattice=options.lattice)
+        record.save(cleared(folder))  # what took long is safe, whatever happens to the evaluation
         run = evaluated(record, cost, stop, quiet=options.json)
-        save_numbers(run, folder)
+        save_numbers(run, folder, options.lattice)
         save_pictures(run, folder, options)
         save_run_moving(run, folder, options, stop)
     if options.json:
@@ -67,7 +67,7 @@ def command(options: Arguments) -> int:
     else:
         print_summary(run)
         stopped = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stop.requested else "saved in"
-        print(f"{stopped} {folder}/: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+        print(f"{stopped} {folder}/: {listed(folder)}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -15,6 +15,9 @@ class Arguments:
     Example: robocov schema > robocov-map.schema.json
     """
 
+    json: bool = False
+    """Accepted for the sake of uniformity: the answer is JSON anyway."""
+
 
 def command(options: Arguments) -> None:
     """Print the schema."""

@@ -52,20 +52,39 @@ FLAGSHIP = "rapf"
 def controller_kinds() -> dict[str, type[Any]]:
     """Return all controller classes by name: built in, then those that installed packages offer.
 
-    Raises
-    ------
-    ParameterError
-        When an installed package's controller cannot be loaded.
+    One that cannot be loaded is left out.
     """
-    kinds = dict(CONTROLLERS)
+    return {**_offered(), **CONTROLLERS}
+
+
+def _offered(only: str | None = None) -> dict[str, type[Any]]:
+    """Return the controllers that installed packages offer, or the one called `only`.
+
+    One that cannot be loaded is an error where it is asked for by name, and left out otherwise: it
+    must not stand in the way of the others.
+    """
+    kinds: dict[str, type[Any]] = {}
     for entry in entry_points(group="robocov.controllers"):
+        if entry.name in CONTROLLERS or (only is not None and entry.name != only):
+            continue
         try:
-            kinds.setdefault(entry.name, entry.load())
-        except Exception as error:
-            raise ParameterError(
-                f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded: {error}"
-            ) from error
+            kinds[entry.name] = _named(entry.load(), entry.name)
+        except (Exception, SystemExit) as error:
+            if only is not None:
+                raise ParameterError(
+                    f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded: "
+                    f"{type(error).__name__}: {error}"
+                ) from error
     return kinds
+
+
+def _named(kind: type[Any], name: str) -> type[Any]:
+    """Give a class the names that it does not state itself."""
+    summary = (kind.__doc__ or "").strip().split("\n")[0]
+    for attribute, default in (("name", name), ("label", kind.__name__), ("summary", summary)):
+        if not hasattr(kind, attribute):
+            setattr(kind, attribute, default)
+    return kind
 
 
 def controller_kind(name: str) -> type[Any]:
@@ -78,10 +97,12 @@ def controller_kind(name: str) -> type[Any]:
     """
     if ".py:" in name or name.endswith(".py"):
         return _kind_in_file(name)
-    kinds = controller_kinds()
-    if name not in kinds:
-        raise ParameterError(unknown_name("controller", name, kinds))
-    return kinds[name]
+    if name in CONTROLLERS:
+        return CONTROLLERS[name]
+    offered = _offered(name)
+    if name not in offered:
+        raise ParameterError(unknown_name("controller", name, controller_kinds()))
+    return offered[name]
 
 
 def make_controller(name: str, gains: Mapping[str, object] | None = None) -> Controller:
@@ -120,7 +141,7 @@ def _kind_in_file(name: str) -> type[Any]:
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ParameterError(
             f"controller {shown(name)}: {file} cannot be run: {type(error).__name__}: {error}"
         ) from error
@@ -137,16 +158,10 @@ def _kind_in_file(name: str) -> type[Any]:
             )
         raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
     kind = kinds[class_name]
-    for attribute, default in (
-        ("name", class_name),
-        ("label", class_name),
-        ("summary", (kind.__doc__ or "").strip().split("\n")[0]),
-    ):
-        if not hasattr(kind, attribute):
-            setattr(kind, attribute, default)
-    if not hasattr(kind, "__dataclass_fields__"):
+    parameters = getattr(kind, "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
         raise ParameterError(
-            f"controller {shown(name)}: {class_name} is not a dataclass; "
+            f"controller {shown(name)}: {class_name} is not a frozen dataclass; "
             f"@dataclass(frozen=True) above it was wanted"
         )
-    return kind
+    return _named(kind, class_name)

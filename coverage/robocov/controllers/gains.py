@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from robocov.errors import ParameterError, shown, unknown_name
@@ -74,9 +74,12 @@ def gain(
 
 
 def gains_of(controller: Any) -> dict[str, Gain]:
-    """Return the gains of a controller class or instance by name, in their order of declaration."""
+    """Return the gains of a controller class or instance by name, in their order of declaration.
+
+    One that is no dataclass has none.
+    """
     found: dict[str, Gain] = {}
-    for each in fields(controller):
+    for each in fields(controller) if is_dataclass(controller) else ():
         default = None if each.default is MISSING else each.default
         if "gain" in each.metadata:
             unit, low, high, meaning, optional = each.metadata["gain"]
@@ -122,4 +125,10 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
             if not known:
                 raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
             raise ParameterError(f"{where}: {unknown_name('gain', name, known)}")
-    return kind(**{name: known[name].validated(value, where) for name, value in values.items()})
+    given = {name: known[name].validated(value, where) for name, value in values.items()}
+    try:
+        return kind(**given)
+    except TypeError as error:
+        raise ParameterError(
+            f"{where}: cannot be made: {error}; a default for every field was wanted"
+        ) from error
