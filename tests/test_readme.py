@@ -9,7 +9,8 @@ import pytest
 
 from robocov.controllers import make_controller
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, parse_map
+from robocov.mapfile import bundled_maps, load_map, parse_map
+from robocov.simulation import Simulation
 from robocov_app.cli import COMMANDS
 
 README = (Path(__file__).parents[1] / "README.md").read_text()
@@ -32,10 +33,15 @@ def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(capsys.readouterr().out.split()) == 3
 
 
-def test_the_controller_is_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["Homing", "Patient"])
+def test_the_controllers_run(name: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
-    file.write_text(block("python", "class Homing"))
-    assert make_controller(f"{file}:Homing", {"shy": 0.5}).name == "Homing"
+    file.write_text(block("python", f"class {name}"))
+    controller = make_controller(f"{file}:{name}")
+    room = load_map("rooms")
+    record = Simulation(room, controller, room.start().sample(3), dt=1 / 30).run(2.0)
+    assert record.label == name
+    assert abs(record.positions[-1] - record.positions[0]).max() > 0.1
 
 
 def test_every_command_and_map_that_it_names_exists() -> None:

@@ -65,7 +65,7 @@ class RunOptions:
     colours: Literal["paper", "robots"] = "paper"
     """Trajectories in the paper's red, or a colour for each robot; in films too."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size in pixels; by default 1280x720 for films, and what suits the map for pictures."""
+    """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
