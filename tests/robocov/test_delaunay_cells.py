@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from voronoi_cases import REGIONS, SQUARE, assert_same_ring, clipped, lattice, scattered
 
 from robocov.clipped_cells import clip_cells, mass_and_centroid
 from robocov.delaunay_cells import delaunay_cells
 from robocov.neighbours import Neighbours
 from robocov.voronoi import partition
-
-sys.path.insert(0, str(Path(__file__).parent))
-from voronoi_cases import REGIONS, SQUARE, assert_same_ring, clipped, lattice, scattered
 
 
 def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
+import brute_force_geodesic as brute
 import numpy as np
 import pytest
 import shapely
@@ -13,9 +11,6 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError
 from robocov.geodesic import Geodesics
-
-sys.path.insert(0, str(Path(__file__).parent))
-import brute_force_geodesic as brute
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 BAY = ((0, 0), (8, 0), (8, 4), (4, 4), (4, 6), (8, 6), (8, 8), (0, 8), (2, 4))

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from voronoi_cases import (
+    FAMILIES,
+    PENTAGON,
+    REGIONS,
+    SQUARE,
+    Family,
+    circle,
+    families,
+    names,
+    scattered,
+    seeds,
+)
 
 from robocov import triangulation
 from robocov.arrays import Array, ComplexArray
@@ -23,20 +33,6 @@ from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.triangulation import SENTINELS, Fitted, Triangulation, triangulated
 from robocov.voronoi import VoronoiPartition, partition
-
-sys.path.insert(0, str(Path(__file__).parent))
-from voronoi_cases import (
-    FAMILIES,
-    PENTAGON,
-    REGIONS,
-    SQUARE,
-    Family,
-    circle,
-    families,
-    names,
-    scattered,
-    seeds,
-)
 
 CORNERS = 40.0 * np.exp(2j * np.pi / 3 * np.arange(3) + 0.2j)
 

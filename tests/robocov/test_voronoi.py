@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 import pickle
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from robocov.cell_edges import REGION
-from robocov.errors import InputError
-from robocov.neighbours import Neighbours
-from robocov.region import Region
-from robocov.voronoi import partition
-
-sys.path.insert(0, str(Path(__file__).parent))
 from voronoi_cases import (
     FAMILIES,
     PENTAGON,
@@ -34,6 +24,12 @@ from voronoi_cases import (
     scattered,
     seeds,
 )
+
+from robocov.cell_edges import REGION
+from robocov.errors import InputError
+from robocov.neighbours import Neighbours
+from robocov.region import Region
+from robocov.voronoi import partition
 
 
 @pytest.mark.parametrize("name", REGIONS)

@@ -1,14 +1,13 @@
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pygame
 import pytest
 import shapely
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,9 +21,6 @@ from robocov_app.view.layers import drawn_radii
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.theme import DARK, LIGHT, readable_on, robot_hues
 from robocov_app.view.trajectories import Trajectories
-
-sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 SIZE = (640, 480)
 ONE = np.array([[4.0, 4.0]])

@@ -1,19 +1,15 @@
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.errors import ParameterError
 from robocov_app.panes import comparison_frames, pane_layout, side_by_side
 from robocov_app.recording import frame_rows
 from robocov_app.view.theme import DARK, LIGHT
-
-sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 
 def plain(count, width=64, height=48, start=0):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, explained, run_of, scene_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -17,9 +18,6 @@ from robocov_app.view.layers import Obstacles
 from robocov_app.view.picture import Painter, scale_for, standard_layers
 from robocov_app.view.theme import DARK, LIGHT
 from robocov_app.view.trajectories import Trajectories
-
-sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, explained, run_of, scene_of
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])

@@ -11,6 +11,7 @@ import matplotlib
 import numpy as np
 import pygame
 import pytest
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
@@ -32,9 +33,6 @@ from robocov_app.plots import (
     save_figure,
 )
 from robocov_app.view.theme import DARK, LIGHT
-
-sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
 
 SIZES = [(900, 600), (1400, 901), (2560, 1440)]
 MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]

@@ -5,13 +5,13 @@ import os
 import re
 import stat
 import subprocess
-import sys
 from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
+from drawn_run import ROOMS, SQUARE, run_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -24,9 +24,6 @@ from robocov_app.recording import (
     save_film,
     save_frames,
 )
-
-sys.path.insert(0, str(Path(__file__).parent))
-from drawn_run import ROOMS, SQUARE, run_of
 
 
 def plain(count, width=64, height=48):

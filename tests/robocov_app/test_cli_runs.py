@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import SHORT, answer, complaint
+
+from robocov.controllers import CONTROLLERS, gains_of
+from robocov.record import Record
+from robocov_app.cli import main
+
+
+def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    words = (
+        "run",
+        "rooms",
+        *SHORT,
+        "--frames",
+        "--video",
+        "--fps",
+        "10",
+        "--film-speed",
+        "1",
+        "--out",
+        str(out),
+    )
+    assert main(list(words)) == 0
+    said = capsys.readouterr()
+    assert str(out) in said.out
+    assert "mean distance" in said.out
+    names = sorted(path.name for path in out.iterdir())
+    assert names == sorted(
+        [
+            "run.json",
+            "record.npz",
+            "cost.csv",
+            "trajectories.png",
+            "trajectories.svg",
+            "cost.png",
+            "cost.svg",
+            "frames",
+            "run.mp4",
+        ]
+    )
+    frames = sorted(path.name for path in (out / "frames").iterdir())
+    assert frames == [f"{k:06d}.png" for k in range(len(frames))]
+    assert len(frames) == 11 + 10, "one second at ten frames, and one second on the last"
+    header, *rows = (out / "cost.csv").read_text().splitlines()
+    assert header == "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
+    assert len(rows) == 11
+    run = json.loads((out / "run.json").read_text())
+    assert run["summary"]["mean_distance_m"] == float(rows[-1].split(",")[1])
+    assert run["controller"] == {
+        "name": "rapf",
+        "gains": {g.name: g.default for g in gains_of(CONTROLLERS["rapf"]).values()},
+    }
+    assert len(Record.load(out)) == 61
+
+
+def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    row = answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
+    assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(row)
+    assert row["settled_at_s"] is None
+    assert row["interrupted"] is False
+
+
+def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("one", "two"):
+        answer(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
+    for file in (
+        "record.npz",
+        "run.json",
+        "cost.csv",
+        "trajectories.png",
+        "trajectories.svg",
+        "cost.png",
+        "cost.svg",
+    ):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
+
+
+def test_compare_gives_every_controller_the_same_starts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "compare"
+    rows = answer(
+        capsys, "compare", "rooms", *SHORT, "--set", "k_rep=1", "rpf.k_rep=2", "--video", "--out", str(out)
+    )
+    assert [row["controller"] for row in rows["runs"]] == ["rapf", "rpf", "lloyd"]
+    assert [row["gains"].get("k_rep") for row in rows["runs"]] == [1.0, 2.0, None]
+    assert min(row["above_best"] for row in rows["runs"]) == 0.0
+    records = [Record.load(out / name) for name in ("rapf", "rpf", "lloyd")]
+    assert all((record.positions[0] == records[0].positions[0]).all() for record in records)
+    names = {path.name for path in out.iterdir()}
+    assert {"comparison.json", "comparison.csv", "comparison.mp4", "cost.svg", "trajectories.png"} <= names
+    assert len((out / "comparison.csv").read_text().splitlines()) == 4
+
+
+def test_overwrite_removes_the_old_result_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    answer(capsys, "run", "square", *SHORT, "--frames", "--out", str(out))
+    (out / "notes.txt").write_text("mine")
+    (out / "frames" / "notes.txt").write_text("mine")
+    assert "not empty" in complaint(capsys, "run", "square", *SHORT, "--out", str(out))
+    answer(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
+    assert (out / "notes.txt").read_text() == "mine"
+    assert [path.name for path in (out / "frames").iterdir()] == ["notes.txt"]
+
+
+def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    pull: float = 0.5\n"
+        "    def force(self, own):\n"
+        "        return self.pull * (own.centroid - own.position)\n"
+    )
+    out = tmp_path / "run"
+    answer(
+        capsys, "run", "square", *SHORT, "--controller", f"{mine}:Mine", "--set", "pull=2", "--out", str(out)
+    )
+    record = Record.load(out)
+    assert record.controller == f"{mine}:Mine", "the run can be repeated from its record"
+    assert record.label == "Mine"
+    assert record.gains == {"pull": 2.0}
+    assert not np.isnan(record.goals).any()
+
+
+@pytest.mark.parametrize(
+    ("law", "part"),
+    [
+        (
+            "return 1 / 0",
+            "controller 'Mine': ZeroDivisionError: division by zero (mine.py, line 5) at 0.000 s",
+        ),
+        ("return [1.0]", "controller 'Mine': force(own) gave [1.0], but two numbers in newtons were wanted"),
+        ("return None", "controller 'Mine': force(own) gave nan"),
+        ("raise SystemExit(0)", "controller 'Mine': SystemExit: 0 (mine.py, line 5)"),
+        ("return [float('nan'), 0]", "controller 'Mine': force [nan, 0.0] on robot 1 at 0.000 s"),
+        ("return 'east'", "controller 'Mine': ValueError"),
+    ],
+)
+def test_a_controller_that_fails_is_named_with_its_line(
+    law: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    def force(self, own):\n"
+        f"        {law}\n"
+    )
+    out = tmp_path / "run"
+    words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
+    assert part in complaint(capsys, *words)
+    assert not out.exists(), "a folder with nothing in it is not left behind"

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from called import COMMAND, SHORT, answer
+
+from robocov.record import Record
+from robocov_app.cli import main
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="needs a limit on the size of files")
+@pytest.mark.parametrize(("limit", "file"), [(2_000, "record.npz"), (45_000, "trajectories.png")])
+def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, file: str) -> None:
+    """The size of files is limited, which fails as a full disk does: in the middle of a write."""
+    script = (
+        "import resource, signal, sys\n"
+        f"signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from robocov_app.cli import main\n"
+        "import robocov, robocov_app.run, robocov_app.plots, matplotlib.figure\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
+        f"out = {str(tmp_path / 'run')!r}\n"
+        "words = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--out', out]\n"
+        "sys.exit(main(words))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    errors = [line for line in done.stderr.splitlines() if line.startswith("robocov: error: ")]
+    assert len(errors) == 1
+    assert "Traceback" not in done.stderr
+    assert f"{file}: cannot be written" in errors[0]
+    left = [path.name for path in (tmp_path / "run").glob("*")]
+    assert file not in left
+    assert not [name for name in left if "part" in name]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = subprocess.Popen(
+        [
+            *COMMAND,
+            "run",
+            "square",
+            "--duration",
+            "3000",
+            "--lattice",
+            "16",
+            "--size",
+            "480x320",
+            "--out",
+            str(out),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not out.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    said, complaints = process.communicate(timeout=120)
+    assert process.returncode == 130, complaints
+    assert "Traceback" not in complaints
+    assert "stopped at" in said
+    assert "what was done is in" in said
+    record = Record.load(out)
+    assert 10 < len(record) < 180_000
+    run = json.loads((out / "run.json").read_text())
+    assert run["duration_s"] == pytest.approx(record.time[-1])
+    assert run["summary"]["mean_distance_m"] > 0
+    assert len((out / "cost.csv").read_text().splitlines()) < 300, "nobody waits for all of the cost"
+    assert (out / "trajectories.png").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
+    """In a terminal Ctrl-C goes to the whole process group, the encoder included."""
+    import imageio_ffmpeg
+
+    out = tmp_path / "run"
+    words = [
+        "run",
+        "square",
+        "--duration",
+        "20",
+        "--lattice",
+        "16",
+        "--film-speed",
+        "0.01",
+        "--size",
+        "480x320",
+    ]
+    process = subprocess.Popen(
+        [*COMMAND, *words, "--video", "--out", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not list(out.glob(".run.*.part.mp4")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    said, complaints = process.communicate(timeout=60)
+    assert process.returncode == 130, complaints
+    assert "Traceback" not in complaints
+    assert "run.mp4" in said
+    assert not list(out.glob(".*")), "no unfinished file is left"
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(out / "run.mp4"))
+    assert frames > 3
+
+
+@pytest.mark.parametrize("command", ["controllers", "maps", "check rooms", "schema"])
+def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
+    done = subprocess.run(
+        [*COMMAND, *command.split()],
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert done.stderr == b""
+    assert len(done.stdout) > 100
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
+def test_nobody_listening_is_no_error(tmp_path: Path) -> None:
+    words = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
+    done = subprocess.run(f"{' '.join([*COMMAND, *words])} >&-", shell=True, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run" / "trajectories.png").exists()
+
+
+def test_a_controller_for_the_whole_team_needs_no_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "import robocov as rc\n"
+        "@dataclass(frozen=True)\n"
+        "class Still:\n"
+        "    def begin(self, region, team):\n"
+        "        return 0\n"
+        "    def decide(self, seen, memory):\n"
+        "        assert memory == round(60 * seen.time)\n"
+        "        return rc.Decision(0 * seen.positions, memory=memory + 1)\n"
+    )
+    out = tmp_path / "out"
+    words = ("compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Still", "--out", str(out))
+    assert [row["label"] for row in answer(capsys, *words)["runs"]] == ["RAPF", "Still"]
+    assert (Record.load(out / "Still").forces == 0).all()
+
+
+def test_names_with_brackets_are_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    label = '[bold]R[/] [/] $x'\n"
+        "    def force(self, own):\n"
+        "        return own.centroid - own.position\n"
+    )
+    words = (
+        "compare",
+        "square",
+        *SHORT,
+        "--controllers",
+        "rapf",
+        f"{mine}:Mine",
+        "--out",
+        str(tmp_path / "out"),
+    )
+    assert main(list(words)) == 0
+    assert "[bold]R[/] [/] $x" in capsys.readouterr().out
+
+
+def test_a_reader_that_has_had_enough_is_no_error() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m robocov_app schema | head -c 10",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    assert len(done.stdout) == 10
