@@ -17,9 +17,9 @@ class Rpf:
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
     Every robot is pushed away from the neighbours within `rho_0` and from the single closest
-    obstacle point; viscosity brings the team to rest. The default gains are among its best over the
-    bundled maps; stronger repulsion spreads hardly better and trembles, because the single nearest
-    obstacle point jumps. For the paper's protocol, which gives RPF and RAPF the same potential
+    obstacle point; viscosity brings the team to rest. The team often trembles there, because the
+    single nearest obstacle point jumps, and the more the stronger the repulsion is, while it spreads
+    hardly better. For the paper's protocol, which gives RPF and RAPF the same potential
     parameters, set `k_rep` and `rho_0` for both.
     """
 
