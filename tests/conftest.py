@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.starts import DiscStart, UniformStart
+
+# no test finds, or leaves, anything in the cache of whoever runs it
+os.environ["ROBOCOV_CACHE"] = ""
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
