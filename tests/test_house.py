@@ -64,11 +64,8 @@ def test_files_do_one_thing() -> None:
 TESTED_THROUGH = {
     "arrays": "everywhere",
     "atomic": "test_record",
-    "clusters": "test_cost",
-    "corners": "test_geodesic",
+    "corner_views": "test_cost",
     "robot_views": "test_cost",
-    "orientation": "test_geodesic",
-    "visibility": "test_geodesic",
     "cell_edges": "test_voronoi",
     "clipped_cells": "test_voronoi",
     "maprules": "test_map_errors",

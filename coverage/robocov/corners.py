@@ -11,8 +11,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.clusters import coherent_order
-from robocov.orientation import BITS, Grid, cross
+from robocov.orientation import Grid, cross
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +41,7 @@ class Walls:
     sector_wide : (s,)
         True where the sector is a corner.
     corner_x, corner_y : (k,) grid steps
-        The corners, numbered so that neighbours have near numbers.
+        The corners.
     corner_in, corner_out : (2, k) grid steps
         Their edges, along the wall: before → corner, corner → after.
     """
@@ -82,8 +81,6 @@ class Walls:
         # a straight wall counts where another sector ends on it: that one's walls would hide what is ahead
         wide = (turn < 0.0) | ((turn == 0.0) & (np.bincount(vertex)[vertex] > 1))
         corner = np.nonzero(wide)[0]
-        cells = np.column_stack([x[vertex[corner]], y[vertex[corner]]]) * 2.0 ** (16 - BITS)
-        corner = corner[coherent_order(*np.clip(cells, 0, 65535).astype(np.int64).T)]
         inner = ~_on_hull(x, y, start, end)
         return cls(
             grid=grid,
@@ -124,10 +121,9 @@ class Walls:
                 found[i] = at
         return found
 
-    def sectors_hold(self, vertex: int, x: Array, y: Array) -> BoolArray:
-        """Return whether the direction from `vertex` to each of (n,) points runs into its free space."""
-        holds = np.zeros(len(x), dtype=bool)
-        dx, dy = x - self.x[vertex], y - self.y[vertex]
+    def sectors_hold(self, vertex: int, dx: Array, dy: Array) -> BoolArray:
+        """Return whether each of (n,) directions from `vertex` runs into its free space."""
+        holds = np.zeros(len(dx), dtype=bool)
         for s in np.nonzero(self.sector_vertex == vertex)[0]:
             a, b = self.sector_before[s], self.sector_after[s]
             first = cross(self.x[vertex] - self.x[a], self.y[vertex] - self.y[a], dx, dy) >= 0.0

@@ -4,25 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.clusters import Clusters, coherent_order
+from robocov.corner_views import CornerViews
 from robocov.errors import InputError, ParameterError, shown
 from robocov.geodesic import Geodesics
-from robocov.robot_views import RobotViews, first_of_least
+from robocov.grouping import least
+from robocov.lattice import Lattice
+from robocov.robot_views import RobotViews
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.array_cache import ArrayCache
     from robocov.environment import Environment
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
-_PAIRS = 1 << 16
-"""Pairs of sites and corners looked at in one piece, which bounds the memory."""
+_CACHED = 1
+"""Version of the tables in the cache; another one whenever they mean something else."""
+
+_WORTH_KEEPING = 0.5
+"""Seconds; what is computed faster is not put into the cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +107,11 @@ class CoverageCost:
     environment : Environment
     lattice : int
         Cells along a side.
+    progress : callable
+        Called now and then, while what is known before the positions is computed, with the part that is
+        done. It may raise, to give up.
+    cache : ArrayCache
+        Where the part of it that takes long is looked for, and kept.
 
     Attributes
     ----------
@@ -123,7 +136,14 @@ class CoverageCost:
     0.383
     """
 
-    def __init__(self, environment: Environment, lattice: int = 64) -> None:
+    def __init__(
+        self,
+        environment: Environment,
+        lattice: int = 64,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cache: ArrayCache | None = None,
+    ) -> None:
         whole = isinstance(lattice, (int, np.integer)) and not isinstance(lattice, bool)
         if not whole or not 1 <= lattice <= MAX_LATTICE:
             raise ParameterError(
@@ -132,60 +152,30 @@ class CoverageCost:
         self.lattice = int(lattice)
         self.geodesics = Geodesics(environment)
         self._areas = np.array([part.area for part in environment.free.geoms])
-        self._lay()
-        self._view()
+        self._sites = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
+        self._corner_views = self._looked_up(progress, cache)
+        self.points, self.cells = frozen(self._sites.points), self._sites.cells
+        self.spacing = self._sites.spacing
+        corners = np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y])
+        self._corners = frozen(self.geodesics.walls.grid.metres(corners))
 
-    def _lay(self) -> None:
-        """Find the sites and the component that holds each."""
-        grid = self.geodesics.walls.grid
-        self.spacing = self.geodesics.size / self.lattice
-        middles = (np.arange(self.lattice) + 0.5) * self.spacing
-        y, x = np.meshgrid(middles, middles, indexing="ij")
-        points = np.column_stack([x.ravel(), y.ravel()]) + grid.origin
-        snapped = grid.snap(points)
-        component = np.full(len(points), -1, dtype=np.intp)
-        for k, part in enumerate(self.geodesics.walls.free.geoms):
-            component[shapely.contains_xy(part, snapped[:, 0], snapped[:, 1])] = k
-        self.cells = np.nonzero(component >= 0)[0]
-        if not len(self.cells):
-            raise ParameterError(
-                f"lattice: {self.lattice}, but none of its sites is free; a finer one was wanted"
-            )
-        self.points = frozen(points[self.cells])
-        self._corners = frozen(
-            grid.metres(np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y]))
-        )
-        row, column = np.divmod(self.cells, self.lattice)
-        order = coherent_order(column, row)
-        self._rank = np.empty_like(order)
-        self._rank[order] = np.arange(len(order))
-        self._component = component[self.cells[order]]
-        self._x, self._y = np.ascontiguousarray(snapped[self.cells[order]].T)
-        self._clusters = Clusters(self._x, self._y, leaf=16)
-
-    def _view(self) -> None:
-        """List for each site the useful corners in view: rows of site, corner and distance."""
-        paths = self.geodesics
-        count, sites = len(paths.corner_x), len(self.cells)
-        rows = max(1, _PAIRS // sites)
-        pieces = [(np.empty(0, np.int32), np.empty(0, np.int32))]
-        for begin in range(0, count, rows):
-            corner = np.arange(begin, min(begin + rows, count))
-            row, site = np.nonzero(paths.walls.useful(corner[:, None], self._x, self._y))
-            row += begin
-            seen = paths.corner_fans.see(row, self._x[site], self._y[site])
-            pieces.append((site[seen].astype(np.int32), row[seen].astype(np.int32)))
-        site, corner = (np.concatenate([piece[k] for piece in pieces]) for k in (0, 1))
-        order = np.argsort(site, kind="stable")
-        self._list_corner = corner[order].astype(np.intp)
-        site = site[order]
-        self._list_length = np.hypot(
-            paths.corner_x[self._list_corner] - self._x[site],
-            paths.corner_y[self._list_corner] - self._y[site],
-        )
-        self._list_count = np.bincount(site, minlength=sites)
-        self._list_first = np.cumsum(self._list_count) - self._list_count
-        self._listed = np.nonzero(self._list_count)[0]
+    def _looked_up(self, progress: Callable[[float], None] | None, cache: ArrayCache | None) -> CornerViews:
+        """Return what the sites see of the corners, from the cache if it is there; this takes the longest."""
+        walls = self.geodesics.walls
+        if cache is None:
+            return CornerViews.looked_for(self.geodesics, self._sites, progress)
+        origin_x, origin_y = walls.grid.origin.tolist()
+        place = walls.grid.unit, origin_x, origin_y, self.geodesics.size
+        key = cache.key("corner views", _CACHED, walls.free.wkb, *place, self.lattice)
+        tables = cache.load(key)
+        if tables is not None:
+            return CornerViews(self._sites, tables["corner"], tables["first"], tables["length"])
+        begin = perf_counter()
+        views = CornerViews.looked_for(self.geodesics, self._sites, progress)
+        if perf_counter() - begin > _WORTH_KEEPING:
+            tables = {"corner": views.corner, "first": views.first, "length": views.length}
+            cache.save(key, tables)
+        return views
 
     def __call__(self, positions: Array) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -198,67 +188,55 @@ class CoverageCost:
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        paths = self.geodesics
+        paths, sites = self.geodesics, self._sites
         x, y, holds = paths.place(positions)
         covered = np.asarray(holds.any(axis=0))
-        owner, distance2 = self._clusters.nearest(x, y)
-        near, near2 = paths.corner_clusters.nearest(x, y)
-        reach2 = np.zeros(len(x))
-        np.maximum.at(reach2, owner, distance2)
-        robots = RobotViews(paths, x, y, np.sqrt(reach2))
 
-        corner = np.full(len(owner), -1, dtype=np.intp)
+        runs = sites.scanlines.nearest(x, y)
+        owner = runs.robot.repeat(runs.length)
+        dx = sites.x - x[runs.robot].repeat(runs.length)
+        dy = sites.y - y[runs.robot].repeat(runs.length)
+        distance2 = dx * dx + dy * dy
+        # of a run the first or the last site is the farthest
+        reach2 = np.zeros(len(x))
+        for end in (runs.begin, runs.begin + runs.length - 1):
+            np.maximum.at(reach2, runs.robot, distance2[end])
+        robots = RobotViews(paths, x, y, np.sqrt(reach2))
+        hidden = ~robots.see(owner, dx, dy, distance2)
         distance = np.sqrt(distance2)
-        seen = robots.see(owner, self._x, self._y)
+        corner = np.full(len(owner), -1, dtype=np.intp)
         if not covered.all():
-            away = ~covered[self._component]
-            owner[away], distance[away], seen[away] = -1, np.inf, True
-        hidden = np.nonzero(~seen)[0]
-        if len(hidden):
-            ways = robots.to_corners(near, np.sqrt(near2))
-            least, way = self._by_corners(hidden, ways.distance)
-            site, other, straight = self._clusters.within(x, y, np.where(seen, 0.0, least))
-            pairs = other != owner[site]
-            site, other, straight = site[pairs], other[pairs], straight[pairs]
-            pairs = robots.see_beyond(other, self._x[site], self._y[site], straight)
+            away = ~covered[sites.component]
+            owner[away], distance[away], hidden[away] = -1, np.inf, False
+
+        place = hidden[sites.by_tile].nonzero()[0]
+        if len(place):
+            site, tile = sites.by_tile[place], sites.tile[place]
+            ways = robots.to_corners()
+            shortest, way = self._corner_views.shortest(tile, sites.slot[place], ways.distance)
+            nearest = owner[site]
             if len(ways.first):
-                way = way[hidden]
-                distance[hidden], corner[hidden], owner[hidden] = (
-                    least[hidden],
-                    ways.first[way],
-                    ways.owner[way],
-                )
-            site, other, straight = first_of_least(site[pairs], other[pairs], straight[pairs])
-            distance[site], corner[site], owner[site] = straight, -1, other
+                corner[site], owner[site] = ways.first[way], ways.owner[way]
+            # whoever else is nearer than by way of a corner may see the site
+            bound2 = shortest * shortest
+            index, other, dx, dy, distance2 = sites.within(place, bound2, x, y)
+            some = (other != nearest[index]).nonzero()[0]
+            index, other, distance2 = index[some], other[some], distance2[some]
+            seen = robots.see_beyond(other, dx[some], dy[some], distance2).nonzero()[0]
+            index, other = index[seen], other[seen]
+            robot = np.full(len(site), -1, dtype=np.intp)
+            least(index, distance2[seen], bound2, (robot, other))
+            straight = (robot >= 0).nonzero()[0]
+            shortest[straight] = np.sqrt(bound2[straight])
+            distance[site] = shortest
+            site = site[straight]
+            corner[site], owner[site] = -1, robot[straight]
         return self._result(positions, covered, distance, owner, corner)
 
-    def _by_corners(self, site: IntArray, distance: Array) -> tuple[Array, IntArray]:
-        """Return the least distance of all sites by way of a corner, and that corner; of `site` at least."""
-        least, way = np.full(len(self._x), np.inf), np.zeros(len(self._x), dtype=np.intp)
-        corner, length = self._list_corner, self._list_length
-        # to look at all is quicker than to pick more than half
-        some = self._listed if len(site) > len(self._x) // 2 else site[self._list_count[site] > 0]
-        count = self._list_count[some]
-        begin = np.cumsum(count) - count
-        if some is not self._listed:
-            entry = np.arange(count.sum()) + np.repeat(self._list_first[some] - begin, count)
-            corner, length = corner[entry], length[entry]
-        if len(some):
-            total = length + distance.take(corner)
-            best = np.minimum.reduceat(total, begin)
-            least[some] = best
-            # of equals the first is written last
-            hit = np.nonzero(total == np.repeat(best, count))[0][::-1]
-            way[np.repeat(some, count)[hit]] = corner[hit]
-        return least, way
-
     def _result(
-        self, positions: Array, covered: BoolArray, distance: Array, owner: IntArray, corner: IntArray
+        self, positions: Array, covered: BoolArray, distances: Array, owner: IntArray, corner: IntArray
     ) -> CoverageResult:
-        """Put the sites, which are worked on group by group, back row by row."""
-        paths = self.geodesics
-        distances = distance[self._rank] * paths.walls.grid.unit
-        owner = owner[self._rank]
+        distances = distances * self.geodesics.walls.grid.unit
         reached = distances if covered.all() else distances[owner >= 0]
         mean = float(reached.mean()) if len(reached) else np.nan
         return CoverageResult(
@@ -267,7 +245,7 @@ class CoverageCost:
             uncovered_area=float(self._areas[~covered].sum()),
             distances=distances,
             owner=owner,
-            corner=corner[self._rank],
+            corner=corner,
             positions=positions,
             points=self.points,
             corners=self._corners,

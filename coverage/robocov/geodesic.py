@@ -8,13 +8,13 @@ other holds all that is needed.
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.clusters import Clusters
 from robocov.corners import Walls
 from robocov.environment import GRID
 from robocov.errors import InputError
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 _CORNER_BINS = 256
 """Angular bins of a corner, which looks at many targets; other sources have the default."""
+
+_PAIRS = 1 << 20
+"""Pairs of corners looked at in one piece, which bounds the memory."""
 
 
 class Geodesics:
@@ -41,7 +44,6 @@ class Geodesics:
         Vertices, edges and corners, in grid coordinates.
     index : WallIndex
         The edges for `Fans`.
-    corner_clusters : Clusters
     corner_fans : Fans
         The views of the corners.
     size : float, m
@@ -59,7 +61,6 @@ class Geodesics:
         shapely.prepare(list(self.walls.free.geoms))
         self.corner_x, self.corner_y = self.walls.corner_x, self.walls.corner_y
         self.index = WallIndex(self.walls)
-        self.corner_clusters = Clusters(self.corner_x, self.corner_y, leaf=8)
         everywhere = np.full(len(self.corner_x), np.inf)
         self.corner_fans = Fans(self.index, self.corner_x, self.corner_y, everywhere, _CORNER_BINS)
         self._link()
@@ -68,12 +69,18 @@ class Geodesics:
         """Build the graph of the corners."""
         count = len(self.corner_x)
         corner = np.arange(count)
-        useful = np.empty((count, count), dtype=bool)
-        for v in range(count):
-            useful[v] = self.walls.useful(corner[v : v + 1], self.corner_x, self.corner_y)
-        row, column = np.nonzero(np.triu(useful & useful.T, 1))
-        seen = self.corner_fans.see(row, self.corner_x[column], self.corner_y[column])
-        row, column = row[seen], column[seen]
+        pieces = [(np.empty(0, np.intp), np.empty(0, np.intp))]
+        block = max(1, _PAIRS // max(1, count))
+        for begin in range(0, count, block):
+            # each of the two must be useful to the other
+            some = corner[begin : begin + block, None]
+            good = self.walls.useful(some, self.corner_x, self.corner_y) & (some < corner)
+            good &= self.walls.useful(corner, self.corner_x[some], self.corner_y[some])
+            row, column = good.nonzero()
+            row += begin
+            seen = self.corner_fans.see(row, self.corner_x[column], self.corner_y[column])
+            pieces.append((row[seen], column[seen]))
+        row, column = (np.concatenate([piece[k] for piece in pieces]) for k in (0, 1))
         row, column = np.concatenate([row, column]), np.concatenate([column, row])
         order = np.lexsort((column, row))
         self.graph_row, self.graph_column = row[order], column[order]
@@ -150,14 +157,23 @@ class Geodesics:
 
         `vertex` (n,) is the vertex that each source coincides with, -1 for none.
         """
-        seen = fans.see(source, x, y)
+        dx, dy = x - fans.x[source], y - fans.y[source]
+        return self.see_along(fans, vertex, source, dx, dy, dx * dx + dy * dy)
+
+    def see_along(
+        self, fans: Fans, vertex: IntArray, source: IntArray, dx: Array, dy: Array, distance2: Array
+    ) -> BoolArray:
+        """Return the same for targets at (dx, dy) from their sources, and the square of that distance."""
+        seen = fans.see_along(source, dx, dy, distance2)
         for i in np.nonzero(vertex >= 0)[0]:
             pairs = np.nonzero(source == i)[0]
-            seen[pairs] &= self.walls.sectors_hold(int(vertex[i]), x[pairs], y[pairs])
+            seen[pairs] &= self.walls.sectors_hold(int(vertex[i]), dx[pairs], dy[pairs])
         return seen
 
-    def relax(self, reach: Array) -> Array:
+    def relax(self, reach: Array, sweeps: int | None = None) -> Array:
         """Return the distance of every corner from the sources, given that by direct view.
+
+        After a limited number of sweeps, which is a bound, paths may bend at as many corners more.
 
         Parameters
         ----------
@@ -170,13 +186,15 @@ class Geodesics:
         """
         if not len(self._linked):
             return reach
-        while True:
-            by_way_of = reach[..., self.graph_column] + self.graph_length
+        for _ in itertools.count() if sweeps is None else range(sweeps):
+            by_way_of = reach.take(self.graph_column, axis=-1) + self.graph_length
             shorter = np.minimum.reduceat(by_way_of, self._linked_first, axis=-1)
-            if not (shorter < reach[..., self._linked]).any():
-                return reach
+            former = reach.take(self._linked, axis=-1)
+            if not (shorter < former).any():
+                break
             reach = reach.copy()
-            reach[..., self._linked] = np.minimum(reach[..., self._linked], shorter)
+            reach[..., self._linked] = np.minimum(former, shorter)
+        return reach
 
     def previous(self, distance: Array, reach: Array) -> IntArray:
         """Return for every corner the one before it on its shortest path, -1 where that is the source.

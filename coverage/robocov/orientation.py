@@ -60,9 +60,9 @@ def cross(ux: Array, uy: Array, vx: Array, vy: Array) -> Array:
     array([1.])
     """
     value = ux * vy - uy * vx
-    doubtful = np.abs(value) < _DOUBT
-    if doubtful.any():
-        at = np.nonzero(doubtful)
+    size = np.abs(value)
+    if size.min(initial=np.inf) < _DOUBT:
+        at = (size < _DOUBT).nonzero()
         value[at] = _exact_cross(*(part[at] for part in np.broadcast_arrays(ux, uy, vx, vy)))
     return value
 

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.grouping import least
 from robocov.visibility import Fans
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from robocov.geodesic import Geodesics
 
+
+_PAIRS = 1 << 18
+"""Pairs of targets and robots looked at in one piece, which bounds the memory."""
+
+_SWEEPS = 2
+"""Enough to find for most corners a way that few robots are nearer than."""
 
 _FEW = 1 << 13
 """Pairs of robots and walls that are few enough to look at all."""
@@ -53,54 +62,51 @@ class RobotViews:
         self._paths = paths
         self.x, self.y = x, y
         self._vertex = paths.walls.vertex_at(x, y)
-        # targets at the very end belong to it; with few walls a second look costs more than all of them
-        few = len(x) * len(paths.index.ax) <= _FEW
-        self._reach = np.full(len(x), np.inf) if few else reach * (1.0 + 1e-9)
+        # targets at the very end belong to it, and some beyond, which would cost a second look;
+        # with few walls that costs more than all of them
+        few = len(x) * paths.index.count <= _FEW
+        self._reach = np.full(len(x), np.inf) if few else reach * (1.0 + 1e-9) + reach.mean()
         self._fans = Fans(paths.index, x, y, self._reach)
 
-    def see(self, robot: IntArray, x: Array, y: Array) -> BoolArray:
-        """Return for (m,) pairs of a robot and a target in its reach whether it sees the target."""
-        return self._paths.see(self._fans, self._vertex, robot, x, y)
+    def see(self, robot: IntArray, dx: Array, dy: Array, distance2: Array) -> BoolArray:
+        """Return for (m,) pairs of a robot and a target in its reach whether it sees the target.
 
-    def see_beyond(self, robot: IntArray, x: Array, y: Array, distance: Array) -> BoolArray:
-        """Return the same for targets at any `distance` (m,)."""
-        far = distance > self._reach[robot]
-        if not far.any():
-            return self.see(robot, x, y)
+        The targets are given by (dx, dy) from the robot, and the square of that distance.
+        """
+        return self._paths.see_along(self._fans, self._vertex, robot, dx, dy, distance2)
+
+    def see_beyond(self, robot: IntArray, dx: Array, dy: Array, distance2: Array) -> BoolArray:
+        """Return the same for targets at any distance."""
+        beyond = distance2 > self._reach[robot] ** 2
+        if not beyond.any():
+            return self.see(robot, dx, dy, distance2)
         seen = np.empty(len(robot), dtype=bool)
-        seen[~far] = self.see(robot[~far], x[~far], y[~far])
-        looking, source = np.unique(robot[far], return_inverse=True)
-        reach = np.zeros(len(looking))
-        np.maximum.at(reach, source, distance[far])
-        fans = Fans(self._paths.index, self.x[looking], self.y[looking], reach * (1.0 + 1e-9))
-        seen[far] = self._paths.see(fans, self._vertex[looking], source, x[far], y[far])
+        near, far = (~beyond).nonzero()[0], beyond.nonzero()[0]
+        seen[near] = self.see(robot[near], dx[near], dy[near], distance2[near])
+        reach2 = np.zeros(len(self.x))
+        np.maximum.at(reach2, robot[far], distance2[far])
+        looking = np.nonzero(reach2)[0]
+        number = np.empty(len(self.x), dtype=np.intp)
+        number[looking] = np.arange(len(looking))
+        reach = np.sqrt(reach2[looking]) * (1.0 + 1e-9)
+        fans = Fans(self._paths.index, self.x[looking], self.y[looking], reach)
+        seen[far] = self._paths.see_along(
+            fans, self._vertex[looking], number[robot[far]], dx[far], dy[far], distance2[far]
+        )
         return seen
 
-    def to_corners(self, robot: IntArray, straight: Array) -> Ways:
-        """Return the shortest ways to the corners.
-
-        Parameters
-        ----------
-        robot : (k,)
-            The robot nearest to each corner as the crow flies.
-        straight : (k,) grid steps
-            Its distance.
-        """
+    def to_corners(self) -> Ways:
+        """Return the shortest ways to the corners."""
         paths = self._paths
-        corner = np.arange(len(robot))
-        good = paths.walls.useful(corner, self.x[robot], self.y[robot])
-        good &= paths.corner_fans.see(corner, self.x[robot], self.y[robot])
-        owner, reach = robot.copy(), np.where(good, straight, np.inf)
-        distance = paths.relax(reach)
-        # whoever else is nearer than that may see the corner
-        corner, other, away = paths.corner_clusters.within(self.x, self.y, distance)
-        pairs = other != robot[corner]
-        corner, other, away = corner[pairs], other[pairs], away[pairs]
-        pairs = paths.walls.useful(corner, self.x[other], self.y[other])
-        corner, other, away = corner[pairs], other[pairs], away[pairs]
-        pairs = paths.corner_fans.see(corner, self.x[other], self.y[other])
-        corner, other, away = first_of_least(corner[pairs], other[pairs], away[pairs])
-        reach[corner], owner[corner] = away, other
+        corner_x, corner_y = paths.corner_x, paths.corner_y
+        corner = np.arange(len(corner_x))
+        # few of the other robots matter once it is known how far the nearest one has to go, if not straight
+        owner, nearest2 = self._nearest(corner_x, corner_y)
+        reach = np.where(self._seen_from(corner, owner), np.sqrt(nearest2), np.inf)
+        distance = paths.relax(reach, _SWEEPS)
+        corner, other, away = self._nearer(corner_x, corner_y, distance, owner)
+        seen = self._seen_from(corner, other).nonzero()[0]
+        least(corner[seen], away[seen], reach, (owner, other[seen]))
         distance = paths.relax(np.minimum(distance, reach))
         before = paths.previous(distance, reach)
         first = np.where(before < 0, np.arange(len(before)), before)
@@ -108,16 +114,37 @@ class RobotViews:
             first = first[first]
         return Ways(distance, owner[first], first)
 
+    def _seen_from(self, corner: IntArray, robot: IntArray) -> BoolArray:
+        """Return for (p,) pairs whether a corner sees a robot, and is useful to it."""
+        paths = self._paths
+        x, y = self.x[robot], self.y[robot]
+        good = paths.walls.useful(corner, x, y)
+        some = good.nonzero()[0]
+        good[some] = paths.corner_fans.see(corner[some], x[some], y[some])
+        return good
 
-def first_of_least(target: IntArray, robot: IntArray, distance: Array) -> tuple[IntArray, IntArray, Array]:
-    """Return for every target that occurs the pair of least distance, the first of equals.
+    def _pieces(self, count: int) -> Iterator[slice]:
+        """Yield slices of so many targets, few enough that all pairs with robots fit in memory."""
+        size = max(1, _PAIRS // len(self.x))
+        yield from (slice(begin, begin + size) for begin in range(0, count, size))
 
-    >>> first_of_least(np.array([4, 2, 4, 4]), np.array([0, 0, 1, 2]), np.array([7.0, 5.0, 6.0, 6.0]))
-    (array([2, 4]), array([0, 1]), array([5., 6.]))
-    """
-    order = np.lexsort((distance, target))
-    target = target[order]
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = target[1:] != target[:-1]
-    order = order[first]
-    return target[first], robot[order], distance[order]
+    def _nearest(self, x: Array, y: Array) -> tuple[IntArray, Array]:
+        """Return each target's nearest robot and its squared distance."""
+        robot, distance2 = np.empty(len(x), dtype=np.intp), np.empty(len(x))
+        for part in self._pieces(len(x)):
+            away2 = (x[part] - self.x[:, None]) ** 2 + (y[part] - self.y[:, None]) ** 2
+            robot[part] = away2.argmin(axis=0)
+            distance2[part] = away2[robot[part], np.arange(away2.shape[1])]
+        return robot, distance2
+
+    def _nearer(self, x: Array, y: Array, bound: Array, but: IntArray) -> tuple[IntArray, IntArray, Array]:
+        """Return the pairs of a target and a robot nearer than `bound`, but for the robot `but`."""
+        pieces = [(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0))]
+        for part in self._pieces(len(x)):
+            away2 = (x[part] - self.x[:, None]) ** 2 + (y[part] - self.y[:, None]) ** 2
+            robot, target = (away2 < bound[part] ** 2).nonzero()
+            other = (robot != but[part][target]).nonzero()[0]
+            robot, target = robot[other], target[other]
+            pieces.append((target + part.start, robot, np.sqrt(away2[robot, target])))
+        target, robot, away = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        return target, robot, away

@@ -6,8 +6,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov import clusters, robot_views, visibility
+from robocov import corner_views, geodesic, robot_views, visibility
 from robocov import cost as cost_module
+from robocov.array_cache import ArrayCache
+from robocov.corner_views import CornerViews
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import InputError, ParameterError
@@ -129,7 +131,7 @@ def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n, few, monke
     # the walls in reach first, or all at once; everything in one piece, or in many
     monkeypatch.setattr(robot_views, "_FEW", few)
     if not few:
-        for module in (visibility, clusters, cost_module):
+        for module in (visibility, corner_views, geodesic, robot_views):
             monkeypatch.setattr(module, "_PAIRS", 100)
         monkeypatch.setattr(visibility, "_REST", 0)
     cost = CoverageCost(OFFICE, lattice=24)
@@ -238,3 +240,48 @@ def test_the_lattice_must_be_a_whole_number_in_range(lattice):
 def test_a_lattice_without_a_free_site_is_refused():
     with pytest.raises(ParameterError, match="lattice: 1, but none of its sites is free"):
         CoverageCost(PILLAR, lattice=1)
+
+
+def test_building_tells_how_far_it_is_and_can_be_given_up():
+    told = []
+    CoverageCost(OFFICE, lattice=64, progress=told.append)
+    assert told == sorted(told)
+    assert 0.0 <= told[0] <= told[-1] < 1.0
+
+    class UnwantedError(Exception):
+        pass
+
+    def refuse(done):
+        raise UnwantedError
+
+    with pytest.raises(UnwantedError):
+        CoverageCost(OFFICE, lattice=64, progress=refuse)
+
+
+def test_the_cache_changes_nothing_but_the_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(cost_module, "_WORTH_KEEPING", 0.0)
+    positions = [[1.0, 1.0], [8.0, 4.0], [5.0, 6.8]]
+    cache = ArrayCache(tmp_path)
+    fresh = CoverageCost(OFFICE, 48, cache=cache)
+    assert len(list(tmp_path.iterdir())) == 1
+
+    def never(*args):
+        raise AssertionError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CornerViews, "looked_for", never)
+        kept = CoverageCost(OFFICE, 48, cache=cache)
+        # whatever the result depends on makes another entry
+        moved = Environment("office", tuple((x + 1.0, y) for x, y in OFFICE.boundary), OFFICE.obstacles)
+        for other, lattice in ((OFFICE, 47), (PILLAR, 48), (moved, 48)):
+            with pytest.raises(AssertionError):
+                CoverageCost(other, lattice, cache=cache)
+    one, two = fresh(positions), kept(positions)
+    for name in ("distances", "owner", "corner", "gradient"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+    assert one.value == two.value
+
+
+def test_quick_builds_are_not_kept(tmp_path):
+    CoverageCost(PILLAR, 8, cache=ArrayCache(tmp_path))
+    assert not list(tmp_path.iterdir())
