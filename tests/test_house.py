@@ -76,6 +76,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("base gains individual lloyd rapf repulsion rpf".split(), "test_controllers"),
     **dict.fromkeys("run check controllers cost import_map maps schema console".split(), "test_cli"),
     "report": "test_houseexpo",
+    **dict.fromkeys("measure plot render start step".split(), "test_bench"),
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts forces furniture scene sprites".split(), "test_layers"),
     "trajectories": "test_layers",

@@ -25,6 +25,7 @@ COMMANDS = {
     "maps": ("maps", "list the bundled maps"),
     "controllers": ("controllers", "list the controllers and their gains"),
     "cost": ("cost", "the exact coverage cost (22) of given positions"),
+    "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
     "import": ("import_map", "turn a foreign map file into a map JSON"),
     "schema": ("schema", "print the JSON Schema of map files"),
 }

@@ -275,9 +275,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
     import matplotlib
 
     path = Path(path)
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in ("png", "svg"):
-        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png or .svg was wanted")
+    kind = figure_kind(path)
     metadata: dict[str, str | None] = {"Date": None} if kind == "svg" else {"Software": None}
     with (
         written(path) as part,
@@ -285,6 +283,20 @@ def save_figure(figure: Figure, path: Path | str) -> None:
         matplotlib.rc_context({"svg.hashsalt": "robocov", "svg.fonttype": "path", "savefig.bbox": None}),
     ):
         figure.savefig(part, format=kind, dpi=figure.dpi, metadata=metadata, facecolor=figure.get_facecolor())
+
+
+def figure_kind(path: Path) -> str:
+    """Return ``png`` or ``svg``, by the suffix of a path.
+
+    Raises
+    ------
+    ParameterError
+        When the suffix is another.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in ("png", "svg"):
+        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png or .svg was wanted")
+    return kind
 
 
 def _figure_of(axes: Axes) -> Figure:

@@ -1,0 +1,1 @@
+"""How fast robocov is: each time beside a yardstick that is taken in turn with it."""

@@ -1,0 +1,133 @@
+"""The exact coverage cost against fast marching of second order, by scikit-fmm.
+
+Fast marching travels over the same lattice with the same free sites, from the cells that hold a robot.
+It is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, PolygonObstacle
+from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from robocov.arrays import Array
+
+VERTICES = (20, 200, 1000)
+LATTICES = (64, 128, 256, 512)
+ROBOTS = (6, 50, 200)
+
+GOALS = {
+    (128, 200, 50): 0.75,
+    (256, 200, 50): 0.45,
+    (512, 200, 50): 0.25,
+    (128, 200, 6): 1.0,
+    (256, 200, 6): 0.65,
+    (512, 200, 6): 0.45,
+    (256, 1000, 50): 0.9,
+}
+"""Wanted ratios, by lattice, vertices and robots."""
+
+BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
+"""Wanted seconds for what is computed once for a map, by lattice and vertices."""
+
+YARDSTICK = "scikit-fmm, order 2"
+
+SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+
+
+def cases(*, quick: bool = False) -> list[Case]:
+    """Return a case for each lattice and number of vertices."""
+    sizes = ((128, 200), (256, 200)) if quick else [(n, k) for k in VERTICES for n in LATTICES]
+    return [partial(_rows, lattice, vertices, quick) for lattice, vertices in sizes]
+
+
+def has_yardstick() -> bool:
+    """Return whether scikit-fmm is installed."""
+    try:
+        import skfmm  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def random_map(vertices: int, seed: int = 0) -> Environment:
+    """Return a unit square with obstacles of five corners each, about a quarter of it blocked."""
+    rng = np.random.default_rng(seed)
+    radius = np.sqrt(0.23 / (vertices / 5) / 2.2)
+    obstacles: list[PolygonObstacle] = []
+    while len(obstacles) < vertices // 5:
+        angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 5))
+        steps = np.column_stack([np.cos(angle), np.sin(angle)])
+        ring = rng.random(2) + radius * rng.uniform(1.0, 1.5) * steps
+        if shapely.Polygon(ring).area > 0.3 * radius**2:
+            obstacles.append(PolygonObstacle(tuple((float(x), float(y)) for x, y in ring)))
+    return Environment("random", SQUARE, tuple(obstacles))
+
+
+def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
+    environment = random_map(vertices)
+    begin = perf_counter()
+    cost = CoverageCost(environment, lattice)
+    built = perf_counter() - begin
+    size: Parameters = {"lattice": lattice, "vertices": vertices}
+    yield Row("cost", "built, once a map", size, built, goal_seconds=BUILD_GOALS.get((lattice, vertices)))
+    for robots in (6, 50) if quick else ROBOTS:
+        if robots > len(cost.points):
+            continue
+        places = _Places(cost, robots)
+        calls: dict[str, Callable[[], object]] = {"exact": partial(_evaluated, cost, places)}
+        if has_yardstick():
+            calls["marching"] = partial(_marched, cost, places)
+        taken = InTurn(calls).rounds(7, 0.3 if quick else 1.0)
+        goal = GOALS.get((lattice, vertices, robots))
+        yield Row(
+            *("cost", "evaluated", {**size, "robots": robots}, taken["exact"]),
+            *((YARDSTICK, taken["marching"], goal) if "marching" in taken else ()),
+        )
+
+
+class _Places:
+    """Robots that move a little with every call."""
+
+    def __init__(self, cost: CoverageCost, robots: int) -> None:
+        self._rng = np.random.default_rng(1)
+        self._start = cost.points[self._rng.choice(len(cost.points), robots, replace=False)]
+        self._step = cost.spacing / 4.0
+        self._walls = cost.geodesics.walls
+        self.now = self._start
+
+    def moved(self) -> Array:
+        """Return (n, 2) free positions, m."""
+        places = self._start + self._rng.uniform(-self._step, self._step, self._start.shape)
+        free = shapely.intersects_xy(self._walls.free, *self._walls.grid.snap(places).T)
+        self.now = np.where(free[:, None], places, self._start)
+        return self.now
+
+
+def _evaluated(cost: CoverageCost, places: _Places) -> float:
+    """Return the mean distance from where the robots are next."""
+    return cost(places.moved()).mean_distance
+
+
+def _marched(cost: CoverageCost, places: _Places) -> float:
+    """Return the mean distance from where the robots were last, by fast marching."""
+    import skfmm
+
+    side = cost.lattice
+    blocked = np.ones(side * side, dtype=bool)
+    blocked[cost.cells] = False
+    column, row = np.floor(places.now / cost.spacing).astype(int).T
+    front = np.ones((side, side))
+    front[row, column] = -1.0
+    masked = np.ma.MaskedArray(front, blocked.reshape(side, side))
+    return float(skfmm.distance(masked, dx=cost.spacing, order=2).mean())

@@ -1,0 +1,142 @@
+"""Times that can be trusted on a shared machine: calls in turn, medians, ratios."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from statistics import median
+from time import perf_counter
+from typing import Any, TypeAlias
+
+Call: TypeAlias = Callable[[], object]
+
+Parameters: TypeAlias = dict[str, int | str]
+"""Names and values, like ``{"robots": 50}``."""
+
+Case: TypeAlias = Callable[[], Iterable["Row"]]
+"""Something to measure, which may give several rows."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One time, and its yardstick if there is one.
+
+    Attributes
+    ----------
+    part : str
+        ``step``, ``cost``, ``render`` or ``start``.
+    name : str
+        What is timed: ``one step``.
+    parameters : dict
+        What varies: ``{"robots": 50}``.
+    seconds : float
+        Median.
+    yardstick : str or None
+        What it is compared with.
+    yardstick_seconds : float or None
+        Median, in the same run.
+    goal : float or None
+        Largest ratio that is wanted.
+    goal_seconds : float or None
+        Longest time that is wanted.
+    note : str
+        The time in other words: ``95 x real time``.
+    """
+
+    part: str
+    name: str
+    parameters: Parameters
+    seconds: float
+    yardstick: str | None = None
+    yardstick_seconds: float | None = None
+    goal: float | None = None
+    goal_seconds: float | None = None
+    note: str = ""
+
+    @property
+    def ratio(self) -> float | None:
+        """The time as a multiple of the yardstick's."""
+        return None if self.yardstick_seconds is None else self.seconds / self.yardstick_seconds
+
+    @property
+    def met(self) -> bool | None:
+        """Whether what is wanted is reached; None where nothing is."""
+        reached = []
+        if self.goal is not None and self.ratio is not None:
+            reached.append(self.ratio <= self.goal)
+        if self.goal_seconds is not None:
+            reached.append(self.seconds <= self.goal_seconds)
+        return all(reached) if reached else None
+
+    @property
+    def case(self) -> str:
+        """The parameters in words."""
+        return ", ".join(
+            f"{value} {name}" if isinstance(value, int) and name != "lattice" else _worded(name, value)
+            for name, value in self.parameters.items()
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the row as JSON."""
+        return {
+            "part": self.part,
+            "name": self.name,
+            "parameters": self.parameters,
+            "seconds": self.seconds,
+            "yardstick": self.yardstick,
+            "yardstick_seconds": self.yardstick_seconds,
+            "ratio": self.ratio,
+            "goal": self.goal,
+            "goal_seconds": self.goal_seconds,
+            "met": self.met,
+            "note": self.note,
+        }
+
+
+def _worded(name: str, value: int | str) -> str:
+    return f"{value} x {value}" if name == "lattice" else str(value)
+
+
+@dataclass
+class InTurn:
+    """The median times of calls that are made in turn.
+
+    The moods of a shared machine then fall on all alike, and the ratio of two medians holds although
+    neither time does. Garbage is not collected meanwhile.
+
+    Parameters
+    ----------
+    calls : by name
+    clock : callable
+        Returns seconds.
+    """
+
+    calls: Mapping[str, Call]
+    clock: Callable[[], float] = perf_counter
+    taken: dict[str, list[float]] = field(default_factory=dict)
+
+    def rounds(self, count: int, seconds: float = 0.0) -> dict[str, float]:
+        """Return the medians of at least `count` rounds, and as many more as begin within `seconds`.
+
+        One round that does not count comes first.
+        """
+        self.taken = {name: [] for name in self.calls}
+        collecting = gc.isenabled()
+        gc.collect()
+        gc.disable()
+        try:
+            for call in self.calls.values():
+                call()
+            until = self.clock() + seconds
+            made = 0
+            while made < count or self.clock() < until:
+                for name, call in self.calls.items():
+                    begin = self.clock()
+                    call()
+                    self.taken[name].append(self.clock() - begin)
+                made += 1
+        finally:
+            if collecting:
+                gc.enable()
+        return {name: median(times) for name, times in self.taken.items()}

@@ -1,0 +1,88 @@
+"""Drawing a frame against filling and copying an empty one; films and PNGs against drawing their frames."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import partial
+from itertools import cycle
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov.controllers import Rapf
+from robocov.mapfile import load_map
+from robocov.simulation import Simulation
+from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.recording import iter_frames, png_bytes, save_film
+from robocov_app.view.picture import Painter
+from robocov_app.view.scene import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov.record import Record
+
+SIZE = (1280, 720)
+
+FRAME_GOALS = {50: 4e-3}
+"""Wanted seconds for a frame, by number of robots."""
+
+
+def cases(*, quick: bool = False) -> list[Case]:
+    """Return a case for each size of a team, then one for films and pictures."""
+    frames = [partial(_frames, name, n, quick) for name, n in (("rooms", 6), ("rooms", 50), ("campus", 200))]
+    return [*frames, partial(_films, quick)]
+
+
+def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
+    record = _travelled(name, n)
+    painter = Painter(record.environment, SIZE)
+    canvas, empty = pygame.Surface(SIZE), pygame.Surface(SIZE)
+    scenes = cycle([_scene_at(record, k) for k in range(len(record))])
+
+    def clear_and_flip() -> None:
+        empty.fill((255, 255, 255))
+        canvas.blit(empty, (0, 0))
+
+    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": clear_and_flip}
+    taken = InTurn(calls).rounds(40 if quick else 150)
+    size: Parameters = {"robots": n, "map": name}
+    bare = "clear and flip", taken["bare"]
+    yield Row("render", "one frame", size, taken["frame"], *bare, goal_seconds=FRAME_GOALS.get(n))
+
+
+def _films(quick: bool) -> Iterator[Row]:
+    record = _travelled("rooms", 6)
+    shown = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
+    frames = list(iter_frames(record, size=SIZE, rows=shown))
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.mp4"
+        calls = {
+            "draw": lambda: list(iter_frames(record, size=SIZE, rows=shown)),
+            "film": lambda: save_film(film, frames),
+            "png": lambda: [png_bytes(frame) for frame in frames],
+        }
+        taken = InTurn(calls).rounds(1 if quick else 3)
+    size: Parameters = {"frames": len(frames)}
+    for name, call in (("film encoded", "film"), ("PNGs encoded", "png")):
+        rate = f"{len(frames) / taken[call]:.0f} frames a second"
+        yield Row("render", name, size, taken[call], "drawing the frames", taken["draw"], note=rate)
+
+
+def _travelled(name: str, n: int) -> Record:
+    """Return five seconds of a run, which has trajectories and cells in motion."""
+    environment = load_map(name)
+    return Simulation(environment, Rapf(), environment.start("uniform").sample(n, seed=0)).run(5.0)
+
+
+def _scene_at(record: Record, k: int) -> Scene:
+    """Return what is drawn of moment `k`."""
+    return Scene.of(
+        *(record.environment, record.team, record.snapshot(k)),
+        starts=record.positions[0],
+        trail=record.positions[: k + 1],
+        trail_time=record.time[: k + 1],
+        label=record.label,
+    )

@@ -1,0 +1,169 @@
+"""`robocov bench`."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import platform
+import sys
+from dataclasses import dataclass
+from importlib.metadata import version
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robocov_app.bench.measure import Row
+
+PARTS = ("step", "cost", "render", "start")
+
+TITLES = {
+    "step": "A step of RAPF on campus",
+    "cost": "The exact coverage cost, in a unit square with random obstacles",
+    "render": "Pictures of 1280 x 720",
+    "start": "Until a command begins",
+}
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass
+class Arguments:
+    """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
+
+    Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of
+    the cost is scikit-fmm: pip install 'robocov[bench]'. All takes about four minutes.
+
+    Example: robocov bench step
+    """
+
+    part: Annotated[
+        tyro.conf.Positional[Literal["step", "cost", "render", "start", "all"]], tyro.conf.arg(metavar="PART")
+    ] = "all"
+    """What to measure: step, cost, render, start or all."""
+    quick: bool = False
+    """Fewer cases and rounds: half a minute."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Draw the ratios to a PNG or SVG."""
+
+
+def command(options: Arguments) -> int | None:
+    """Measure, then print and draw; what was measured until Ctrl-C as well."""
+    from robocov.errors import OutputError, ParameterError
+    from robocov_app.progress import progress
+
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+    if options.plot is not None:
+        from robocov_app.plots import figure_kind
+
+        figure_kind(options.plot)
+        if not options.plot.parent.is_dir():
+            raise OutputError(f"{options.plot}: cannot be written: there is no folder {options.plot.parent}")
+    parts = PARTS if options.part == "all" else (options.part,)
+    modules = [importlib.import_module(f"robocov_app.bench.{part}") for part in parts]
+    if "cost" in parts and not modules[parts.index("cost")].has_yardstick():
+        missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
+        if options.part == "cost":
+            raise ParameterError(missing)
+        print(f"robocov: {missing}", file=sys.stderr)
+    cases = [case for module in modules for case in module.cases(quick=options.quick)]
+    rows: list[Row] = []
+    stopped = False
+    try:
+        with progress("measuring", len(cases), quiet=options.json) as update:
+            for done, case in enumerate(cases, start=1):
+                rows += case()
+                update(done)
+    except KeyboardInterrupt:
+        stopped = True
+    if options.plot is not None and rows:
+        from robocov_app.bench.plot import save_ratios
+
+        save_ratios(rows, options.plot)
+    if options.json:
+        print(json.dumps({"machine": machine(), "rows": [row.to_dict() for row in rows]}, indent=1))
+    else:
+        print_tables(rows)
+    if stopped:
+        raise KeyboardInterrupt
+    return None
+
+
+def machine() -> dict[str, Any]:
+    """Return what times depend on."""
+    packages = {name: version(name) for name in ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")}
+    return {
+        "python": platform.python_version(),
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "packages": packages,
+    }
+
+
+def print_tables(rows: Sequence[Row]) -> None:
+    """Print the rows for people, one table a part."""
+    from rich.table import Table
+
+    from robocov_app.console import console
+
+    out = console()
+    for part, group in groupby(rows, key=lambda row: row.part):
+        table = Table(box=None, pad_edge=False, header_style="bold", title_justify="left", title=TITLES[part])
+        table.add_column("")
+        table.add_column("")
+        for title in ("time", "yardstick", "ratio", "goal"):
+            table.add_column(title, justify="right", no_wrap=True)
+        table.add_column("", no_wrap=True)
+        table.add_column("")
+        former = ""
+        for row in group:
+            words = row.case or row.name
+            table.add_row(
+                "" if words == former else words,
+                row.name if row.case else "",
+                duration(row.seconds),
+                "" if row.yardstick_seconds is None else duration(row.yardstick_seconds),
+                "" if row.ratio is None else f"{row.ratio:.2f}",
+                goals(row),
+                "" if row.yardstick is None else f"/ {row.yardstick}",
+                row.note,
+            )
+            former = words
+        out.print(table)
+        out.print()
+    facts = machine()
+    packages = ", ".join(f"{name} {number}" for name, number in facts["packages"].items())
+    out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
+
+
+def goals(row: Row) -> str:
+    """Return what is wanted, and whether it is missed.
+
+    >>> from robocov_app.bench.measure import Row
+    >>> goals(Row("step", "one step", {}, 3.0, "yardstick", 1.0, goal=2.5))
+    '2.5 missed'
+    """
+    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:g}"]
+    if row.goal_seconds is not None:
+        wanted.append(duration(row.goal_seconds))
+    return ", ".join(wanted) + (" missed" if row.met is False else "")
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that suits it.
+
+    >>> duration(0.00031), duration(0.012), duration(2.5)
+    ('310 µs', '12.0 ms', '2.50 s')
+    """
+    if seconds < 1e-3:
+        return f"{seconds * 1e6:.0f} µs"
+    return f"{seconds * 1e3:.1f} ms" if seconds < 1.0 else f"{seconds:.2f} s"

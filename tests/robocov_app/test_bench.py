@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+import gc
+import json
+import re
+import sys
+from functools import partial
+
+import matplotlib
+import numpy as np
+import pytest
+from called import complaint
+from matplotlib.figure import Figure
+
+from robocov_app.bench import cost, plot, render, start, step
+from robocov_app.bench.measure import InTurn, Row
+from robocov_app.cli import main
+from robocov_app.commands import bench
+
+KEYS = ["part", "name", "parameters", "seconds", "yardstick", "yardstick_seconds", "ratio", "goal"]
+KEYS += ["goal_seconds", "met", "note"]
+
+
+class Clock:
+    """A clock that goes on only when told to."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def work(self, *seconds: float):
+        times = iter(seconds)
+
+        def call() -> None:
+            self.now += next(times)
+
+        return call
+
+
+def test_calls_are_made_in_turn_and_their_medians_taken():
+    clock, order = Clock(), []
+    slow, quick = clock.work(9.0, 3.0, 1.0, 2.0), clock.work(9.0, 0.5, 0.25, 1.5)
+
+    def noted(name, call):
+        order.append((name, gc.isenabled()))
+        call()
+
+    calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
+    assert InTurn(calls, clock).rounds(3) == {"slow": 2.0, "quick": 0.5}
+    # the first round does not count, and nothing is collected meanwhile
+    assert order == [("slow", False), ("quick", False)] * 4
+    assert gc.isenabled()
+
+
+def test_rounds_go_on_until_the_time_is_over():
+    clock = Clock()
+    turn = InTurn({"one": clock.work(*[1.0] * 20)}, clock)
+    turn.rounds(2, seconds=6.5)
+    assert len(turn.taken["one"]) == 7
+    turn = InTurn({"one": clock.work(*[1.0] * 20)}, clock)
+    turn.rounds(5, seconds=2.0)
+    assert len(turn.taken["one"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("goal", "goal_seconds", "met"),
+    [(None, None, None), (2.0, None, True), (1.9, None, False), (None, 0.5, True), (None, 0.3, False)]
+    + [(2.0, 0.3, False), (2.0, 0.5, True)],
+)
+def test_a_goal_is_met_or_missed(goal, goal_seconds, met):
+    row = Row("step", "one step", {"robots": 6}, 0.4, "yardstick", 0.2, goal, goal_seconds)
+    assert row.ratio == 2.0
+    assert row.met is met
+    assert ("missed" in bench.goals(row)) == (met is False)
+    assert list(row.to_dict()) == KEYS
+
+
+def test_without_a_yardstick_there_is_no_ratio_to_want():
+    row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, goal=1.0)
+    assert (row.ratio, row.met) == (None, None)
+    assert bench.goals(row) == ""
+    assert row.case == "128 x 128, 6 robots"
+
+
+def small(monkeypatch):
+    """Make every part a matter of a second or two."""
+    monkeypatch.setattr(step, "GOALS", {6: None})
+    monkeypatch.setattr(step, "WARM_UP", 2)
+    monkeypatch.setattr(cost, "random_map", lambda vertices: cost_map(vertices))
+    monkeypatch.setattr(start, "WORDS", {"import robocov": ("-c", "import robocov")})
+    monkeypatch.setattr(render, "cases", lambda quick: [partial(render._frames, "rooms", 6, quick)])
+
+
+def cost_map(vertices, real=cost.random_map):
+    return real(min(vertices, 20))
+
+
+def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
+    small(monkeypatch)
+    target = tmp_path / "ratios.png"
+    assert main(["bench", "all", "--quick", "--json", "--plot", str(target)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {row["part"] for row in found["rows"]} == {"step", "cost", "render", "start"}
+    assert set(found["machine"]) == {"python", "system", "processor", "cores", "packages"}
+    for row in found["rows"]:
+        assert list(row) == KEYS
+        assert row["seconds"] > 0.0
+        if row["yardstick_seconds"] is not None:
+            assert row["ratio"] == pytest.approx(row["seconds"] / row["yardstick_seconds"])
+    assert target.stat().st_size > 10_000
+
+
+def test_a_table_for_people(monkeypatch, capsys):
+    small(monkeypatch)
+    assert main(["bench", "step", "--quick"]) == 0
+    said = capsys.readouterr()
+    assert "Qhull's Delaunay" in said.out
+    assert "x real time" in said.out
+    assert "numpy" in said.out
+    assert re.search(r"measuring: 1 of 1 in", said.err)
+
+
+def test_the_cost_is_measured_beside_its_yardstick(monkeypatch):
+    pytest.importorskip("skfmm", reason="the yardstick is an extra")
+    small(monkeypatch)
+    built, few, many = cost._rows(128, 200, quick=True)
+    assert built.yardstick is None
+    assert (few.goal, many.goal) == (cost.GOALS[128, 200, 6], cost.GOALS[128, 200, 50])
+    assert few.ratio is not None
+
+
+def test_fast_marching_measures_the_same_distances():
+    pytest.importorskip("skfmm", reason="the yardstick is an extra")
+    evaluated = cost.CoverageCost(cost_map(20), 64)
+    places = cost._Places(evaluated, 6)
+    exact = cost._evaluated(evaluated, places)
+    assert cost._marched(evaluated, places) == pytest.approx(exact, rel=0.1)
+
+
+def test_robots_of_the_benchmark_move_a_little_and_stay_free():
+    evaluated = cost.CoverageCost(cost_map(200), 64)
+    places = cost._Places(evaluated, 20)
+    former = places.moved()
+    for _ in range(20):
+        now = places.moved()
+        assert 0.0 < np.abs(now - former).max() <= evaluated.spacing / 2.0
+        evaluated(now)
+
+
+def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "skfmm", None)
+    assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")
+    small(monkeypatch)
+    assert main(["bench", "all", "--quick", "--json"]) == 0
+    said = capsys.readouterr()
+    assert "pip install 'robocov[bench]'" in said.err
+    rows = [row for row in json.loads(said.out)["rows"] if row["name"] == "evaluated"]
+    assert rows
+    assert all(row["ratio"] is None and row["met"] is None for row in rows)
+
+
+def test_what_was_measured_until_the_interruption_is_told(monkeypatch, capsys):
+    def interrupted():
+        yield Row("step", "one step", {"robots": 7}, 1.0, "yardstick", 0.5)
+
+    def stop():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(step, "cases", lambda quick: [interrupted, stop, stop])
+    assert main(["bench", "step"]) == 130
+    assert "7 robots" in capsys.readouterr().out
+
+
+def test_a_plot_that_cannot_be_written_is_told_before_anything_is_measured(capsys, tmp_path):
+    assert "'.gif'" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
+    assert "there is no folder" in complaint(capsys, "bench", "step", "--plot", str(tmp_path / "a" / "b.png"))
+
+
+ROWS = [
+    *(
+        Row("cost", "evaluated", {"lattice": n, "vertices": k, "robots": r}, 1e-3, "fmm", 1e-3 * 64 / n, 0.5)
+        for n in (64, 128, 256)
+        for k in (20, 1000)
+        for r in (6, 50)
+    ),
+    Row("cost", "built, once a map", {"lattice": 64, "vertices": 20}, 0.1),
+    Row("step", "one step", {"robots": 1000}, 3e-3, "a yardstick with a long name indeed", 1e-3, 1.2),
+    Row("step", "one step", {"robots": 6}, 3e-4, "Qhull's Delaunay", 1e-3),
+    Row("start", "robocov --help", {}, 0.2, "import numpy", 0.1, 2.0),
+]
+
+
+@pytest.mark.parametrize("rows", [ROWS, ROWS[-3:], ROWS[:12]], ids=["all", "no cost", "only cost"])
+def test_every_word_of_the_plot_is_inside_and_alone(rows, tmp_path, monkeypatch):
+    drawn: list[Figure] = []
+    save = plot.save_figure
+
+    def kept(figure, path):
+        drawn.append(figure)
+        save(figure, path)
+
+    monkeypatch.setattr(plot, "save_figure", kept)
+    plot.save_ratios(rows, tmp_path / "ratios.png")
+    (figure,) = drawn
+    width, height = figure.canvas.get_width_height()
+    texts = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text().strip()]
+    boxes = [text.get_window_extent() for text in texts if text.get_visible()]
+    assert len(boxes) > 10
+    for box in boxes:
+        assert box.x0 >= 0
+        assert box.x1 <= width
+        assert box.y0 >= 0
+        assert box.y1 <= height
+    said = {text.get_text() for text in texts}
+    for row in rows:
+        if row.part != "cost":
+            assert f"{row.ratio:.2f}" in said
+    for k, one in enumerate(boxes):
+        for other in boxes[:k]:
+            apart = one.x1 <= other.x0 or other.x1 <= one.x0 or one.y1 <= other.y0 or other.y1 <= one.y0
+            assert apart, (texts[k].get_text(), texts[boxes.index(other)].get_text())
