@@ -77,6 +77,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("run check controllers cost import_map maps schema console".split(), "test_cli"),
     "report": "test_houseexpo",
     **dict.fromkeys("measure plot render start step".split(), "test_bench"),
+    "coverage": "test_coverage_layers",
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts forces furniture scene sprites".split(), "test_layers"),
     "trajectories": "test_layers",

@@ -8,14 +8,24 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import controller_kind, gains_of
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.output import finite, write_csv, write_json
-from robocov_app.run import COST_SIZE, FILM_HOLD, Run, cost_title, save_figures, save_moving
+from robocov_app.run import (
+    FILM_HOLD,
+    Run,
+    cost_title,
+    last_moments,
+    save_figures,
+    save_moving,
+    shown_in_films,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from robocov.cost import CoverageCost
     from robocov_app.interruption import Interruption
     from robocov_app.options import RunOptions
+    from robocov_app.plot_coverage import Moment
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 
@@ -85,9 +95,10 @@ def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
     write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
 
 
-def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) -> None:
+def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
     """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
-    from robocov_app.plots import plot_comparison, plot_cost
+    from robocov_app.plot_coverage import plot_coverage
+    from robocov_app.plots import plot_comparison
     from robocov_app.view.theme import theme_named
 
     rows = rows_of(runs)
@@ -103,22 +114,24 @@ def save_comparison(runs: Mapping[str, Run], folder: Path, options: RunOptions) 
         (run.record.label, run.record.controller, run.history.time, run.history.mean_distance)
         for run in runs.values()
     ]
+
+    def moments() -> list[Moment]:
+        return last_moments(list(runs.values()), cost)
+
     save_figures(
         folder,
         {
             "trajectories": lambda: plot_comparison(
                 records, theme=theme, colours=options.colours, size=size, mean_distances=finals
             ),
-            "cost": lambda: plot_cost(
-                curves, theme=theme, size=size or COST_SIZE, title=cost_title(records[0])
-            ),
+            "cost": lambda: plot_coverage(curves, moments(), theme, size, cost_title(records[0])),
         },
         quiet=options.json,
     )
 
 
 def save_comparison_moving(
-    runs: Mapping[str, Run], folder: Path, options: RunOptions, stop: Interruption
+    runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions, stop: Interruption
 ) -> None:
     """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
     from robocov_app.panes import comparison_frames, pane_layout
@@ -127,7 +140,8 @@ def save_comparison_moving(
     records = [run.record for run in runs.values()]
     if not (options.frames or options.video):
         return
-    layout = pane_layout(records, options.theme, options.colours, options.picture_size())
+    shown = shown_in_films(list(runs.values()), cost, options)
+    layout = pane_layout(records, options.theme, options.colours, options.picture_size(), shown)
     longest = max(records, key=len)
     total = len(frame_rows(longest.time, options.fps, options.film_speed, FILM_HOLD))
     save_moving(
@@ -142,6 +156,7 @@ def save_comparison_moving(
             fps=options.fps,
             speed=options.film_speed,
             hold=FILM_HOLD,
+            shown=shown,
         ),
         total,
         options,

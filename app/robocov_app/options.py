@@ -64,6 +64,10 @@ class RunOptions:
     """Colours of pictures and films."""
     colours: Literal["paper", "robots"] = "paper"
     """Trajectories in the paper's red, or a colour for each robot; in films too."""
+    show: tuple[str, ...] = ()
+    """Layers that films and frames show besides the usual ones: distances, geodesic-cells, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers that they do not show, as in --hide cells centroids."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
     json: bool = False

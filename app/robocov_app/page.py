@@ -171,15 +171,22 @@ class Page:
         """Return how wide a text or legend is, in pixels."""
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
-    def footer_height(self, handles: Sequence[Artist]) -> float:
+    def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:
         """Return how much room `footer` needs below what is plotted, in pixels."""
-        columns, width, height = self._legend_extent(handles)
-        if columns == len(handles) and width <= self._beside_bar:
+        begin = self.margin if begin is None else begin
+        columns, width, height = self._legend_extent(handles, begin)
+        if columns == len(handles) and width <= self._beside_bar(begin):
             return 46 * self.scale
         return 36 * self.scale + height + 14 * self.scale
 
     def footer(
-        self, handles: Sequence[Artist], left: float, right: float, bottom: float, zoom: float
+        self,
+        handles: Sequence[Artist],
+        left: float,
+        right: float,
+        bottom: float,
+        zoom: float,
+        begin: float | None = None,
     ) -> None:
         """Draw the scale bar and the legend: beside each other where that fits, else below each other.
 
@@ -190,27 +197,30 @@ class Page:
         left, right, bottom : float, px
             Edges of what is plotted above.
         zoom : float, px/m
+        begin : float or None, px
+            Nothing is left of this; by default the margin.
         """
-        columns, width, _ = self._legend_extent(handles)
+        begin = self.margin if begin is None else begin
+        columns, width, _ = self._legend_extent(handles, begin)
         middle = bottom + 24 * self.scale
-        if columns == len(handles) and width <= self._beside_bar:
+        if columns == len(handles) and width <= self._beside_bar(begin):
             end = self.size[0] - self.margin
-            start = min(left, end - width - (self.size[0] - 2 * self.margin - self._beside_bar))
-            taken = self._scale_bar(max(start, self.margin), middle, zoom)
+            start = min(left, end - width - (end - begin - self._beside_bar(begin)))
+            taken = self._scale_bar(max(start, begin), middle, zoom)
             x = min(max(right, taken + 24 * self.scale + width), end)
             self._legend(handles, columns, "center right", (x, middle))
         else:
             self._scale_bar(left, bottom + 20 * self.scale, zoom)
-            self._legend(handles, columns, "upper center", (self.size[0] / 2, bottom + 38 * self.scale))
+            centre = (begin + self.size[0] - self.margin) / 2
+            self._legend(handles, columns, "upper center", (centre, bottom + 38 * self.scale))
 
     @property
     def _longest_bar(self) -> float:
         return max(min(120 * self.scale, self.size[0] / 7), 20.0)
 
-    @property
-    def _beside_bar(self) -> float:
-        """Width that the longest scale bar, with its words, leaves a legend in the same line."""
-        return self.size[0] - 2 * self.margin - self._longest_bar - 80 * self.scale
+    def _beside_bar(self, begin: float) -> float:
+        """Return the width that the longest scale bar, with its words, leaves a legend in the same line."""
+        return self.size[0] - self.margin - begin - self._longest_bar - 80 * self.scale
 
     def _scale_bar(self, left: float, y: float, zoom: float) -> float:
         """Draw a bar of a round length; return where its words end."""
@@ -229,14 +239,14 @@ class Page:
         self.text(length_label(length), words, y, points=SMALL, bold=True)
         return words + self.text_width(length_label(length), points=SMALL, bold=True)
 
-    def _legend_extent(self, handles: Sequence[Artist]) -> tuple[int, float, float]:
+    def _legend_extent(self, handles: Sequence[Artist], begin: float) -> tuple[int, float, float]:
         """Return columns in which the legend fits the page in the fewest rows, and its width and height."""
         for rows in range(1, len(handles) + 1):
             columns = -(-len(handles) // rows)
             legend = self._legend(handles, columns, "upper left", (0.0, 0.0))
             extent = legend.get_window_extent(self.figure.canvas.get_renderer())  # type: ignore[attr-defined]
             legend.remove()
-            if extent.width <= self.size[0] - self.margin or columns == 1:
+            if extent.width <= self.size[0] - begin or columns == 1:
                 break
         return columns, float(extent.width), float(extent.height)
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.environment import Environment
     from robocov.record import Record
+    from robocov_app.view.field import Fields
     from robocov_app.view.layers import LegendEntry
 
 USUAL_SIZE = (1920, 1080)
@@ -55,8 +56,28 @@ class PaneLayout:
     size: tuple[int, int]
 
 
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What panes show besides, or not, of what they usually do.
+
+    Attributes
+    ----------
+    also, without : names of layers
+    fields : Fields or None
+        See `iter_frames`.
+    """
+
+    also: frozenset[str] = frozenset()
+    without: frozenset[str] = frozenset()
+    fields: Fields | None = None
+
+
 def pane_layout(
-    records: Sequence[Record], theme: str, colours: str = "robots", size: tuple[int, int] | None = None
+    records: Sequence[Record],
+    theme: str,
+    colours: str = "robots",
+    size: tuple[int, int] | None = None,
+    shown: Shown = Shown(),
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
@@ -69,6 +90,7 @@ def pane_layout(
         See `iter_frames`.
     size : (width, height) or None, px
         Of the whole film; None for what suits the map, within `USUAL_SIZE`.
+    shown : Shown
     """
     count = len(records)
     aspect = max(_aspect(record.environment) for record in records)
@@ -86,7 +108,7 @@ def pane_layout(
         needed = max(round((pane_height - around) * aspect + beside), round(_NARROWEST * scale))
         pane_width = min(pane_width, needed)
         width = columns * pane_width + (columns - 1) * GAP
-    header = _legend(records, theme, colours, width, scale)
+    header = _legend(records, theme, colours, width, scale, shown)
     if size is None:
         height = len(header) + rows * pane_height + (rows - 1) * GAP
         width, height = width + width % 2, height + height % 2
@@ -105,6 +127,7 @@ def comparison_frames(
     fps: float,
     speed: float,
     hold: float,
+    shown: Shown = Shown(),
 ) -> Iterator[Frame]:
     """Draw the frames of several saved runs side by side.
 
@@ -115,6 +138,7 @@ def comparison_frames(
     layout : PaneLayout
     theme, colours, fps, speed, hold
         See `iter_frames`.
+    shown : Shown
     """
     films = [
         iter_frames(
@@ -127,6 +151,9 @@ def comparison_frames(
             layers=pane_layers(colours),
             scale=layout.scale,
             cost=cost,
+            also=shown.also,
+            without=shown.without,
+            fields=shown.fields,
         )
         for record, cost in zip(records, costs, strict=True)
     ]
@@ -203,12 +230,15 @@ def _aspect(environment: Environment) -> float:
     return (high_x - low_x) / (high_y - low_y)
 
 
-def _legend(records: Sequence[Record], theme: str, colours: str, width: int, scale: float) -> Frame:
+def _legend(
+    records: Sequence[Record], theme: str, colours: str, width: int, scale: float, shown: Shown
+) -> Frame:
     """Draw one legend for all: of what any of them shows."""
     look = theme_named(theme)
     found: list[list[LegendEntry]] = []
     for record in records:
         painter = Painter(record.environment, (64, 64), look, pane_layers(colours), scale)
+        painter.change(shown.also, shown.without)
         start = record.positions[:1]
         scene = Scene.of(
             record.environment,
@@ -217,8 +247,9 @@ def _legend(records: Sequence[Record], theme: str, colours: str, width: int, sca
             starts=start[0],
             trail=start,
             label=record.label,
+            field=shown.fields.at(start[0]) if shown.fields and painter.needs_field else None,
         )
         found.append(painter.legend_entries(scene))
     # the longest first: its order is kept, and mostly nothing is missing
     entries = {(entry.text, entry.style): entry for part in sorted(found, key=len)[::-1] for entry in part}
-    return legend_picture(list(entries.values()), width, look, scale)
+    return legend_picture(list(entries.values()), width, look, scale, shown.also)

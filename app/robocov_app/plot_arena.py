@@ -12,6 +12,8 @@ from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
@@ -92,24 +94,31 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     begin = record.positions[0]
     starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
     axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
-    radius = _disc_points(axes, record)
     fills = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
-    axes.scatter(
-        last[:, 0],
-        last[:, 1],
-        s=[(2 * r) ** 2 for r in radius],
-        c=[tone(fill) for fill in fills],
-        edgecolors=tone(theme.robot_ring),
-        linewidths=[min(1.1, 0.25 * r) for r in radius],
-        zorder=7,
-        clip_on=False,
-    )
+    radius = draw_robots(axes, last, record.team.radius, fills, theme)
     if has_goals(record):
         apart = mark_size(_in_points(axes, cells.centroid), 3.2, _CENTROID)
         away = np.hypot(*(_in_points(axes, cells.centroid) - _in_points(axes, last)).T)
         # where a robot has arrived, only the ends of the cross would stick out from under its disc
         axes.plot(*cells.centroid[away > radius].T, zorder=6, **_centroid_style(theme, apart))
-    for robot, (point, r, fill) in enumerate(zip(last, radius, fills, strict=True), start=1):
+
+
+def draw_robots(
+    axes: Axes, places: Array, radius: Array, fills: Sequence[Colour], theme: Theme
+) -> list[float]:
+    """Draw robots at (n, 2) m with radii (n,) m as discs with numbers; return the drawn radii in points."""
+    drawn = _disc_points(axes, places, radius)
+    axes.scatter(
+        places[:, 0],
+        places[:, 1],
+        s=[(2 * r) ** 2 for r in drawn],
+        c=[tone(fill) for fill in fills],
+        edgecolors=tone(theme.robot_ring),
+        linewidths=[min(1.1, 0.25 * r) for r in drawn],
+        zorder=7,
+        clip_on=False,
+    )
+    for robot, (point, r, fill) in enumerate(zip(places, drawn, fills, strict=True), start=1):
         digits = len(str(robot))
         size = r * (1.25, 1.1, 0.85, 0.65)[min(digits, 4) - 1]
         if size >= _SMALLEST_NUMBER:
@@ -124,6 +133,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
                 va="center_baseline",
                 zorder=8,
             )
+    return drawn
 
 
 def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
@@ -134,11 +144,11 @@ def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Co
     return [theme.trail(hue) for hue in hues]
 
 
-def _disc_points(axes: Axes, record: Record) -> list[float]:
+def _disc_points(axes: Axes, places: Array, radius: Array) -> list[float]:
     """Return each robot's radius in points: readable where there is room, in a crowd down to true size."""
     unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    true = record.team.radius * float(unit[1, 0] - unit[0, 0])
-    radii = fitted_radii(_in_points(axes, record.positions[-1]), true, _SMALLEST_DISC, _DISC)
+    true = radius * float(unit[1, 0] - unit[0, 0])
+    radii = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC)
     return [float(radius) for radius in radii]
 
 
@@ -192,24 +202,31 @@ def map_handles(environment: Environment, theme: Theme) -> list[Artist]:
     return handles
 
 
+def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
+    """Return the legend's entry for a robot."""
+    from matplotlib.lines import Line2D
+
+    style: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": 8.0,
+        "markerfacecolor": tone(fill),
+        "markeredgecolor": tone(theme.robot_ring),
+    }
+    return Line2D([], [], label=label, **style)
+
+
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
     """Return the legend's entries for what `draw_run` draws."""
     from matplotlib.lines import Line2D
 
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
-    final: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 8.0,
-        "markerfacecolor": tone(theme.final if paper else theme.robots[0]),
-        "markeredgecolor": tone(theme.robot_ring),
-    }
     centroid = Line2D([], [], label="cell centroid", **_centroid_style(theme, _CENTROID))
     return [
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
-        Line2D([], [], label="final position", **final),
+        robot_handle("final position", theme.final if paper else theme.robots[0], theme),
         *([centroid] if has_goals(record) else []),
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],

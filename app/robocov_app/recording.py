@@ -20,6 +20,7 @@ from robocov.errors import OutputError, ParameterError, shown
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
     from robocov.record import Record
+    from robocov_app.view.field import Fields
     from robocov_app.view.layers import Layer
 
 Frame: TypeAlias = NDArray[np.uint8]
@@ -80,6 +81,9 @@ def iter_frames(
     hold: float = 0.0,
     colours: str = "robots",
     show: Iterable[str] | None = None,
+    also: Iterable[str] = (),
+    without: Iterable[str] = (),
+    fields: Fields | None = None,
     layers: Sequence[Layer] | None = None,
     scale: float | None = None,
     cost: tuple[Array, Array] | None = None,
@@ -98,6 +102,10 @@ def iter_frames(
         Trajectories in a hue for each robot, or all in the paper's red.
     show : names of layers or None
         None shows those that are shown by default.
+    also, without : names of layers
+        Changes to that.
+    fields : Fields or None
+        What layers of distances draw; without it they draw nothing.
     layers : list of Layer or None
         From the lowest to the topmost; None for `standard_layers`.
     scale : float or None
@@ -120,6 +128,7 @@ def iter_frames(
     painter = Painter(record.environment, size, theme_named(theme), layers, scale)
     if show is not None:
         painter.show(show)
+    painter.change(also, without)
     if rows is None:
         rows = frame_rows(record.time, fps, speed, hold)
     last, frame = -1, None
@@ -134,6 +143,8 @@ def iter_frames(
                 trail_time=record.time[: row + 1],
                 label=record.label,
                 cost=_cost_text(float(record.time[row]), cost),
+                field=fields.at(record.positions[row]) if fields and painter.needs_field else None,
+                field_limit=fields.limit if fields else 1.0,
             )
             last, frame = row, painter.frame(scene)
         yield frame

@@ -11,27 +11,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
-from robocov.cost import CoverageCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov_app.building import FILM_LATTICE, cost_for_pictures
 from robocov_app.interruption import Interruption
 from robocov_app.output import finite, write_csv
 from robocov_app.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
     from robocov.arrays import Array
+    from robocov.cost import CoverageCost
     from robocov.environment import Environment
     from robocov_app.options import RunOptions
+    from robocov_app.panes import Shown
+    from robocov_app.plot_coverage import Moment
     from robocov_app.recording import Frame
 
-COST_SIZE = (1000, 560)
-"""Size in pixels of the picture of cost curves, where no size is asked for."""
+FILM_SCALE = 1.3
+"""How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
 
 FILM_HOLD = 1.0
 """Seconds for which a film stays on its last moment."""
@@ -140,9 +143,10 @@ def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     write_csv(folder / "cost.csv", "time_s,mean_distance_m,cost_m3,uncovered_area_m2", rows)
 
 
-def save_pictures(run: Run, folder: Path, options: RunOptions) -> None:
+def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:
     """Draw ``trajectories.png|svg`` and ``cost.png|svg``."""
-    from robocov_app.plots import plot_cost, plot_trajectories
+    from robocov_app.plot_coverage import plot_coverage
+    from robocov_app.plots import plot_trajectories
     from robocov_app.view.theme import theme_named
 
     record, history = run.record, run.history
@@ -155,10 +159,27 @@ def save_pictures(run: Run, folder: Path, options: RunOptions) -> None:
             "trajectories": lambda: plot_trajectories(
                 record, theme=theme, colours=options.colours, size=size, mean_distance=final
             ),
-            "cost": lambda: plot_cost([curve], theme=theme, size=size or COST_SIZE, title=cost_title(record)),
+            "cost": lambda: plot_coverage(
+                [curve], last_moments([run], cost), theme=theme, size=size, title=cost_title(record)
+            ),
         },
         quiet=options.json,
     )
+
+
+def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
+    """Return the last moments of runs on one map, to be drawn, with what `cost` knows of the map."""
+    from robocov_app.plot_coverage import Moment
+    from robocov_app.view.field import Field, FieldLattice
+
+    cost = cost_for_pictures(runs[0].record.environment, cost)
+    lattice = FieldLattice(cost)
+    return [
+        Moment.last_of(
+            run.record, Field(lattice, cost(run.record.positions[-1])), float(run.history.mean_distance[-1])
+        )
+        for run in runs
+    ]
 
 
 def cost_title(record: Record) -> str:
@@ -210,21 +231,73 @@ def save_moving(
             save_film(folder / film, shown, fps=options.fps, progress=lambda done, _: update(done))
 
 
-def save_run_moving(run: Run, folder: Path, options: RunOptions, stop: Interruption) -> None:
+def save_run_moving(
+    run: Run, cost: CoverageCost, folder: Path, options: RunOptions, stop: Interruption
+) -> None:
     """Write ``frames/`` and ``run.mp4`` as the options say."""
     from robocov_app.recording import frame_rows
 
+    if not (options.frames or options.video):
+        return
     total = len(frame_rows(run.record.time, options.fps, options.film_speed, FILM_HOLD))
-    save_moving(folder, "run.mp4", lambda: frames_of(run, options, options.film_size()), total, options, stop)
+    shown = shown_in_films([run], cost, options)
+
+    def frames() -> Iterator[Frame]:
+        return frames_of(run, options, options.film_size(), shown)
+
+    save_moving(folder, "run.mp4", frames, total, options, stop)
 
 
-def frames_of(run: Run, options: RunOptions, size: tuple[int, int]) -> Iterator[Frame]:
+def check_layers(options: RunOptions) -> None:
+    """Make sure, before anything is simulated, that films can show what is wanted.
+
+    Raises
+    ------
+    ParameterError
+        When there is no such layer.
+    """
+    if options.show or options.hide:
+        from robocov_app.view.picture import checked_layers
+
+        checked_layers("--show", options.show)
+        checked_layers("--hide", options.hide)
+
+
+def shown_in_films(runs: Sequence[Run], cost: CoverageCost, options: RunOptions) -> Shown:
+    """Return what films of runs on one map show, all on one scale of colours.
+
+    The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
+    """
+    from robocov_app.panes import Shown
+    from robocov_app.view.field import Fields
+    from robocov_app.view.picture import checked_layers
+    from robocov_app.view.shading import round_limit
+
+    also, without = checked_layers("--show", options.show), checked_layers("--hide", options.hide)
+    if not also & {"distances", "geodesic_cells"}:
+        return Shown(also, without)
+    cost = cost_for_pictures(runs[0].record.environment, cost, FILM_LATTICE)
+    farthest = max(float(reached.max(initial=0.0)) for reached in _reached(runs, cost))
+    return Shown(also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
+
+
+def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
+    """Yield the distances at the end of each run that are finite."""
+    for run in runs:
+        distances = cost(run.record.positions[-1]).distances
+        yield distances[np.isfinite(distances)]
+
+
+def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown) -> Iterator[Frame]:
     """Draw the film frames of a run."""
     from robocov_app.recording import iter_frames
 
     return iter_frames(
         run.record,
         size=size,
+        also=shown.also,
+        without=shown.without,
+        fields=shown.fields,
         theme=options.theme,
         colours=options.colours,
         fps=options.fps,

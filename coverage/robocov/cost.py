@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.corner_views import CornerViews
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
     from robocov.array_cache import ArrayCache
     from robocov.environment import Environment
+
+Number = TypeVar("Number", bound=np.generic)
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
@@ -52,6 +55,8 @@ class CoverageResult:
         The nearest robot (the geodesic Voronoi partition), -1 where none can come.
     corner : (m,)
         The row in `corners` where the way from the owner to the site bends first, -1 where it is straight.
+    last_corner : (m,)
+        The row where it bends last, -1 where it is straight.
     positions : (n, 2) m
     points : (m, 2) m
         The sites.
@@ -65,6 +70,7 @@ class CoverageResult:
     distances: Array
     owner: IntArray
     corner: IntArray
+    last_corner: IntArray
     positions: Array
     points: Array
     corners: Array
@@ -204,7 +210,7 @@ class CoverageCost:
         robots = RobotViews(paths, x, y, np.sqrt(reach2))
         hidden = ~robots.see(owner, dx, dy, distance2)
         distance = np.sqrt(distance2)
-        corner = np.full(len(owner), -1, dtype=np.intp)
+        corner, last_corner = np.full((2, len(owner)), -1, dtype=np.intp)
         if not covered.all():
             away = ~covered[sites.component]
             owner[away], distance[away], hidden[away] = -1, np.inf, False
@@ -216,7 +222,7 @@ class CoverageCost:
             shortest, way = self._corner_views.shortest(tile, sites.slot[place], ways.distance)
             nearest = owner[site]
             if len(ways.first):
-                corner[site], owner[site] = ways.first[way], ways.owner[way]
+                corner[site], last_corner[site], owner[site] = ways.first[way], way, ways.owner[way]
             # whoever else is nearer than by way of a corner may see the site
             bound2 = shortest * shortest
             index, other, dx, dy, distance2 = sites.within(place, bound2, x, y)
@@ -230,11 +236,17 @@ class CoverageCost:
             shortest[straight] = np.sqrt(bound2[straight])
             distance[site] = shortest
             site = site[straight]
-            corner[site], owner[site] = -1, robot[straight]
-        return self._result(positions, covered, distance, owner, corner)
+            corner[site], last_corner[site], owner[site] = -1, -1, robot[straight]
+        return self._result(positions, covered, distance, owner, corner, last_corner)
 
     def _result(
-        self, positions: Array, covered: BoolArray, distances: Array, owner: IntArray, corner: IntArray
+        self,
+        positions: Array,
+        covered: BoolArray,
+        distances: Array,
+        owner: IntArray,
+        corner: IntArray,
+        last_corner: IntArray,
     ) -> CoverageResult:
         distances = distances * self.geodesics.walls.grid.unit
         reached = distances if covered.all() else distances[owner >= 0]
@@ -246,10 +258,31 @@ class CoverageCost:
             distances=distances,
             owner=owner,
             corner=corner,
+            last_corner=last_corner,
             positions=positions,
             points=self.points,
             corners=self._corners,
         )
+
+    def grid(self, values: NDArray[Number]) -> NDArray[Number]:
+        """Return (m,) values of the sites as a picture of the whole lattice, (n, n), the lowest row first.
+
+        Cells that are not free hold nan, or -1 where the values are whole numbers.
+
+        Examples
+        --------
+        >>> from robocov.environment import CircleObstacle, Environment
+        >>> square = ((0, 0), (3, 0), (3, 3), (0, 3))
+        >>> cost = CoverageCost(Environment("ring", square, (CircleObstacle((1.5, 1.5), 0.4),)), lattice=3)
+        >>> cost.grid(cost([[0.5, 0.5]]).owner)
+        array([[ 0,  0,  0],
+               [ 0, -1,  0],
+               [ 0,  0,  0]])
+        """
+        fill = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
+        picture = np.full(self.lattice**2, fill, dtype=values.dtype)
+        picture[self.cells] = values
+        return picture.reshape(self.lattice, self.lattice)
 
     def path(self, positions: Array, point: Array) -> Array:
         """Return the shortest path from a point to the nearest of (n, 2) robots, (w, 2) way-points in metres.

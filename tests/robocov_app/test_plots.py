@@ -11,6 +11,7 @@ import matplotlib
 import numpy as np
 import pygame
 import pytest
+from clear_pages import all_clear, overlap
 from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,34 +46,6 @@ def curves(*finals):
         (name.upper(), name, T, final + 2 * np.exp(-T / 10))
         for name, final in zip(names, finals, strict=False)
     ]
-
-
-def boxes(figure):
-    """Return the extents of all that is written on the page outside the arenas, and of the arenas."""
-    renderer = figure.canvas.get_renderer()
-    texts = [text for text in figure.texts if text.get_text()]
-    parts = [*texts, *figure.legends]
-    return [part.get_window_extent(renderer) for part in parts], [
-        axes.get_window_extent(renderer) for axes in figure.axes
-    ]
-
-
-def overlap(first, second):
-    wide = min(first.x1, second.x1) - max(first.x0, second.x0)
-    high = min(first.y1, second.y1) - max(first.y0, second.y0)
-    return wide > 1.0 and high > 1.0
-
-
-def all_clear(figure):
-    """Nothing is cut at the page's edge, and no words lie on others or on an arena."""
-    words, arenas = boxes(figure)
-    page = figure.bbox
-    for box in [*words, *arenas]:
-        assert box.x0 >= -0.5 and box.y0 >= -0.5 and box.x1 <= page.x1 + 0.5 and box.y1 <= page.y1 + 0.5
-    everything = [*words, *arenas]
-    for k, box in enumerate(everything):
-        for other in everything[k + 1 :]:
-            assert not overlap(box, other)
 
 
 @pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
@@ -409,6 +382,7 @@ import sys
 import robocov_app.plots
 assert "matplotlib" not in sys.modules
 sys.path.insert(0, sys.argv[1])
+from clear_pages import all_clear, boxes, overlap
 from drawn_run import ROOMS, run_of
 robocov_app.plots.plot_trajectories(run_of(ROOMS, 3))
 assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules

@@ -34,8 +34,8 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
     from robocov.controllers import make_controller
-    from robocov.cost import CoverageCost
     from robocov.mapfile import load_map
+    from robocov_app.building import built_cost
     from robocov_app.compare import (
         begin_comparison,
         folder_names,
@@ -46,7 +46,7 @@ def command(options: Arguments) -> int:
     )
     from robocov_app.interruption import Interruption
     from robocov_app.output import cleared, finite, listed, prepared, results
-    from robocov_app.run import evaluated, save_numbers, simulated, starts_of, team_of
+    from robocov_app.run import check_layers, evaluated, save_numbers, simulated, starts_of, team_of
 
     names = options.controllers
     if not names:
@@ -60,8 +60,9 @@ def command(options: Arguments) -> int:
         make_controller(name, chosen)
     team_of(options)
     starts_of(environment, options)
+    check_layers(options)
     target = options.out or Path(f"{Path(options.map).stem}-comparison")
-    cost = CoverageCost(environment, lattice=options.lattice)
+    cost = built_cost(environment, options.lattice, quiet=options.json)
     runs: dict[str, Run] = {}
     with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
         for name, chosen, folder in zip(names, gains, folder_names(names), strict=True):
@@ -74,8 +75,8 @@ def command(options: Arguments) -> int:
             runs[folder] = run
             if stop.requested:
                 break
-        save_comparison(runs, out, options)
-        save_comparison_moving(runs, out, options, stop)
+        save_comparison(runs, cost, out, options)
+        save_comparison_moving(runs, cost, out, options, stop)
     if options.json:
         print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, "runs": rows_of(runs)})))
     else:

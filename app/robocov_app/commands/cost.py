@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import tyro
 
 from robocov.arrays import Array
 from robocov.atomic import written
-from robocov.cost import CoverageCost
-from robocov.errors import InputError, ParameterError, shown
+from robocov.errors import InputError, OutputError, ParameterError, shown
 from robocov.mapfile import load_map
+from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite
+
+if TYPE_CHECKING:
+    from robocov.cost import CoverageCost, CoverageResult
+    from robocov.environment import Environment
 
 
 @dataclass
@@ -33,6 +37,10 @@ class Arguments:
     """Evaluate on N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
     """Save per-site points (m,2), distances (m,) and owner (m,) there."""
+    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Draw a map of the distances to a PNG or SVG."""
+    theme: Literal["light", "dark"] = "light"
+    """Colours of the picture."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -43,9 +51,15 @@ def command(options: Arguments) -> None:
         raise ParameterError(f"--lattice: {options.lattice}, but a whole number from 2 to 2048 was wanted")
     if options.sites is not None and (options.sites.is_dir() or not options.sites.name):
         raise InputError(f"--sites: {str(options.sites)!r}, but the name of a file was wanted")
+    if options.plot is not None:
+        from robocov_app.plots import figure_kind
+
+        figure_kind(options.plot)
+        if not options.plot.parent.is_dir():
+            raise OutputError(f"{options.plot}: cannot be written: there is no folder {options.plot.parent}")
     environment = load_map(options.map)
     robots = read_positions(options.positions)
-    cost = CoverageCost(environment, lattice=options.lattice)
+    cost = built_cost(environment, options.lattice, quiet=options.json)
     try:
         result = cost(robots)
     except InputError as error:
@@ -53,6 +67,8 @@ def command(options: Arguments) -> None:
     if options.sites is not None:
         with written(options.sites) as part, part.open("wb") as file:
             np.savez(file, points=cost.points, distances=result.distances, owner=result.owner)
+    if options.plot is not None:
+        draw(options, environment, cost_for_pictures(environment, cost), result)
     answer = {
         "mean_distance_m": result.mean_distance,
         "cost_m3": result.value,
@@ -67,6 +83,21 @@ def command(options: Arguments) -> None:
     print(f"coverage cost   {result.value:.3f} m³")
     print(f"uncovered area  {result.uncovered_area:.3f} m²")
     print(f"on {len(cost.points)} sites, {len(robots)} robots")
+
+
+def draw(options: Arguments, environment: Environment, cost: CoverageCost, result: CoverageResult) -> None:
+    """Draw the map of distances."""
+    from robocov.robots import Team
+    from robocov_app.plot_coverage import Moment, plot_coverage
+    from robocov_app.plots import save_figure
+    from robocov_app.view.field import Field, FieldLattice
+
+    assert options.plot is not None
+    n = len(result.positions)
+    facts = f"{n} robot{'s' if n > 1 else ''}, mean distance {result.mean_distance:.3f} m"
+    field = Field(FieldLattice(cost), cost(result.positions))
+    moment = Moment(environment, Team.homogeneous(n), field, environment.name, facts)
+    save_figure(plot_coverage([], [moment], options.theme, title="Coverage cost"), options.plot)
 
 
 def read_positions(path: Path) -> Array:

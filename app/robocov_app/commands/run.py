@@ -32,12 +32,13 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
     from robocov.controllers import make_controller
-    from robocov.cost import CoverageCost
     from robocov.mapfile import load_map
+    from robocov_app.building import built_cost
     from robocov_app.compare import folder_names
     from robocov_app.interruption import Interruption
     from robocov_app.output import cleared, finite, listed, results
     from robocov_app.run import (
+        check_layers,
         evaluated,
         save_numbers,
         save_pictures,
@@ -53,15 +54,16 @@ def command(options: Arguments) -> int:
     make_controller(options.controller, gains)
     team_of(options)
     starts_of(environment, options)
-    cost = CoverageCost(environment, lattice=options.lattice)
+    check_layers(options)
+    cost = built_cost(environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
         record.save(cleared(folder))  # what took long is safe, whatever happens to the evaluation
         run = evaluated(record, cost, stop, quiet=options.json)
         save_numbers(run, folder, options.lattice)
-        save_pictures(run, folder, options)
-        save_run_moving(run, folder, options, stop)
+        save_pictures(run, cost, folder, options)
+        save_run_moving(run, cost, folder, options, stop)
     if options.json:
         print(json.dumps(finite({"out": str(folder), "interrupted": stop.requested, **run.summary})))
     else:

@@ -42,6 +42,8 @@ class Canvas:
         Widths and text sizes of the theme are multiplied by it: 2 on a screen of twice the density.
     hues : (n,) int
         Index of each robot's colour in the theme.
+    shown : names of layers
+        All that are drawn.
     """
 
     surface: pygame.Surface
@@ -49,6 +51,7 @@ class Canvas:
     theme: Theme
     scale: float
     hues: IntArray
+    shown: frozenset[str] = frozenset()
 
     def width(self, pixels: float) -> int:
         """Return a stroke's width of `pixels` at scale 1: whole pixels, at least one."""

@@ -133,7 +133,7 @@ class Legend(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         width = canvas.surface.get_width()
         words = tuple((entry.text, entry.style) for entry in self.entries)
-        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist())
+        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
         if self._strip is None or key != self._key:
             self._strip, self._key = legend_strip(self.entries, canvas), key
         canvas.surface.blit(self._strip, (0, 0))
@@ -157,11 +157,19 @@ def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surfa
 
 
 def legend_picture(
-    entries: Sequence[LegendEntry], width: int, theme: Theme, scale: float
+    entries: Sequence[LegendEntry],
+    width: int,
+    theme: Theme,
+    scale: float,
+    shown: frozenset[str] = frozenset(),
 ) -> NDArray[np.uint8]:
-    """Return these entries as an RGB picture of a width, (height, width, 3), 0 to 255."""
+    """Return these entries as an RGB picture of a width, (height, width, 3), 0 to 255.
+
+    Names of layers in `shown` are those that the pictures below show.
+    """
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
-    strip = legend_strip(entries, Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1)))
+    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), shown)
+    strip = legend_strip(entries, canvas)
     pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
     return pixels.reshape(strip.get_height(), width, 3)
 

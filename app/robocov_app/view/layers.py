@@ -98,8 +98,9 @@ class Cells(Layer):
         sizes = np.array([len(cell) for cell in scene.cells])
         corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
         ends = np.cumsum(sizes)
-        for cell, hue in zip(np.split(corners, ends[:-1]), canvas.hues.tolist(), strict=True):
-            canvas.polygon(cell, canvas.theme.cell(hue))
+        if not self._lines_only(canvas, scene):
+            for cell, hue in zip(np.split(corners, ends[:-1]), canvas.hues.tolist(), strict=True):
+                canvas.polygon(cell, canvas.theme.cell(hue))
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         width = canvas.width(canvas.theme.line)
@@ -110,10 +111,16 @@ class Cells(Layer):
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             size = 11 * canvas.scale
             box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
-            pygame.draw.rect(canvas.surface, canvas.theme.cell(0), box)
+            if not self._lines_only(canvas, scene):
+                pygame.draw.rect(canvas.surface, canvas.theme.cell(0), box)
             pygame.draw.rect(canvas.surface, canvas.theme.cell_edge, box, canvas.width(canvas.theme.line))
 
         return [LegendEntry("Voronoi cell", glyph)] if scene.cells else []
+
+    @staticmethod
+    def _lines_only(canvas: Canvas, scene: Scene) -> bool:
+        """Whether colours below mean something else."""
+        return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.shown)
 
 
 def _once(edges: Array) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
+from robocov_app.view.coverage import ColourBar, Distances, GeodesicCells, bar_room
 from robocov_app.view.forces import ForceTerm, Goals, Links, ObstaclePoints, Ranges, Velocities
 from robocov_app.view.furniture import (
     LEGEND_ROW,
@@ -53,6 +54,8 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         Colours of the trajectories, see `Trajectories`.
     """
     return [
+        Distances(),
+        GeodesicCells(),
         Cells(),
         Grid(),
         Obstacles(),
@@ -71,10 +74,27 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         ForceTerm("repulsion_obstacle"),
         ForceTerm("resultant"),
         Robots(),
+        ColourBar(),
         Legend(),
         ScaleBar(),
         Status(),
     ]
+
+
+def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
+    """Return names of layers, a dash as good as an underscore.
+
+    Raises
+    ------
+    ParameterError
+        When there is no layer of that name; the message names the option.
+    """
+    known = [layer.name for layer in standard_layers()]
+    wanted = [name.replace("-", "_") for name in names]
+    for name in wanted:
+        if name not in known:
+            raise ParameterError(f"{option}: {unknown_name('layer', name, known)}")
+    return frozenset(wanted)
 
 
 def pane_layers(trails: str = "robots") -> list[Layer]:
@@ -148,6 +168,16 @@ class Painter:
             raise ParameterError(unknown_name("layer", name, known))
         self.visible = wanted
 
+    def change(self, also: Iterable[str], without: Iterable[str]) -> None:
+        """Show some layers too, and others not; names that this painter has no layers of are passed over."""
+        known = {layer.name for layer in self.layers}
+        self.visible = (self.visible | set(also) & known) - set(without)
+
+    @property
+    def needs_field(self) -> bool:
+        """Whether what is shown depends on the distances to the nearest robot."""
+        return bool({"distances", "geodesic_cells"} & self.visible)
+
     def resize(self, size: tuple[int, int], scale: float | None = None) -> None:
         """Draw in another size from now on; what was zoomed or panned stays so."""
         self.size = size
@@ -183,7 +213,8 @@ class Painter:
             self.resize(surface.get_size(), self.scale)
         self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
         entries = self.legend_entries(scene)
-        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues)
+        shown = frozenset(self.visible)
+        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
         rows = 0
         for layer in self._shown():
             if isinstance(layer, Legend):
@@ -191,8 +222,8 @@ class Painter:
                 rows = len(legend_rows(canvas, entries))
             elif isinstance(layer, Caption):
                 rows = 1
-        self._place_view(rows)
-        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues)
+        self._place_view(rows, bar_room(canvas, scene))
+        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
         surface.fill(self.theme.background)
         for static, group in groupby(self._shown(), key=lambda layer: layer.static):
             layers = list(group)
@@ -217,19 +248,19 @@ class Painter:
     def _shown(self) -> list[Layer]:
         return [layer for layer in self.layers if layer.name in self.visible]
 
-    def _place_view(self, legend_rows_count: int) -> None:
-        """Give the world what the strips above and below leave."""
+    def _place_view(self, legend_rows_count: int, beside: float = 0.0) -> None:
+        """Give the world what the strips above and below, and `beside` pixels at the right, leave."""
         width, height = self.size
         top = MARGIN * self.scale
         if legend_rows_count:
             top = (6 + LEGEND_ROW * legend_rows_count + 6) * self.scale
         below = bool({"scale_bar", "status"} & self.visible)
         bottom = (STRIP if below else MARGIN) * self.scale
-        view = (0.0, top, float(width), max(height - top - bottom, 1.0))
+        view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
         if self._camera is None or self._follows:
             bounds = self.environment.region.bounds
             side = MARGIN * self.scale
-            inner = (side, top, max(width - 2 * side, 1.0), view[3])
+            inner = (side, top, max(view[2] - (1 if beside else 2) * side, 1.0), view[3])
             self._camera = Camera.fit(bounds, inner, margin=2 * self.scale).within(view)
         elif self._camera.view != view:
             self._camera = self._camera.within(view)
@@ -246,7 +277,7 @@ class Painter:
         if kept is None or kept[0] != key:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(self._clip())
-            own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
+            own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues, canvas.shown)
             for layer in layers:
                 layer.draw(own, scene)
             self._pages = {names: (key, page)}

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import partition
+
+if TYPE_CHECKING:
+    from robocov_app.view.field import Field
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +41,10 @@ class Scene:
         The controller as people name it.
     cost : str
         For example ``mean distance 1.23 m``.
+    field : Field or None
+        The distances to the nearest robot.
+    field_limit : float, m
+        Where the scale of their colours ends.
     """
 
     environment: Environment
@@ -50,6 +58,8 @@ class Scene:
     adjacency: IntArray | None = None
     label: str = ""
     cost: str = ""
+    field: Field | None = None
+    field_limit: float = 1.0
 
     @property
     def has_goals(self) -> bool:
@@ -68,6 +78,8 @@ class Scene:
         trail_time: Array | None = None,
         label: str = "",
         cost: str = "",
+        field: Field | None = None,
+        field_limit: float = 1.0,
     ) -> Scene:
         """Return the scene of `snapshot` with the Voronoi cells of all its robots.
 
@@ -86,4 +98,6 @@ class Scene:
             cells.adjacency,
             label,
             cost,
+            field,
+            field_limit,
         )

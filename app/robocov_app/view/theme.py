@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocov.errors import ParameterError, unknown_name
 
@@ -86,6 +87,10 @@ class Theme:
     forces : dict of term name to Colour
     robots : nine colours
         One for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one.
+    heat : colours
+        From near to far, evenly spaced, ever darker or ever brighter; see `heat_table`.
+    unreached : Colour
+        Where no robot can come.
     tint, paper_tint : float
         How much of a robot's colour its cell takes on; less in plots in the paper's colours.
     """
@@ -109,6 +114,8 @@ class Theme:
     others: tuple[Colour, ...]
     forces: dict[str, Colour]
     robots: tuple[Colour, ...]
+    heat: tuple[Colour, ...]
+    unreached: Colour
     tint: float
     paper_tint: float
     text: float = 12.0
@@ -121,6 +128,13 @@ class Theme:
     def cell(self, hue: int) -> Colour:
         """Return the fill of a cell of the hue with index `hue`."""
         return mix(self.background, self.robots[hue], self.tint)
+
+    def heat_table(self, count: int) -> NDArray[np.uint8]:
+        """Return colours from near to far, (count, 3)."""
+        anchors = np.array(self.heat, dtype=float)
+        place = np.linspace(0.0, len(anchors) - 1.0, count)
+        columns = [np.interp(place, np.arange(len(anchors)), anchors[:, k]) for k in range(3)]
+        return np.asarray(np.rint(np.column_stack(columns)), dtype=np.uint8)
 
     def controller(self, name: str) -> Colour:
         """Return the colour of a controller's curves and labels."""
@@ -168,6 +182,8 @@ LIGHT = Theme(
         "resultant": rgb("1B2330"),
     },
     robots=tuple(rgb(code) for code in _MUTED),
+    heat=tuple(rgb(code) for code in ("FBFCFE", "DCE6F2", "B4CBE4", "86A9D3", "5D84BF", "3F60A2", "2A3F78")),
+    unreached=rgb("E3DED4"),
     tint=0.25,
     paper_tint=0.13,
 )
@@ -204,6 +220,8 @@ DARK = Theme(
     robots=tuple(
         mix(rgb(code), (255, 255, 255), 0.38 if luminance(rgb(code)) < 0.16 else 0.0) for code in _MUTED
     ),
+    heat=tuple(rgb(code) for code in ("141B26", "1B2F4B", "23486F", "31668F", "4B88A6", "78ADB8", "B8D3C8")),
+    unreached=rgb("332E28"),
     tint=0.26,
     paper_tint=0.19,
 )

@@ -1,0 +1,335 @@
+"""The distance to the nearest robot at any place of a picture, from its exact values at the sites.
+
+From every site the shortest way goes back to a last way-point, a corner or the robot itself; from there
+it is straight. So does that of places beside the site: their distance is that of the way-point plus the
+straight rest. Each place asks the four sites around it and takes the least, which is smooth between
+walls and sharp where the owner changes, at any magnification.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array, BoolArray, IntArray
+    from robocov.cost import CoverageCost, CoverageResult
+
+_SHALLOW = 0.05
+"""Least angle in radians at which two distances are taken to grow apart, so that borders stay thin."""
+
+
+_BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
+"""The squares beside a square: rows up and columns right, and the corners that the two share."""
+
+_BLOCK = 4
+"""Pixels along the side of blocks that are looked at as a whole first."""
+
+_RIVALS = 5
+"""Different ways that a place may choose from."""
+
+
+class FieldLattice:
+    """Which sites are around each place of a map; the same for all results on it.
+
+    Parameters
+    ----------
+    cost : CoverageCost
+    """
+
+    def __init__(self, cost: CoverageCost) -> None:
+        side = cost.lattice
+        self.spacing = cost.spacing
+        number = cost.grid(np.arange(len(cost.points)))
+        self.origin = cost.points[0] - np.array(np.divmod(cost.cells[0], side)[::-1]) * cost.spacing
+        # squares between four cells' middles, low left, low right, high left, high right; the rim's stick out
+        rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
+        lower, upper = rows[:-1], rows[1:]
+        corners = [number[np.ix_(y, x)] for y in (lower, upper) for x in (lower, upper)]
+        around = np.stack(corners, axis=-1)
+        # a site that is not free speaks as another one of the square, and where none is, as the nearest
+        some = around.max(axis=-1)
+        row, column = distance_transform_edt(number < 0, return_distances=False, return_indices=True)
+        nearest = number[row, column]
+        some = np.where(some < 0, nearest[np.ix_(upper, upper)], some)
+        self.around: IntArray = np.where(around < 0, some[..., None], around)
+        self.free: BoolArray = around >= 0
+
+    def squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
+        """Return the columns and the rows of the squares that hold coordinates, (w,) and (h,) m."""
+        last = len(self.around) - 1
+        column, row = (
+            np.clip(np.floor((places - start) / self.spacing) + 1, 0, last).astype(np.intp)
+            for places, start in ((x, self.origin[0]), (y, self.origin[1]))
+        )
+        return column, row
+
+
+@dataclass(frozen=True, eq=False)
+class Borders:
+    """Places near which the owner changes.
+
+    Attributes
+    ----------
+    row, column : (k,)
+        Of the picture.
+    owner : (k,)
+    gap : (k,) m
+        How far the border is.
+    """
+
+    row: IntArray
+    column: IntArray
+    owner: IntArray
+    gap: Array
+
+    def within(self, gap: float) -> Borders:
+        """Return those that are no farther from a border."""
+        near = (self.gap <= gap).nonzero()[0]
+        return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
+
+
+class _Rivals(NamedTuple):
+    """Sites whose ways a place may choose from.
+
+    Attributes
+    ----------
+    number : (s, s)
+        The number of each square that has any, else -1.
+    site : (k, r)
+    right : (k, 4, r)
+        Whether the way's straight end, led to each corner of the square, is not shorter than the shortest
+        way to it; if it is, there is a wall in between.
+    """
+
+    number: IntArray
+    site: IntArray
+    right: BoolArray
+
+
+class Field:
+    """The distance to the nearest robot, and who that is, for one set of positions.
+
+    Parameters
+    ----------
+    lattice : FieldLattice
+    result : CoverageResult
+        Of the same `CoverageCost`.
+    """
+
+    def __init__(self, lattice: FieldLattice, result: CoverageResult) -> None:
+        self.lattice = lattice
+        self.result = result
+        owner, last = result.owner, result.last_corner
+        way = result.positions[owner]
+        bent = (last >= 0).nonzero()[0]
+        way[bent] = result.corners[last[bent]]
+        rest = np.hypot(*(result.points - way).T)
+        start = np.maximum(result.distances - rest, 0.0)
+        start[(last < 0) & (owner >= 0)] = 0.0
+        self._way_x, self._way_y = np.ascontiguousarray(way.T)
+        self._start, self._owner = start, owner
+        # sites whose ways come from the same way-point of the same robot give the same distances
+        source = np.where(last >= 0, last, -1 - owner)
+        around = lattice.around
+        mixed = (source[around[..., 1:]] != source[around[..., :1]]).any(axis=-1)
+        self._inside = self._rivals(mixed, around[mixed])
+        divided = (owner[around[..., 1:]] != owner[around[..., :1]]).any(axis=-1)
+        beside, others = _with_neighbours(lattice, divided)
+        self._around = self._rivals(beside, _first_different(others, source[others]))
+
+    def _rivals(self, squares: BoolArray, site: IntArray) -> _Rivals:
+        """Return the rivals of some squares, given their sites (k, r)."""
+        number = np.full(squares.shape, -1, dtype=np.intp)
+        number[squares] = np.arange(len(site))
+        corner = self.lattice.around[squares]
+        points = self.result.points[corner]
+        said = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
+        known = self.result.distances[corner][..., None]
+        return _Rivals(number, site, said >= known - 1e-9 * self.lattice.spacing)
+
+    @property
+    def largest(self) -> float:
+        """The largest distance of a site that a robot can reach, m; nan if there is none."""
+        reached = self.result.distances[self._owner >= 0]
+        return float(reached.max()) if len(reached) else float("nan")
+
+    def distances(self, x: Array, y: Array) -> Array:
+        """Return the distances at (w,) x and (h,) y, m, as (h, w) m; inf where no robot can come.
+
+        Within obstacles they are those of places beside them, so that pictures can be cut there.
+        """
+        column, row = self.lattice.squares(x, y)
+        site = self.lattice.around[..., 0][row[:, None], column]
+        distance = self._distance(site, np.broadcast_to(x, site.shape), y[:, None])
+        number = self._inside.number[row[:, None], column]
+        high, wide = (number >= 0).nonzero()
+        distance[high, wide] = self._asked(self._inside, number[high, wide], x[wide], y[high]).min(axis=1)
+        return distance
+
+    def cells(self, x: Array, y: Array, within: float) -> tuple[IntArray, Borders]:
+        """Return the nearest robot of every pixel, (h, w), -1 where none can come; and `borders`."""
+        column, row = self.lattice.squares(x, y)
+        owner = self._owner[self.lattice.around[..., 0]].take(row, axis=0).take(column, axis=1)
+        blocks, pixels = self._coarse_and_fine(x, y, within)
+        for part in (blocks, pixels):
+            owner[part.row, part.column] = part.owner
+        return owner, pixels.within(within)
+
+    def borders(self, x: Array, y: Array, within: float) -> Borders:
+        """Return the places of a picture near which the owner changes.
+
+        Parameters
+        ----------
+        x, y : (w,) and (h,) m
+            Of the pixels' middles, evenly spaced.
+        within : float, m
+            How far the border may be.
+        """
+        _, pixels = self._coarse_and_fine(x, y, within)
+        return pixels.within(within)
+
+    def _coarse_and_fine(self, x: Array, y: Array, within: float) -> tuple[Borders, Borders]:
+        """Return what is near a border by blocks, each as its middle is, then by pixels."""
+        # blocks with a corner in a square with rivals
+        column, row = self.lattice.squares(x, y)
+        numbered = self._around.number >= 0
+        ends = [
+            np.minimum(np.arange(0, n, _BLOCK) + more, n - 1)
+            for n in (len(y), len(x))
+            for more in (0, _BLOCK - 1)
+        ]
+        some = np.zeros((len(ends[0]), len(ends[2])), dtype=bool)
+        for high, wide in product(ends[:2], ends[2:]):
+            some |= numbered[row[high][:, None], column[wide]]
+        high, wide = some.nonzero()
+        middle_x, middle_y = (_middles(places) for places in (x, y))
+        column, row = self.lattice.squares(middle_x, middle_y)
+        known = numbered[row[high], column[wide]]
+        blocks = self._bordering(high[known], wide[known], middle_x, middle_y)
+        step = abs(x[1] - x[0]) if len(x) > 1 else self.lattice.spacing
+        # half a block's diagonal, and as much again because gaps are taken as if borders were straight
+        near = (blocks.gap <= within + 1.5 * _BLOCK * step).nonzero()[0]
+        coarse = _spread(blocks.row, blocks.column, len(y), len(x))
+        coarse_owner, coarse_gap = blocks.owner[coarse[2]], blocks.gap[coarse[2]]
+        fine = _spread(
+            *(np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])),
+            *(len(y), len(x)),
+        )
+        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(*fine[:2], x, y)
+
+    def _bordering(self, high: IntArray, wide: IntArray, x: Array, y: Array) -> Borders:
+        """Return who is nearest, and how far the border is, at chosen rows and columns; inf for no border."""
+        column, row = self.lattice.squares(x, y)
+        number = self._around.number[row[high], column[wide]]
+        some = (number >= 0).nonzero()[0]
+        number, high, wide = number[some], high[some], wide[some]
+        px, py = x[wide], y[high]
+        around = self._around.site[number]
+        distance = self._asked(self._around, number, px, py)
+        owner = self._owner[around]
+        each = np.arange(len(around))
+        first = distance.argmin(axis=1)
+        others = np.where(owner == owner[each, first][:, None], np.inf, distance)
+        second = others.argmin(axis=1)
+        (ux, uy), (vx, vy) = (self._heading(around[each, k], px, py) for k in (first, second))
+        apart = np.maximum(np.hypot(ux - vx, uy - vy), _SHALLOW)
+        # between places that robots reach and such that none does, there is a wall
+        with np.errstate(invalid="ignore"):
+            gap = np.nan_to_num(
+                (others[each, second] - distance[each, first]) / apart, nan=np.inf, posinf=np.inf
+            )
+        return Borders(high, wide, owner[each, first], gap)
+
+    def _asked(self, rivals: _Rivals, number: IntArray, x: Array, y: Array) -> Array:
+        """Return what the rivals of (k,) places in numbered squares say, (k, r), inf behind a wall."""
+        distance = self._distance(rivals.site[number], x[:, None], y[:, None])
+        # the square's corner beside the place
+        right, upper = (
+            np.floor((places - start) / self.lattice.spacing - 0.5).astype(np.intp)
+            - np.floor((places - start) / self.lattice.spacing).astype(np.intp)
+            + 1
+            for places, start in ((x, self.lattice.origin[0]), (y, self.lattice.origin[1]))
+        )
+        return np.where(rivals.right[number, 2 * upper + right], distance, np.inf)
+
+    def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
+        dx, dy = x - self._way_x[site], y - self._way_y[site]
+        return np.asarray(np.sqrt(dx * dx + dy * dy) + self._start[site])
+
+    def _heading(self, site: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
+        dx, dy = x - self._way_x[site], y - self._way_y[site]
+        length = np.maximum(np.hypot(dx, dy), 1e-12)
+        return dx / length, dy / length
+
+
+class Fields:
+    """The fields of one map, whatever the positions, and one scale of colours for all of them.
+
+    Parameters
+    ----------
+    cost : CoverageCost
+    limit : float, m
+        Where the scale of colours ends.
+    """
+
+    def __init__(self, cost: CoverageCost, limit: float) -> None:
+        self.limit = limit
+        self._cost = cost
+        self._lattice = FieldLattice(cost)
+
+    def at(self, positions: Array) -> Field:
+        """Return the field of robots at (n, 2) m.
+
+        Raises
+        ------
+        InputError
+            When a robot is outside the free space.
+        """
+        return Field(self._lattice, self._cost(positions))
+
+
+def _middles(places: Array) -> Array:
+    """Return the middles of blocks of pixels; the last block may stick out."""
+    step = places[1] - places[0] if len(places) > 1 else 0.0
+    return np.asarray(places[::_BLOCK] + 0.5 * (_BLOCK - 1) * step)
+
+
+def _spread(row: IntArray, column: IntArray, height: int, width: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Return rows and columns of all pixels of (k,) blocks, and which block each is of."""
+    inner_row, inner_column = np.divmod(np.arange(_BLOCK**2), _BLOCK)
+    rows = (row[:, None] * _BLOCK + inner_row).ravel()
+    columns = (column[:, None] * _BLOCK + inner_column).ravel()
+    inside = ((rows < height) & (columns < width)).nonzero()[0]
+    return rows[inside], columns[inside], inside // _BLOCK**2
+
+
+def _with_neighbours(lattice: FieldLattice, divided: BoolArray) -> tuple[BoolArray, IntArray]:
+    """Return divided squares and those beside them, and the (k, 20) sites of each: its own first.
+
+    A border may cut a corner off a square whose own four sites are of one robot. Those beside are asked
+    across an open side only.
+    """
+    found = divided.copy()
+    rows, columns = divided.shape
+    asked = []
+    for (up, right), shared in _BESIDE:
+        at = np.ix_(*(np.clip(np.arange(n) + by, 0, n - 1) for n, by in ((rows, up), (columns, right))))
+        open_ = ~divided & divided[at] & lattice.free[..., shared].all(axis=-1)
+        found |= open_
+        asked.append(np.where(open_[..., None], lattice.around[at], lattice.around))
+    return found, np.concatenate([lattice.around, *asked], axis=-1)[found]
+
+
+def _first_different(site: IntArray, source: IntArray) -> IntArray:
+    """Return for each row of (k, m) sites the first few of different sources, else the first."""
+    fresh = np.ones(site.shape, dtype=bool)
+    for j in range(1, site.shape[1]):
+        fresh[:, j] = (source[:, j, None] != source[:, :j]).all(axis=1)
+    order = np.argsort(~fresh, axis=1, kind="stable")[:, :_RIVALS]
+    chosen = np.take_along_axis(site, order, axis=1)
+    return np.where(np.take_along_axis(fresh, order, axis=1), chosen, site[:, :1])

@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from drawn_run import ROOMS
+
+from robocov import cost as cost_module
+from robocov_app import building
+from robocov_app.building import built_cost, cost_for_pictures
+
+PLACE = np.array([[2.0, 2.0]])
+
+
+def test_it_is_the_cost(capsys):
+    cost = built_cost(ROOMS, 48)
+    assert cost.lattice == 48
+    assert cost(PLACE).value == cost_module.CoverageCost(ROOMS, 48)(PLACE).value
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_what_takes_long_is_told(monkeypatch, capsys, quiet):
+    monkeypatch.setattr(building, "PATIENCE", -1.0)
+    built_cost(ROOMS, 48, quiet=quiet)
+    said = capsys.readouterr().err
+    assert ("map of ways: 100 of 100 in" in said) == (not quiet)
+    assert len(said.splitlines()) == (0 if quiet else 1)
+
+
+def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(building, "PATIENCE", -1.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    built_cost(ROOMS, 48)
+    assert "100/100" in capsys.readouterr().err
+
+
+def test_the_users_cache_is_used(monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path))
+    monkeypatch.setattr(cost_module, "_WORTH_KEEPING", 0.0)
+    built_cost(ROOMS, 32)
+    (entry,) = tmp_path.iterdir()
+    entry.write_bytes(b"damaged")
+    assert built_cost(ROOMS, 32)(PLACE).value == built_cost(ROOMS, 32)(PLACE).value
+    assert entry.stat().st_size > 1000
+
+
+def test_pictures_want_a_fine_lattice():
+    coarse, fine = built_cost(ROOMS, 16), built_cost(ROOMS, 300)
+    assert cost_for_pictures(ROOMS, coarse).lattice == building.PICTURE_LATTICE
+    assert cost_for_pictures(ROOMS, coarse, 20).lattice == 20
+    assert cost_for_pictures(ROOMS, fine) is fine

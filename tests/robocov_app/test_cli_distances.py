@@ -1,0 +1,65 @@
+"""The maps of distances, as the command line gives them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import SHORT, complaint
+from PIL import Image
+
+from robocov_app.cli import main
+
+
+def frames(folder: Path) -> list[np.ndarray]:
+    return [np.array(Image.open(path)).astype(int) for path in sorted((folder / "frames").iterdir())]
+
+
+@pytest.mark.parametrize("words", [("run", "trap"), ("compare", "trap", "--controllers", "rapf", "lloyd")])
+def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: Path) -> None:
+    for name, more in (
+        ("plain", ()),
+        ("bare", ("--hide", "cells", "grid")),
+        ("warm", ("--show", "distances")),
+    ):
+        options = (*SHORT, "--frames", "--fps", "2", "--film-speed", "1", "--out", str(tmp_path / name))
+        assert main([*words, *options, *more]) == 0
+    plain, bare, warm = (frames(tmp_path / name) for name in ("plain", "bare", "warm"))
+    assert len(plain) == len(bare) == len(warm) >= 3
+    # tints of cells are many colours; without them the page is mostly white, with distances mostly blue
+    assert (bare[0] == 255).all(axis=2).mean() > (plain[0] == 255).all(axis=2).mean() + 0.2
+    blue = (warm[0][..., 2] - warm[0][..., 0] > 25).mean()
+    assert blue > (plain[0][..., 2] - plain[0][..., 0] > 25).mean() + 0.1
+
+
+@pytest.mark.parametrize("option", ["--show", "--hide"])
+def test_unknown_layers_are_named_before_anything_is_made(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    message = complaint(capsys, "run", "trap", *SHORT, option, "distanses", "--out", str(out))
+    assert message.startswith(f"{option}: unknown layer 'distanses': did you mean 'distances'?")
+    assert not out.exists()
+
+
+def test_cost_draws_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robots = tmp_path / "robots.json"
+    robots.write_text(json.dumps([[1.0, 1.0], [8.0, 4.0]]))
+    for name in ("light.png", "map.svg"):
+        assert main(["cost", "rooms", "--positions", str(robots), "--plot", str(tmp_path / name)]) == 0
+    dark = tmp_path / "dark.png"
+    assert main(["cost", "rooms", "--positions", str(robots), "--plot", str(dark), "--theme", "dark"]) == 0
+    capsys.readouterr()
+    assert np.array(Image.open(tmp_path / "light.png"))[0, 0, :3].min() == 255
+    assert np.array(Image.open(dark))[0, 0, :3].max() < 50
+    assert (tmp_path / "map.svg").read_text().startswith("<?xml")
+
+
+def test_a_map_that_cannot_be_written_is_told_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("cost", "rooms", "--positions", str(tmp_path / "missing.json"), "--plot")
+    assert "'.jpg'" in complaint(capsys, *words, str(tmp_path / "a.jpg"))
+    assert "there is no folder" in complaint(capsys, *words, str(tmp_path / "b" / "a.png"))
