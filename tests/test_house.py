@@ -78,6 +78,7 @@ TESTED_THROUGH = {
     "report": "test_houseexpo",
     **dict.fromkeys("measure plot render start step".split(), "test_bench"),
     "coverage": "test_coverage_layers",
+    **dict.fromkeys("messages cost_process".split(), "test_cost_worker"),
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts forces furniture scene sprites".split(), "test_layers"),
     "trajectories": "test_layers",

@@ -173,7 +173,7 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     from robocov_app.view.field import Field, FieldLattice
 
     cost = cost_for_pictures(runs[0].record.environment, cost)
-    lattice = FieldLattice(cost)
+    lattice = FieldLattice(cost.sites)
     return [
         Moment.last_of(
             run.record, Field(lattice, cost(run.record.positions[-1])), float(run.history.mean_distance[-1])

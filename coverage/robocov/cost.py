@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from robocov.corner_views import CornerViews
 from robocov.errors import InputError, ParameterError, shown
 from robocov.geodesic import Geodesics
 from robocov.grouping import least
-from robocov.lattice import Lattice
+from robocov.lattice import Lattice, Number
 from robocov.robot_views import RobotViews
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from robocov.array_cache import ArrayCache
     from robocov.environment import Environment
-
-Number = TypeVar("Number", bound=np.generic)
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
@@ -127,6 +125,10 @@ class CoverageCost:
         The sites' numbers among all cells, ``row * lattice + column``.
     spacing : float, m
         Side of a cell.
+    sites : Sites
+        All of these.
+    corners : (k, 2) m
+        Where ways can bend.
     geodesics : Geodesics
 
     Raises
@@ -156,28 +158,28 @@ class CoverageCost:
                 f"lattice: {shown(lattice)}, but a whole number from 1 to {MAX_LATTICE} was wanted"
             )
         self.lattice = int(lattice)
-        self.geodesics = Geodesics(environment)
+        self.geodesics = Geodesics(environment, None if progress is None else partial(progress, 0.0))
         self._areas = np.array([part.area for part in environment.free.geoms])
-        self._sites = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
+        self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
         self._corner_views = self._looked_up(progress, cache)
-        self.points, self.cells = frozen(self._sites.points), self._sites.cells
-        self.spacing = self._sites.spacing
+        self.sites = self._lattice.sites
+        self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         corners = np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y])
-        self._corners = frozen(self.geodesics.walls.grid.metres(corners))
+        self.corners = frozen(self.geodesics.walls.grid.metres(corners))
 
     def _looked_up(self, progress: Callable[[float], None] | None, cache: ArrayCache | None) -> CornerViews:
         """Return what the sites see of the corners, from the cache if it is there; this takes the longest."""
         walls = self.geodesics.walls
         if cache is None:
-            return CornerViews.looked_for(self.geodesics, self._sites, progress)
+            return CornerViews.looked_for(self.geodesics, self._lattice, progress)
         origin_x, origin_y = walls.grid.origin.tolist()
         place = walls.grid.unit, origin_x, origin_y, self.geodesics.size
         key = cache.key("corner views", _CACHED, walls.free.wkb, *place, self.lattice)
         tables = cache.load(key)
         if tables is not None:
-            return CornerViews(self._sites, tables["corner"], tables["first"], tables["length"])
+            return CornerViews(self._lattice, tables["corner"], tables["first"], tables["length"])
         begin = perf_counter()
-        views = CornerViews.looked_for(self.geodesics, self._sites, progress)
+        views = CornerViews.looked_for(self.geodesics, self._lattice, progress)
         if perf_counter() - begin > _WORTH_KEEPING:
             tables = {"corner": views.corner, "first": views.first, "length": views.length}
             cache.save(key, tables)
@@ -194,7 +196,7 @@ class CoverageCost:
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        paths, sites = self.geodesics, self._sites
+        paths, sites = self.geodesics, self._lattice
         x, y, holds = paths.place(positions)
         covered = np.asarray(holds.any(axis=0))
 
@@ -261,7 +263,7 @@ class CoverageCost:
             last_corner=last_corner,
             positions=positions,
             points=self.points,
-            corners=self._corners,
+            corners=self.corners,
         )
 
     def grid(self, values: NDArray[Number]) -> NDArray[Number]:
@@ -279,10 +281,7 @@ class CoverageCost:
                [ 0, -1,  0],
                [ 0,  0,  0]])
         """
-        fill = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
-        picture = np.full(self.lattice**2, fill, dtype=values.dtype)
-        picture[self.cells] = values
-        return picture.reshape(self.lattice, self.lattice)
+        return self.sites.grid(values)
 
     def path(self, positions: Array, point: Array) -> Array:
         """Return the shortest path from a point to the nearest of (n, 2) robots, (w, 2) way-points in metres.

@@ -22,6 +22,8 @@ from robocov.orientation import Grid
 from robocov.visibility import Fans, WallIndex
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from robocov.environment import Environment
 
 _CORNER_BINS = 256
@@ -37,6 +39,8 @@ class Geodesics:
     Parameters
     ----------
     environment : Environment
+    beat : callable
+        Called now and then while what is needed is computed. It may raise, to give up.
 
     Attributes
     ----------
@@ -53,7 +57,7 @@ class Geodesics:
     graph_length : (g,) grid steps
     """
 
-    def __init__(self, environment: Environment) -> None:
+    def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
         self.size = max(high_x - low_x, high_y - low_y)
         self._name = environment.name
@@ -63,15 +67,17 @@ class Geodesics:
         self.index = WallIndex(self.walls)
         everywhere = np.full(len(self.corner_x), np.inf)
         self.corner_fans = Fans(self.index, self.corner_x, self.corner_y, everywhere, _CORNER_BINS)
-        self._link()
+        self._link(beat)
 
-    def _link(self) -> None:
+    def _link(self, beat: Callable[[], None] | None) -> None:
         """Build the graph of the corners."""
         count = len(self.corner_x)
         corner = np.arange(count)
         pieces = [(np.empty(0, np.intp), np.empty(0, np.intp))]
         block = max(1, _PAIRS // max(1, count))
         for begin in range(0, count, block):
+            if beat is not None:
+                beat()
             # each of the two must be useful to the other
             some = corner[begin : begin + block, None]
             good = self.walls.useful(some, self.corner_x, self.corner_y) & (some < corner)

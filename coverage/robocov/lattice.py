@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from robocov.arrays import Array, IntArray, frozen
 from robocov.errors import ParameterError
 from robocov.grouping import beginnings, ranges, sizes
 from robocov.scanlines import Scanlines
 
 if TYPE_CHECKING:
-    from robocov.arrays import Array, IntArray
     from robocov.corners import Walls
+
+Number = TypeVar("Number", bound=np.generic)
 
 TILE = 4
 """Cells along a side of a tile."""
@@ -23,6 +27,38 @@ _GROUP = 16
 
 _PAIRS = 1 << 18
 """Pairs of groups and robots looked at at once, which bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Where the sites of a lattice are.
+
+    Attributes
+    ----------
+    lattice : int
+        Cells along a side.
+    spacing : float, m
+        Side of a cell.
+    points : (m, 2) m
+        The sites, row by row from the lower left.
+    cells : (m,)
+        Their numbers among all cells, ``row * lattice + column``.
+    """
+
+    lattice: int
+    spacing: float
+    points: Array
+    cells: IntArray
+
+    def grid(self, values: NDArray[Number]) -> NDArray[Number]:
+        """Return (m,) values of the sites as a picture of the whole lattice, (n, n), the lowest row first.
+
+        Cells that are not free hold nan, or -1 where the values are whole numbers.
+        """
+        fill = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
+        picture = np.full(self.lattice**2, fill, dtype=values.dtype)
+        picture[self.cells] = values
+        return picture.reshape(self.lattice, self.lattice)
 
 
 class Lattice:
@@ -38,12 +74,7 @@ class Lattice:
 
     Attributes
     ----------
-    spacing : float, m
-        Side of a cell.
-    points : (m, 2) m
-        The sites, row by row from the lower left.
-    cells : (m,)
-        Their numbers among all cells, ``row * side + column``.
+    sites : Sites
     x, y : (m,) grid steps
     component : (m,)
         Which component of the free space holds the site.
@@ -63,20 +94,21 @@ class Lattice:
     """
 
     def __init__(self, walls: Walls, size: float, side: int) -> None:
-        self.side = side
-        self.spacing = size / side
-        middles = (np.arange(side) + 0.5) * self.spacing
+        spacing = size / side
+        middles = (np.arange(side) + 0.5) * spacing
         column_x, row_y = walls.grid.snap(np.column_stack([middles, middles]) + walls.grid.origin).T
         y, x = (part.ravel() for part in np.meshgrid(row_y, column_x, indexing="ij"))
         component = np.full(side * side, -1, dtype=np.intp)
         for k, part in enumerate(walls.free.geoms):
             component[shapely.contains_xy(part, x, y)] = k
-        self.cells = np.nonzero(component >= 0)[0]
-        if not len(self.cells):
+        cells = np.nonzero(component >= 0)[0]
+        if not len(cells):
             raise ParameterError(f"lattice: {side}, but none of its sites is free; a finer one was wanted")
-        row, column = np.divmod(self.cells, side)
-        self.points = np.column_stack([middles[column], middles[row]]) + walls.grid.origin
-        self.x, self.y, self.component = x[self.cells], y[self.cells], component[self.cells]
+        row, column = np.divmod(cells, side)
+        points = np.column_stack([middles[column], middles[row]]) + walls.grid.origin
+        cells.setflags(write=False)
+        self.sites = Sites(side, spacing, frozen(points), cells)
+        self.x, self.y, self.component = x[cells], y[cells], component[cells]
         self.scanlines = Scanlines(column_x, row_y, (component >= 0).reshape(side, side))
 
         tile = _interleaved(column // TILE, row // TILE)

@@ -27,16 +27,16 @@ def test_the_sites_are_the_free_cell_centres_row_by_row():
     middles = (np.arange(20) + 0.5) / 20 * 4.0
     y, x = (part.ravel() for part in np.meshgrid(middles + 1.0, middles + 2.0, indexing="ij"))
     free = shapely.contains_xy(environment.free, x, y)
-    np.testing.assert_allclose(sites.points, np.column_stack([x, y])[free], rtol=1e-15)
-    np.testing.assert_array_equal(sites.cells, np.nonzero(free)[0])
-    assert sites.spacing == 0.2
+    np.testing.assert_allclose(sites.sites.points, np.column_stack([x, y])[free], rtol=1e-15)
+    np.testing.assert_array_equal(sites.sites.cells, np.nonzero(free)[0])
+    assert sites.sites.spacing == 0.2
 
 
 @pytest.mark.parametrize("side", [1, 3, 20, 37])
 def test_tiles_are_squares_of_cells(side):
     _, sites = lattice_of(side)
-    row, column = np.divmod(sites.cells[sites.by_tile], side)
-    np.testing.assert_array_equal(np.sort(sites.by_tile), np.arange(len(sites.cells)))
+    row, column = np.divmod(sites.sites.cells[sites.by_tile], side)
+    np.testing.assert_array_equal(np.sort(sites.by_tile), np.arange(len(sites.sites.cells)))
     np.testing.assert_array_equal(sites.slot, row % TILE * TILE + column % TILE)
     assert np.diff(sites.tile, prepend=0).tolist() == np.clip(np.diff(sites.tile, prepend=0), 0, 1).tolist()
     assert sites.tile[-1] == sites.tiles - 1
@@ -54,7 +54,7 @@ def test_within_finds_all_pairs_closer_than_the_bound(pairs, side, robots, seed)
         patch.setattr(lattice, "_PAIRS", pairs)
         _, sites = lattice_of(side)
         rng = np.random.default_rng(seed)
-        place = np.nonzero(rng.random(len(sites.cells)) < rng.choice([0.05, 0.5, 1.0]))[0]
+        place = np.nonzero(rng.random(len(sites.sites.cells)) < rng.choice([0.05, 0.5, 1.0]))[0]
         if not len(place):
             place = np.zeros(1, dtype=np.intp)
         x, y = rng.choice(sites.x, robots), rng.choice(sites.y, robots)

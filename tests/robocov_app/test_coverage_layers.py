@@ -22,7 +22,7 @@ def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
     record = run_of(environment, n, seed=seed)
     cost = CoverageCost(environment, 128)
     positions = environment.start("spread").sample(n, seed + 1000)
-    field = Field(FieldLattice(cost), cost(positions))
+    field = Field(FieldLattice(cost.sites), cost(positions))
     return cost, replace(scene_of(record), field=field, field_limit=limit)
 
 

@@ -17,7 +17,7 @@ def field_of(environment, n, seed, lattice=128):
     hall = max(environment.free.geoms, key=lambda part: part.area)
     points = cost.points[shapely.contains_xy(hall, *cost.points.T)]
     positions = points[np.random.default_rng(seed).choice(len(points), n, replace=False)]
-    return cost, Field(FieldLattice(cost), cost(positions))
+    return cost, Field(FieldLattice(cost.sites), cost(positions))
 
 
 def pixels(environment, width=331):

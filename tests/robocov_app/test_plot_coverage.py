@@ -22,7 +22,7 @@ def moment_of(environment, n=5, seed=0):
     cost = COSTS[environment.name]
     record = run_of(environment, n, seed=seed)
     positions = environment.start("spread").sample(n, seed)
-    return Moment.last_of(record, Field(FieldLattice(cost), cost(positions)), 1.234)
+    return Moment.last_of(record, Field(FieldLattice(cost.sites), cost(positions)), 1.234)
 
 
 def curves(count):

@@ -41,7 +41,7 @@ def test_scales_end_at_round_lengths_not_far_beyond(distance):
 
 def test_levels_follow_the_distances_up_to_the_limit():
     cost = CoverageCost(ROOMS, 64)
-    field = Field(FieldLattice(cost), cost(np.array([[2.0, 2.0]])))
+    field = Field(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
     x, y = np.linspace(0.1, 15.9, 60), np.linspace(9.9, 0.1, 40)
     distance = field.distances(x, y)
     level = levels(field, x, y, 5.0, 9)
@@ -53,7 +53,7 @@ def test_levels_follow_the_distances_up_to_the_limit():
 
 def test_where_nobody_can_come_is_hatched():
     cost = CoverageCost(ROOMS, 32)
-    field = Field(FieldLattice(cost), cost(np.array([[2.0, 2.0]])))
+    field = Field(FieldLattice(cost.sites), cost(np.array([[2.0, 2.0]])))
     courtyard = levels(field, np.linspace(1.8, 3.2, 50), np.linspace(8.6, 7.8, 30), 5.0, 9)
     assert set(np.unique(courtyard)) == {FARTHEST + 1, FARTHEST + 2}
     assert 0.05 < (courtyard == FARTHEST + 2).mean() < 0.2

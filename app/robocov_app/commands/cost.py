@@ -95,7 +95,7 @@ def draw(options: Arguments, environment: Environment, cost: CoverageCost, resul
     assert options.plot is not None
     n = len(result.positions)
     facts = f"{n} robot{'s' if n > 1 else ''}, mean distance {result.mean_distance:.3f} m"
-    field = Field(FieldLattice(cost), cost(result.positions))
+    field = Field(FieldLattice(cost.sites), cost(result.positions))
     moment = Moment(environment, Team.homogeneous(n), field, environment.name, facts)
     save_figure(plot_coverage([], [moment], options.theme, title="Coverage cost"), options.plot)
 

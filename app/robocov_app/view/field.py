@@ -18,6 +18,7 @@ from scipy.ndimage import distance_transform_edt
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray, IntArray
     from robocov.cost import CoverageCost, CoverageResult
+    from robocov.lattice import Sites
 
 _SHALLOW = 0.05
 """Least angle in radians at which two distances are taken to grow apart, so that borders stay thin."""
@@ -38,14 +39,14 @@ class FieldLattice:
 
     Parameters
     ----------
-    cost : CoverageCost
+    sites : Sites
     """
 
-    def __init__(self, cost: CoverageCost) -> None:
-        side = cost.lattice
-        self.spacing = cost.spacing
-        number = cost.grid(np.arange(len(cost.points)))
-        self.origin = cost.points[0] - np.array(np.divmod(cost.cells[0], side)[::-1]) * cost.spacing
+    def __init__(self, sites: Sites) -> None:
+        side = sites.lattice
+        self.spacing = sites.spacing
+        number = sites.grid(np.arange(len(sites.points)))
+        self.origin = sites.points[0] - np.array(np.divmod(sites.cells[0], side)[::-1]) * sites.spacing
         # squares between four cells' middles, low left, low right, high left, high right; the rim's stick out
         rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
         lower, upper = rows[:-1], rows[1:]
@@ -280,7 +281,7 @@ class Fields:
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
         self._cost = cost
-        self._lattice = FieldLattice(cost)
+        self._lattice = FieldLattice(cost.sites)
 
     def at(self, positions: Array) -> Field:
         """Return the field of robots at (n, 2) m.

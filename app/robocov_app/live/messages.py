@@ -1,0 +1,169 @@
+"""What the window and the process that computes the cost say to each other, over two pipes."""
+
+from __future__ import annotations
+
+import pickle
+import struct
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array, IntArray
+    from robocov.cost import CoverageResult
+    from robocov.environment import Environment
+    from robocov.lattice import Sites
+
+_LENGTH = struct.Struct("<Q")
+
+_INDICES = ("owner", "corner", "last_corner")
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """Please prepare the cost of a map."""
+
+    generation: int
+    environment: Environment
+    lattice: int
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Please evaluate the cost of (n, 2) m positions, of whatever map is ready."""
+
+    time: float
+    positions: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Building:
+    """How far a map is.
+
+    Attributes
+    ----------
+    generation : int
+        Counts the maps.
+    fraction : float
+    seconds_left : float
+        By what it has taken so far; at the start, by the sizes of the map.
+    """
+
+    generation: int
+    fraction: float
+    seconds_left: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A map is ready.
+
+    Attributes
+    ----------
+    generation : int
+    sites : Sites
+    corners : (k, 2) m
+        Where ways can bend.
+    seconds : float
+        What it took.
+    """
+
+    generation: int
+    sites: Sites
+    corners: Array
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """What differs from one result to the next; see `CoverageResult`."""
+
+    generation: int
+    time: float
+    positions: Array
+    mean_distance: float
+    value: float
+    uncovered_area: float
+    distances: Array
+    owner: IntArray
+    corner: IntArray
+    last_corner: IntArray
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The cost of positions.
+
+    Attributes
+    ----------
+    generation : int
+        Of the map: an older one while the newest is not ready yet.
+    time : float
+        What the question said.
+    result : CoverageResult
+    seconds : float
+        What the evaluation took.
+    """
+
+    generation: int
+    time: float
+    result: CoverageResult
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Failed:
+    """Something went wrong: a map without a free site, a robot in an obstacle, or the process has ended.
+
+    Attributes
+    ----------
+    generation : int
+    message : str
+        One line.
+    """
+
+    generation: int
+    message: str
+
+
+Event: TypeAlias = Building | Ready | Answer | Failed
+
+
+def values_of(generation: int, time: float, result: CoverageResult, seconds: float) -> Values:
+    """Return what is to be sent of a result."""
+    kept = {item.name: getattr(result, item.name) for item in fields(Values) if hasattr(result, item.name)}
+    # half as long on the way
+    kept |= {name: kept[name].astype(np.int32) for name in _INDICES}
+    return Values(generation=generation, time=time, seconds=seconds, **kept)
+
+
+def answer_of(values: Values, ready: Ready) -> Answer:
+    """Return the answer that values and what is known of their map make."""
+    from robocov.cost import CoverageResult
+
+    kept = {
+        item.name: getattr(values, item.name) for item in fields(CoverageResult) if hasattr(values, item.name)
+    }
+    kept |= {name: kept[name].astype(np.intp) for name in _INDICES}
+    result = CoverageResult(points=ready.sites.points, corners=ready.corners, **kept)
+    return Answer(values.generation, values.time, result, values.seconds)
+
+
+def send(stream: BinaryIO, message: object) -> None:
+    """Write one message."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(_LENGTH.pack(len(data)))
+    stream.write(data)
+    stream.flush()
+
+
+def receive(stream: BinaryIO) -> Any:
+    """Read one message; None at the end, also in the midst of one."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    data = stream.read(length)
+    return pickle.loads(data) if len(data) == length else None
