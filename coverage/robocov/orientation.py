@@ -61,7 +61,7 @@ def cross(ux: Array, uy: Array, vx: Array, vy: Array) -> Array:
     """
     value = ux * vy - uy * vx
     size = np.abs(value)
-    if size.min(initial=np.inf) < _DOUBT:
+    if np.minimum.reduce(size, axis=None, initial=np.inf) < _DOUBT:
         at = (size < _DOUBT).nonzero()
         value[at] = _exact_cross(*(part[at] for part in np.broadcast_arrays(ux, uy, vx, vy)))
     return value

@@ -67,6 +67,7 @@ class RobotViews:
         few = len(x) * paths.index.count <= _FEW
         self._reach = np.full(len(x), np.inf) if few else reach * (1.0 + 1e-9) + reach.mean()
         self._fans = Fans(paths.index, x, y, self._reach)
+        self._table: Array | None = None
 
     def see(self, robot: IntArray, dx: Array, dy: Array, distance2: Array) -> BoolArray:
         """Return for (m,) pairs of a robot and a target in its reach whether it sees the target.
@@ -123,28 +124,40 @@ class RobotViews:
         good[some] = paths.corner_fans.see(corner[some], x[some], y[some])
         return good
 
-    def _pieces(self, count: int) -> Iterator[slice]:
-        """Yield slices of so many targets, few enough that all pairs with robots fit in memory."""
+    def _tables(self, x: Array, y: Array) -> Iterator[tuple[slice, Array]]:
+        """Yield slices of (k,) targets, at least one, and the squared distances of all robots to these."""
+        if self._table is not None:
+            yield slice(0, len(x)), self._table
+            return
+        # few enough for the memory
         size = max(1, _PAIRS // len(self.x))
-        yield from (slice(begin, begin + size) for begin in range(0, count, size))
+        for begin in range(0, max(len(x), 1), size):
+            part = slice(begin, begin + size)
+            dx, dy = x[part] - self.x[:, None], y[part] - self.y[:, None]
+            dx *= dx
+            dy *= dy
+            dx += dy
+            if size >= len(x):
+                self._table = dx
+            yield part, dx
 
     def _nearest(self, x: Array, y: Array) -> tuple[IntArray, Array]:
         """Return each target's nearest robot and its squared distance."""
         robot, distance2 = np.empty(len(x), dtype=np.intp), np.empty(len(x))
-        for part in self._pieces(len(x)):
-            away2 = (x[part] - self.x[:, None]) ** 2 + (y[part] - self.y[:, None]) ** 2
+        for part, away2 in self._tables(x, y):
             robot[part] = away2.argmin(axis=0)
             distance2[part] = away2[robot[part], np.arange(away2.shape[1])]
         return robot, distance2
 
     def _nearer(self, x: Array, y: Array, bound: Array, but: IntArray) -> tuple[IntArray, IntArray, Array]:
         """Return the pairs of a target and a robot nearer than `bound`, but for the robot `but`."""
-        pieces = [(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0))]
-        for part in self._pieces(len(x)):
-            away2 = (x[part] - self.x[:, None]) ** 2 + (y[part] - self.y[:, None]) ** 2
+        pieces = []
+        for part, away2 in self._tables(x, y):
             robot, target = (away2 < bound[part] ** 2).nonzero()
             other = (robot != but[part][target]).nonzero()[0]
             robot, target = robot[other], target[other]
             pieces.append((target + part.start, robot, np.sqrt(away2[robot, target])))
-        target, robot, away = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        target, robot, away = (
+            pieces[0] if len(pieces) == 1 else map(np.concatenate, zip(*pieces, strict=True))
+        )
         return target, robot, away

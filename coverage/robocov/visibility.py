@@ -193,9 +193,9 @@ class Fans:
     def see_along(self, source: IntArray, dx: Array, dy: Array, distance2: Array) -> BoolArray:
         """Return the same for targets at (dx, dy) from their sources, and the square of that distance."""
         angle = pseudo_angle(dx, dy)
-        angle *= self._bins / 4.0
+        # a hair less, so that a whole turn is in the last bin
+        angle *= self._bins / 4.0 * (1.0 - 1e-15)
         key = angle.astype(np.intp)
-        np.minimum(key, self._bins - 1, out=key)
         key += source * self._bins
         visible = distance2 <= self._clear.take(key)
         pending = (~visible).nonzero()[0]

@@ -285,3 +285,19 @@ def test_the_cache_changes_nothing_but_the_time(tmp_path, monkeypatch):
 def test_quick_builds_are_not_kept(tmp_path):
     CoverageCost(PILLAR, 8, cache=ArrayCache(tmp_path))
     assert not list(tmp_path.iterdir())
+
+
+def test_sealed_rooms_without_a_corner():
+    # the nearest robot is behind the wall, and no way bends anywhere
+    where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    cost = CoverageCost(where, lattice=16)
+    assert len(cost.corners) == 0
+    robots = np.array([[2.9, 4.0], [7.0, 7.0]])
+    result = cost(robots)
+    left = cost.points[:, 0] < 4.0
+    np.testing.assert_array_equal(result.owner, np.where(left, 0, 1))
+    expected = np.hypot(*(cost.points - robots[result.owner]).T)
+    np.testing.assert_allclose(result.distances, expected, rtol=1e-14)
+    alone = cost(robots[:1])
+    assert alone.uncovered_area == pytest.approx(24.0)
+    assert (alone.owner == np.where(left, 0, -1)).all()

@@ -48,9 +48,11 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
         call()
 
     calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
-    assert InTurn(calls, clock).rounds(3) == {"slow": 2.0, "quick": 0.5}
+    prepared = partial(noted, "before", clock.work(*[100.0] * 3))
+    assert InTurn(calls, clock, prepared).rounds(3) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
-    assert order == [("slow", False), ("quick", False)] * 4
+    round_ = [("slow", False), ("quick", False)]
+    assert order == [*round_, *[("before", False), *round_] * 3]
     assert gc.isenabled()
 
 
@@ -135,18 +137,18 @@ def test_fast_marching_measures_the_same_distances():
     pytest.importorskip("skfmm", reason="the yardstick is an extra")
     evaluated = cost.CoverageCost(cost_map(20), 64)
     places = cost._Places(evaluated, 6)
-    exact = cost._evaluated(evaluated, places)
+    exact = evaluated(places.now).mean_distance
     assert cost._marched(evaluated, places) == pytest.approx(exact, rel=0.1)
 
 
 def test_robots_of_the_benchmark_move_a_little_and_stay_free():
     evaluated = cost.CoverageCost(cost_map(200), 64)
     places = cost._Places(evaluated, 20)
-    former = places.moved()
+    former = places.now
     for _ in range(20):
-        now = places.moved()
-        assert 0.0 < np.abs(now - former).max() <= evaluated.spacing / 2.0
-        evaluated(now)
+        places.move()
+        assert 0.0 < np.abs(places.now - former).max() <= evaluated.spacing / 4.0
+        evaluated(places.now)
 
 
 def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):

@@ -20,8 +20,6 @@ from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from robocov.arrays import Array
-
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
 ROBOTS = (6, 50, 200)
@@ -88,7 +86,7 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
         calls: dict[str, Callable[[], object]] = {"exact": partial(_evaluated, cost, places)}
         if has_yardstick():
             calls["marching"] = partial(_marched, cost, places)
-        taken = InTurn(calls).rounds(7, 0.3 if quick else 1.0)
+        taken = InTurn(calls, before=places.move).rounds(7, 0.3 if quick else 1.0)
         goal = GOALS.get((lattice, vertices, robots))
         yield Row(
             *("cost", "evaluated", {**size, "robots": robots}, taken["exact"]),
@@ -97,7 +95,7 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
 
 
 class _Places:
-    """Robots that move a little with every call."""
+    """Robots that move a little with every round."""
 
     def __init__(self, cost: CoverageCost, robots: int) -> None:
         self._rng = np.random.default_rng(1)
@@ -105,29 +103,29 @@ class _Places:
         self._step = cost.spacing / 4.0
         self._walls = cost.geodesics.walls
         self.now = self._start
+        blocked = np.ones(cost.lattice**2, dtype=bool)
+        blocked[cost.cells] = False
+        self.blocked = blocked.reshape(cost.lattice, cost.lattice)
 
-    def moved(self) -> Array:
-        """Return (n, 2) free positions, m."""
+    def move(self) -> None:
+        """Go to other free positions, (n, 2) m."""
         places = self._start + self._rng.uniform(-self._step, self._step, self._start.shape)
         free = shapely.intersects_xy(self._walls.free, *self._walls.grid.snap(places).T)
         self.now = np.where(free[:, None], places, self._start)
-        return self.now
 
 
 def _evaluated(cost: CoverageCost, places: _Places) -> float:
-    """Return the mean distance from where the robots are next."""
-    return cost(places.moved()).mean_distance
+    """Return the mean distance, exactly."""
+    return cost(places.now).mean_distance
 
 
 def _marched(cost: CoverageCost, places: _Places) -> float:
-    """Return the mean distance from where the robots were last, by fast marching."""
+    """Return the mean distance, by fast marching."""
     import skfmm
 
     side = cost.lattice
-    blocked = np.ones(side * side, dtype=bool)
-    blocked[cost.cells] = False
     column, row = np.floor(places.now / cost.spacing).astype(int).T
     front = np.ones((side, side))
     front[row, column] = -1.0
-    masked = np.ma.MaskedArray(front, blocked.reshape(side, side))
+    masked = np.ma.MaskedArray(front, places.blocked)
     return float(skfmm.distance(masked, dx=cost.spacing, order=2).mean())

@@ -110,10 +110,13 @@ class InTurn:
     calls : by name
     clock : callable
         Returns seconds.
+    before : callable
+        Called before every round; it takes no time.
     """
 
     calls: Mapping[str, Call]
     clock: Callable[[], float] = perf_counter
+    before: Call | None = None
     taken: dict[str, list[float]] = field(default_factory=dict)
 
     def rounds(self, count: int, seconds: float = 0.0) -> dict[str, float]:
@@ -131,6 +134,8 @@ class InTurn:
             until = self.clock() + seconds
             made = 0
             while made < count or self.clock() < until:
+                if self.before is not None:
+                    self.before()
                 for name, call in self.calls.items():
                     begin = self.clock()
                     call()
