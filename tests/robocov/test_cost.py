@@ -297,7 +297,7 @@ def test_sealed_rooms_without_a_corner():
     left = cost.points[:, 0] < 4.0
     np.testing.assert_array_equal(result.owner, np.where(left, 0, 1))
     expected = np.hypot(*(cost.points - robots[result.owner]).T)
-    np.testing.assert_allclose(result.distances, expected, rtol=1e-14)
+    np.testing.assert_allclose(result.distances, expected, rtol=0, atol=1e-12)
     alone = cost(robots[:1])
     assert alone.uncovered_area == pytest.approx(24.0)
     assert (alone.owner == np.where(left, 0, -1)).all()
