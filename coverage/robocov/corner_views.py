@@ -8,6 +8,7 @@ import numpy as np
 
 from robocov.grouping import beginnings, least, ranges, sizes
 from robocov.lattice import TILE
+from robocov.visibility import pseudo_angle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,7 +18,13 @@ if TYPE_CHECKING:
     from robocov.lattice import Lattice
 
 _PAIRS = 1 << 16
-"""Pairs of sites and corners looked at in one piece, which bounds the memory."""
+"""Pairs of tiles and corners looked at in one piece, which bounds the memory."""
+
+_RADII = (1, 3, 7, 15, 31)
+"""Bins to either side that a tile may span, each at most one more than twice the one before."""
+
+_PAD = 1e-9
+"""Far more than rounding."""
 
 
 class CornerViews:
@@ -56,14 +63,16 @@ class CornerViews:
         """
         x, y = lattice.x[lattice.by_tile], lattice.y[lattice.by_tile]
         count = len(paths.corner_x)
-        block = max(1, _PAIRS // len(x))
+        block = max(1, _PAIRS // lattice.tiles)
         pieces = [(np.empty(0, np.intp), np.empty(0, np.intp), np.empty((0, TILE * TILE)))]
         for begin in range(0, count, block):
             if progress is not None:
                 progress(begin / count)
-            corner = np.arange(begin, min(begin + block, count))
-            row, site = paths.walls.useful(corner[:, None], x, y).nonzero()
-            row += begin
+            row, tile = _perhaps_seen(paths, lattice, begin, min(begin + block, count))
+            many = lattice.first[tile + 1] - lattice.first[tile]
+            row, site = row.repeat(many), ranges(lattice.first[tile], many)
+            useful = paths.walls.useful(row, x[site], y[site]).nonzero()[0]
+            row, site = row[useful], site[useful]
             dx, dy = x[site] - paths.corner_x[row], y[site] - paths.corner_y[row]
             distance2 = dx * dx + dy * dy
             seen = paths.corner_fans.see_along(row, dx, dy, distance2).nonzero()[0]
@@ -109,3 +118,46 @@ class CornerViews:
         total = start[entry] + self.length.take(row[entry] * TILE**2 + slot[site])
         least(site, total, best, (way, self.corner[row[entry]]))
         return best, way
+
+
+def _perhaps_seen(paths: Geodesics, lattice: Lattice, begin: int, end: int) -> tuple[IntArray, IntArray]:
+    """Return the pairs of a corner, from `begin` to `end`, and a tile that may have a site in useful view."""
+    walls = paths.walls
+    middle_x, middle_y = (lattice.low_x + lattice.high_x) / 2.0, (lattice.low_y + lattice.high_y) / 2.0
+    half_x, half_y = (lattice.high_x - lattice.low_x) / 2.0, (lattice.high_y - lattice.low_y) / 2.0
+    dx = middle_x - paths.corner_x[begin:end, None]
+    dy = middle_y - paths.corner_y[begin:end, None]
+    # useful is what is neither behind both of the corner's walls nor in front of both
+    in_front = behind = np.ones(dx.shape, dtype=bool)
+    for wall_x, wall_y in (walls.corner_in[:, begin:end, None], walls.corner_out[:, begin:end, None]):
+        side = wall_x * dy - wall_y * dx
+        beside = (np.abs(wall_x) * half_y + np.abs(wall_y) * half_x) * (1.0 + _PAD) + _PAD * np.abs(side)
+        in_front, behind = in_front & (side > beside), behind & (side < -beside)
+    row, tile = (~(in_front | behind)).nonzero()
+
+    # what begins beyond the horizon in all directions in which it lies is hidden
+    dx, dy, half_x, half_y = dx[row, tile], dy[row, tile], half_x[tile], half_y[tile]
+    apart = np.hypot(dx, dy)
+    near2 = np.maximum(np.abs(dx) - half_x, 0.0) ** 2 + np.maximum(np.abs(dy) - half_y, 0.0) ** 2
+    horizons = _widened(paths.corner_fans.horizons(begin, end))
+    bins = horizons.shape[-1]
+    # a pseudo-angle grows by at most the angle, of which a half turn is at most pi/2 by its sine
+    wide = np.hypot(half_x, half_y) * (np.pi / 2.0) * (bins / 4.0) / np.maximum(apart, 1.0) + 1.0
+    level = np.searchsorted(_RADII, wide)
+    bin_ = np.minimum((pseudo_angle(dx, dy) * (bins / 4.0)).astype(np.intp), bins - 1)
+    far = np.append(horizons, np.full((1, *horizons.shape[1:]), np.inf), axis=0)[level, row, bin_]
+    some = (near2 * (1.0 - _PAD) <= far).nonzero()[0]
+    return row[some] + begin, tile[some]
+
+
+def _widened(horizons: Array) -> Array:
+    """Return for (k, bins) the farthest horizon of any bin up to each of `_RADII` away, (radii, k, bins)."""
+    widened = []
+    reached = 0
+    for radius in _RADII:
+        step = radius - reached
+        sides = np.roll(horizons, step, axis=1), np.roll(horizons, -step, axis=1)
+        horizons = np.maximum(np.maximum(*sides), horizons)
+        widened.append(horizons)
+        reached = radius
+    return np.array(widened)

@@ -86,6 +86,10 @@ class Lattice:
     slot : (m,)
         Its place among the tile's cells.
     tiles : int
+    first : (t + 1,)
+        The sites of a tile are those from its own `first` up to the next, in `by_tile`.
+    low_x, low_y, high_x, high_y : (t,) grid steps
+        Boxes around the sites of each tile.
 
     Raises
     ------
@@ -118,9 +122,10 @@ class Lattice:
         self.tile = np.repeat(np.arange(len(begin)), sizes(begin, len(tile)))
         self.slot = (row % TILE * TILE + column % TILE)[self.by_tile]
         self.tiles = len(begin)
+        self.first = np.append(begin, len(tile))
         x, y = self.x[self.by_tile], self.y[self.by_tile]
-        self._low_x, self._low_y = np.minimum.reduceat(x, begin), np.minimum.reduceat(y, begin)
-        self._high_x, self._high_y = np.maximum.reduceat(x, begin), np.maximum.reduceat(y, begin)
+        self.low_x, self.low_y = np.minimum.reduceat(x, begin), np.minimum.reduceat(y, begin)
+        self.high_x, self.high_y = np.maximum.reduceat(x, begin), np.maximum.reduceat(y, begin)
 
     def within(
         self, place: IntArray, bound2: Array, x: Array, y: Array
@@ -148,7 +153,7 @@ class Lattice:
         begin = beginnings(self.tile[place])
         tile = self.tile[place[begin]]
         low_x, low_y, high_x, high_y = (
-            side[tile] for side in (self._low_x, self._low_y, self._high_x, self._high_y)
+            side[tile] for side in (self.low_x, self.low_y, self.high_x, self.high_y)
         )
         limit2 = np.maximum.reduceat(bound2, begin)
         # first whole groups of tiles

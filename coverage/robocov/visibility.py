@@ -182,6 +182,10 @@ class Fans:
         order = (key.astype(np.uint16) if size <= 1 << 16 else key).argsort(kind="stable")
         return edge[wall[order]], np.bincount(key, minlength=size), clear, horizon
 
+    def horizons(self, begin: int, end: int) -> Array:
+        """Return the squared distances from which on all is hidden, (sources from `begin` to `end`, bins)."""
+        return self._horizon[begin * self._bins : end * self._bins].reshape(-1, self._bins)
+
     def see(self, source: IntArray, x: Array, y: Array) -> BoolArray:
         """Return for (m,) pairs of a source and a target at (x, y) whether no wall hides the target.
 

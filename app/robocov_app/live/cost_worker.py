@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.environment import Environment
 
-_PER_VIEW = 8e-9
+_PER_VIEW = 4e-9
 _PER_LINK = 5e-8
 _PER_SITE = 2e-7
-_ALWAYS = 0.008
+_ALWAYS = 0.01
 """Seconds for a pair of a site and a corner, a pair of corners, a site, and in any case; see `estimate`."""
 
 _PIPE = 1 << 20
