@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from robocov.atomic import written
-from robocov.errors import ParameterError, shown
+from robocov.errors import OutputError, ParameterError, shown
 from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles
 from robocov_app.plot_curves import Curve, draw_curves, end_label
@@ -283,6 +283,21 @@ def save_figure(figure: Figure, path: Path | str) -> None:
         matplotlib.rc_context({"svg.hashsalt": "robocov", "svg.fonttype": "path", "savefig.bbox": None}),
     ):
         figure.savefig(part, format=kind, dpi=figure.dpi, metadata=metadata, facecolor=figure.get_facecolor())
+
+
+def check_figure_path(path: Path) -> None:
+    """Make sure, before any work is done, that a figure can be written there.
+
+    Raises
+    ------
+    OutputError
+        When there is no such folder.
+    ParameterError
+        When the suffix is neither PNG nor SVG.
+    """
+    figure_kind(path)
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 
 def figure_kind(path: Path) -> str:

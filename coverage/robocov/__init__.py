@@ -17,6 +17,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from robocov.array_cache import ArrayCache
     from robocov.controllers import (
         CONTROLLERS,
         Controller,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
         make_controller,
     )
     from robocov.controllers.gains import gain
-    from robocov.cost import CoverageCost
+    from robocov.cost import CoverageCost, CoverageResult
     from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
     from robocov.mapcheck import check_map
@@ -49,10 +50,12 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "ArrayCache": "array_cache",
     "CONTROLLERS": "controllers",
     "CircleObstacle": "environment",
     "Controller": "controllers",
     "CoverageCost": "cost",
+    "CoverageResult": "cost",
     "Decision": "observation",
     "DiscStart": "starts",
     "Environment": "environment",
@@ -97,9 +100,11 @@ _HOME = {
 
 __all__ = [
     "CONTROLLERS",
+    "ArrayCache",
     "CircleObstacle",
     "Controller",
     "CoverageCost",
+    "CoverageResult",
     "Decision",
     "DiscStart",
     "Environment",

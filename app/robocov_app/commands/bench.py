@@ -56,17 +56,15 @@ class Arguments:
 
 def command(options: Arguments) -> int | None:
     """Measure, then print and draw; what was measured until Ctrl-C as well."""
-    from robocov.errors import OutputError, ParameterError
+    from robocov.errors import ParameterError
     from robocov_app.progress import progress
 
     for name in THREADS:
         os.environ.setdefault(name, "1")
     if options.plot is not None:
-        from robocov_app.plots import figure_kind
+        from robocov_app.plots import check_figure_path
 
-        figure_kind(options.plot)
-        if not options.plot.parent.is_dir():
-            raise OutputError(f"{options.plot}: cannot be written: there is no folder {options.plot.parent}")
+        check_figure_path(options.plot)
     parts = PARTS if options.part == "all" else (options.part,)
     modules = [importlib.import_module(f"robocov_app.bench.{part}") for part in parts]
     if "cost" in parts and not modules[parts.index("cost")].has_yardstick():

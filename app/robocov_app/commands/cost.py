@@ -12,7 +12,7 @@ import tyro
 
 from robocov.arrays import Array
 from robocov.atomic import written
-from robocov.errors import InputError, OutputError, ParameterError, shown
+from robocov.errors import InputError, ParameterError, shown
 from robocov.mapfile import load_map
 from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite
@@ -52,11 +52,9 @@ def command(options: Arguments) -> None:
     if options.sites is not None and (options.sites.is_dir() or not options.sites.name):
         raise InputError(f"--sites: {str(options.sites)!r}, but the name of a file was wanted")
     if options.plot is not None:
-        from robocov_app.plots import figure_kind
+        from robocov_app.plots import check_figure_path
 
-        figure_kind(options.plot)
-        if not options.plot.parent.is_dir():
-            raise OutputError(f"{options.plot}: cannot be written: there is no folder {options.plot.parent}")
+        check_figure_path(options.plot)
     environment = load_map(options.map)
     robots = read_positions(options.positions)
     cost = built_cost(environment, options.lattice, quiet=options.json)

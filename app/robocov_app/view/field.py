@@ -135,7 +135,7 @@ class Field:
         self._way_x, self._way_y = np.ascontiguousarray(way.T)
         self._start, self._owner = start, owner
         # sites whose ways come from the same way-point of the same robot give the same distances
-        source = np.where(last >= 0, last, -1 - owner)
+        source = np.where(last >= 0, last, -2 - owner)
         around = lattice.around
         mixed = (source[around[..., 1:]] != source[around[..., :1]]).any(axis=-1)
         self._inside = self._rivals(mixed, around[mixed])
