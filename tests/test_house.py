@@ -80,7 +80,7 @@ TESTED_THROUGH = {
     "coverage": "test_coverage_layers",
     **dict.fromkeys("messages cost_process".split(), "test_cost_worker"),
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
-    **dict.fromkeys("canvas clipping fonts forces furniture scene sprites".split(), "test_layers"),
+    **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
     "trajectories": "test_layers",
 }
 """Modules without a test file of their own, and the one that tests them."""

@@ -11,56 +11,13 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from example_map import DELETED, DOCUMENT, SCHEMA, changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
 from robocov.mapmodels import validate
-
-DELETED = object()
-
-DOCUMENT: dict[str, Any] = {
-    "$schema": "https://example.org/map.json",
-    "format": "robocov-map",
-    "version": 1,
-    "name": "Two rooms – süd",
-    "description": "A wall with a door.\nAnd a second line.",
-    "boundary": [[0, 0], [10, 0], [10, 6], [0, 6]],
-    "obstacles": [
-        {
-            "kind": "polygon",
-            "name": "desk",
-            "vertices": [[2, 2], [4, 2], [4, 4], [2, 4]],
-            "holes": [[[2.5, 2.5], [3, 2.5], [3, 3]]],
-        },
-        {"kind": "circle", "center": [7, 2], "radius": 0.5},
-        {"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1},
-    ],
-    "starts": {
-        "west side": {"kind": "disc", "center": [1, 1], "radius": 0.8},
-        "all": {"kind": "uniform"},
-        "given": {"kind": "points", "positions": [[1, 1], [1.5, 1.25]]},
-    },
-    "extra": {"author": {"name": "Ada"}, "tags": [1, 2.5, None, True, "é"]},
-}
-
-SCHEMA = jsonschema.Draft202012Validator(map_schema())
-
-
-def changed(*path: Any, document: dict[str, Any] = DOCUMENT) -> dict[str, Any]:
-    """Return the document with the value at a path (all but the last argument) replaced or deleted."""
-    *steps, value = path
-    result = copy.deepcopy(document)
-    place: Any = result
-    for step in steps[:-1]:
-        place = place[step]
-    if value is DELETED:
-        del place[steps[-1]]
-    else:
-        place[steps[-1]] = value
-    return result
-
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),

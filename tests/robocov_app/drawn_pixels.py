@@ -1,0 +1,50 @@
+"""Frames of single layers, and colours at their pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from robocov_app.view.picture import Painter
+from robocov_app.view.theme import LIGHT
+
+SIZE = (640, 480)
+ONE = np.array([[4.0, 4.0]])
+TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
+
+
+def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):
+    """Return the frame that shows these layers alone, and its painter."""
+    painter = Painter(scene.environment, size, theme, layers)
+    painter.show(names)
+    return painter.frame(scene).astype(int), painter
+
+
+def changed(scene, *names, size=SIZE):
+    """Return the (x, y) pixels that these layers draw, and the painter."""
+    frame, painter = drawn(scene, *names, size=size)
+    rows, columns = np.nonzero((frame != np.array(LIGHT.background)).any(axis=2))
+    return np.column_stack([columns, rows]), painter
+
+
+def distance(frame, pixel, colour):
+    """Return the largest difference of a channel at a pixel from a colour."""
+    x, y = np.rint(pixel).astype(int)
+    return int(np.abs(frame[y, x] - np.array(colour)).max())
+
+
+def nearest(frame, pixel, colour, reach=1):
+    """Return the least such difference in the pixels around."""
+    x, y = np.rint(pixel).astype(int)
+    return min(
+        distance(frame, (x + dx, y + dy), colour)
+        for dx in range(-reach, reach + 1)
+        for dy in range(-reach, reach + 1)
+    )
+
+
+def inside(geometry, count, seed=0):
+    """Return random points in a geometry."""
+    low_x, low_y, high_x, high_y = geometry.bounds
+    points = np.random.default_rng(seed).uniform((low_x, low_y), (high_x, high_y), size=(20 * count, 2))
+    return points[shapely.contains_xy(geometry, points)][:count]
