@@ -11,6 +11,7 @@ from robocov.errors import ParameterError
 from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle
 from robocov_app.plot_curves import draw_curves, end_label
+from robocov_app.plots import plot_cost
 from robocov_app.view.shading import levels, palette, round_limit, strength, ticks
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 _FINE = 2
 """Dots of a map's picture for each pixel of the page."""
+
+_LEAST = 720, 400
+"""Smallest page for curves and maps."""
 
 _BAR_LABEL = "distance to the nearest robot"
 
@@ -87,7 +91,8 @@ def plot_coverage(
         At least one.
     theme : Theme or {"light", "dark"}
     size : (width, height) or None, px
-        Of the page; by default what suits the shapes of the maps.
+        Of the page; by default what suits the shapes of the maps. One that is too small for both,
+        below 720 x 400, has the curves alone.
     title : str
 
     Returns
@@ -101,6 +106,8 @@ def plot_coverage(
     """
     if not moments:
         raise ParameterError("moments: none were given, but at least one was wanted")
+    if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
+        return plot_cost(curves, theme=theme, size=size, title=title)
     theme = theme_named(theme) if isinstance(theme, str) else theme
     bounds = np.array([moment.environment.region.bounds for moment in moments])
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
@@ -125,7 +132,7 @@ def plot_coverage(
             axes.set_xlim(low_x, high_x)
             axes.set_ylim(low_y, high_y)
             axes.set_axis_off()
-            _draw_moment(axes, moment, limit, theme, box)
+            _draw_moment(axes, moment, limit, theme, box, s)
             page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
             page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
         (left, _, width, _), _ = panels[0]
@@ -226,7 +233,7 @@ def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> l
     ]
 
 
-def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box) -> None:
+def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
     """Draw the distances cut at the walls, the borders of the geodesic cells, the map and the robots."""
     from matplotlib.patches import Polygon
 
@@ -236,7 +243,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     picture = palette(theme)[levels(moment.field, x, y, limit, _FINE * 9)]
-    width = _FINE * 1.8
+    width = _FINE * 1.4 * scale
     borders = moment.field.borders(x, y, width / zoom)
     part = strength(borders, zoom, width)[:, None]
     place = borders.row, borders.column
