@@ -37,7 +37,7 @@ class Arguments:
     """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
 
     Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of
-    the cost is scikit-fmm: pip install 'robocov[bench]'. All takes about four minutes.
+    the cost is scikit-fmm: pip install 'robocov[bench]'. All takes a minute or two.
 
     Example: robocov bench step
     """
@@ -47,7 +47,7 @@ class Arguments:
     ] = "all"
     """What to measure: step, cost, render, start or all."""
     quick: bool = False
-    """Fewer cases and rounds: half a minute."""
+    """Fewer cases and rounds: some ten seconds."""
     json: bool = False
     """Print one JSON object and nothing else."""
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
