@@ -23,7 +23,7 @@ from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
 from robocov.solid import solid_pieces
-from robocov.world import World
+from robocov.world import SINK, World
 
 DEFAULT_DT = 1 / 60
 """Control period in seconds where nothing else is said."""
@@ -42,6 +42,10 @@ class Simulation:
         By default `Team.homogeneous(n)`.
     dt : float, s
         Control period. The physics takes substeps where it needs them.
+    velocities : (n, 2) m/s
+        At the beginning; by default the robots are at rest.
+    time : float, s
+        At the beginning.
 
     Raises
     ------
@@ -68,6 +72,9 @@ class Simulation:
         starts: Array | list[list[float]],
         team: Team | None = None,
         dt: float = DEFAULT_DT,
+        *,
+        velocities: Array | None = None,
+        time: float = 0.0,
     ) -> None:
         positions = np.array(starts, dtype=float)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
@@ -82,13 +89,21 @@ class Simulation:
             raise ParameterError(
                 f"controller: {shown(controller)}, but a controller, as in Rapf(), was wanted"
             )
-        _check_starts(environment, positions, self.team)
+        if velocities is not None:
+            velocities = np.array(velocities, dtype=float)
+            if velocities.shape != positions.shape or not np.isfinite(velocities).all():
+                raise StartError(
+                    f"velocities: {shown(velocities.tolist())}, but finite [x, y] for each robot were wanted"
+                )
+        # who moves may lean on something, and sink in a little
+        _check_starts(environment, positions, self.team, 1e-6 if velocities is None else 2.0 * SINK)
         self.environment = environment
         self.controller = controller
         self.dt = dt
         pieces = solid_pieces(environment)
         self._sensor = RangeSensor(pieces)
-        self._world = World(pieces, self.team, positions)
+        self._world = World(pieces, self.team, positions, velocities)
+        self._began = time
         self._steps = 0
         self._memory = self._asked(lambda: controller.begin(environment.region, self.team))
         self._snapshot: Snapshot | None = None
@@ -96,7 +111,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time in seconds."""
-        return self._steps * self.dt
+        return self._began + self._steps * self.dt
 
     @property
     def positions(self) -> Array:
@@ -156,16 +171,26 @@ class Simulation:
             time=self.time,
         )
 
-    def step(self) -> None:
+    def step(self, pushes: Array | None = None) -> None:
         """Make one control step.
+
+        Parameters
+        ----------
+        pushes : (n, 2) N or None
+            Forces from outside, as by a hand, beside the controller's; see `World.step`. A record does
+            not know of them.
 
         Raises
         ------
         ParameterError
-            When the controller returns anything but finite forces of shape (n, 2).
+            When the controller returns anything but finite forces of shape (n, 2), or the pushes are not.
         """
+        if pushes is not None:
+            pushes = self._rows(pushes, "pushes")
+            if not np.isfinite(pushes).all():
+                raise ParameterError(f"pushes: {shown(pushes.tolist())}, but finite newtons were wanted")
         decision = self.snapshot.decision
-        self._world.step(decision.forces, self.dt)
+        self._world.step(decision.forces, self.dt, pushes)
         self._memory = decision.memory
         self._steps += 1
         self._snapshot = None
@@ -213,6 +238,46 @@ class Simulation:
         twin._snapshot = None  # it holds the memory that the step after it will hand on
         return twin
 
+    def changed(
+        self,
+        *,
+        environment: Environment | None = None,
+        controller: Controller | None = None,
+        team: Team | None = None,
+        positions: Array | None = None,
+        velocities: Array | None = None,
+    ) -> Simulation:
+        """Return a simulation that goes on from here with something else; this one stays as it is.
+
+        What the controller remembers is kept as long as neither it nor the number of robots changes.
+
+        Parameters
+        ----------
+        environment, controller, team
+            By default the same.
+        positions, velocities : (n, 2) m and m/s
+            By default the present ones.
+
+        Raises
+        ------
+        StartError
+            When a robot is in a wall or in another robot by more than what touching robots sink in.
+        ParameterError
+            When sizes differ.
+        """
+        twin = Simulation(
+            self.environment if environment is None else environment,
+            self.controller if controller is None else controller,
+            self.positions if positions is None else positions,
+            self.team if team is None else team,
+            self.dt,
+            velocities=self.velocities if velocities is None else velocities,
+            time=self.time,
+        )
+        if controller is None and len(twin.team) == len(self.team):
+            twin._memory = deepcopy(self._memory)
+        return twin
+
     def _checked(self, made: Any, time: float) -> Decision:
         """Return the decision when it is one that can be carried out and recorded."""
         where = f"controller {self.controller.name!r}"
@@ -254,7 +319,8 @@ def check_dt(dt: float) -> None:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
 
 
-def _check_starts(environment: Environment, positions: Array, team: Team) -> None:
+def _check_starts(environment: Environment, positions: Array, team: Team, slack: float) -> None:
+    """Check that robots are free, but for so many metres."""
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
         raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
     points = shapely.points(positions)
@@ -266,14 +332,14 @@ def _check_starts(environment: Environment, positions: Array, team: Team) -> Non
             raise StartError(
                 f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}"
             )
-        if wall[i] < team.radius[i] - 1e-6:
+        if wall[i] < team.radius[i] - slack:
             raise StartError(
                 f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
             )
     first, second, distance = Neighbours(len(positions)).closer_than(
         positions, 2.0 * float(team.radius.max())
     )
-    clash = distance < team.radius[first] + team.radius[second] - 1e-6
+    clash = distance < team.radius[first] + team.radius[second] - slack
     if clash.any():
         k = int(np.flatnonzero(clash)[0])
         raise StartError(

@@ -86,6 +86,7 @@ class World:
         self._protect()
         self._write_state()
 
+        self._thrown = bool((np.hypot(*self._velocities.T) > team.max_speed).any())
         self._mass = team.mass[:, None]
         self._response: dict[float, tuple[Array, Array]] = {}
         self._fastest = float(team.max_speed.max())
@@ -105,27 +106,55 @@ class World:
         """Return an independent world in the same state, which goes on identically."""
         return World(self._pieces, self.team, self._positions, self._velocities)
 
-    def step(self, forces: Array, dt: float) -> None:
+    def step(self, forces: Array, dt: float, pushes: Array | None = None) -> None:
         """Move on by `dt` seconds under `forces`, (n, 2) N.
 
         The forces are the controllers'; viscosity and limits are added here, the same for all.
-        """
-        # a robot must not cross a thin wall within one substep
-        parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(self._fastest * dt / self._smallest))
-        for _ in range(parts):
-            self._substep(forces, dt / parts)
 
-    def _substep(self, forces: Array, dt: float) -> None:
-        self._force[:-1] = self._net_force(forces, dt)
+        Parameters
+        ----------
+        forces : (n, 2) N
+        dt : float, s
+        pushes : (n, 2) N or None
+            From outside, as by a hand. They know no limits; a robot that they have made faster than it
+            can be brakes as hard as it can.
+        """
+        fastest = self._fastest
+        if pushes is not None or self._thrown:
+            speed = np.hypot(*self._velocities.T)
+            gain = 0.0 if pushes is None else np.hypot(*pushes.T) / self.team.mass * dt
+            fastest = max(fastest, float((speed + gain).max()))
+        # a robot must not cross a thin wall within one substep
+        parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(fastest * dt / self._smallest))
+        for _ in range(parts):
+            self._substep(forces, dt / parts, pushes)
+
+    def _substep(self, forces: Array, dt: float, pushes: Array | None) -> None:
+        limit = self._speed_limit(dt)
+        self._force[:-1] = self._net_force(forces, dt, limit)
+        if pushes is not None:
+            self._force[:-1] += pushes
+            limit = np.maximum(
+                limit, np.hypot(*self._velocities.T) + np.hypot(*pushes.T) / self.team.mass * dt
+            )
         self._touched = False
         batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
         self._space.step(dt)
         if self._touched:
-            self._substep_in_contact(dt)
+            self._substep_in_contact(dt, limit)
         else:
             self._read_state()
+        if pushes is not None or self._thrown:
+            self._thrown = bool((np.hypot(*self._velocities.T) > self.team.max_speed).any())
 
-    def _net_force(self, forces: Array, dt: float) -> Array:
+    def _speed_limit(self, dt: float) -> Array:
+        """Return how fast each robot may be after one substep, (n,) m/s: what was thrown brakes."""
+        if not self._thrown:
+            return self.team.max_speed
+        braked = np.hypot(*self._velocities.T) - self.team.max_acceleration * dt
+        return np.asarray(np.maximum(self.team.max_speed, braked))
+
+    def _net_force(self, forces: Array, dt: float, limit: Array) -> Array:
         """Return the constant net force, (n, 2) N, that makes one substep obey (28) and the limits.
 
         The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is
@@ -141,21 +170,22 @@ class World:
         decay, drive = self._response[dt]
         velocities = self._velocities
         change = _limited(drive * forces - decay * velocities, self.team.max_acceleration * dt)
-        reached = _limited(velocities + change, self.team.max_speed)
+        reached = _limited(velocities + change, limit)
         return np.asarray((reached - velocities) * (self._mass / dt))
 
-    def _substep_in_contact(self, dt: float) -> None:
+    def _substep_in_contact(self, dt: float, limit: Array) -> None:
         self._write_state()
         self._forget_contacts()
         travel = min(SINK, 0.1 * self._smallest)
-        parts = min(_MOST_SUBSTEPS, max(2, math.ceil(self._fastest * dt / travel)))
+        fastest = max(self._fastest, float(limit.max()))
+        parts = min(_MOST_SUBSTEPS, max(2, math.ceil(fastest * dt / travel)))
         for _ in range(parts):
             batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
             self._space.step(dt / parts)
         self._settle_overlap(dt / parts)
         self._read_state()
         # impulses of a contact may exceed what a robot can do by itself
-        speed_limited = _limited(self._velocities, self.team.max_speed)
+        speed_limited = _limited(self._velocities, limit)
         if speed_limited is not self._velocities:
             self._velocities = speed_limited
             self._protect()

@@ -340,3 +340,84 @@ def test_a_controller_cannot_change_the_world(cluttered: Environment) -> None:
         simulation.step()
         assert not simulation.positions.flags.writeable
         assert not simulation.velocities.flags.writeable
+
+
+class TestChanges:
+    ROOM = load_map("rooms")
+
+    def moving(self, controller: Controller | None = None) -> Simulation:
+        simulation = Simulation(self.ROOM, controller or Rapf(), self.ROOM.start().sample(6, seed=1))
+        for _ in range(90):
+            simulation.step()
+        return simulation
+
+    def test_nothing_changed_goes_on_alike(self) -> None:
+        before = self.moving()
+        after, twin = before.changed(), before.copy()
+        assert after.time == before.time == pytest.approx(1.5)
+        for _ in range(120):
+            after.step()
+            twin.step()
+        np.testing.assert_array_equal(after.positions, twin.positions)
+        np.testing.assert_array_equal(after.velocities, twin.velocities)
+        assert after.time == pytest.approx(twin.time)
+        # the one that was changed stays where it is
+        assert before.time == pytest.approx(1.5)
+
+    def test_another_controller_starts_from_here(self) -> None:
+        before = self.moving()
+        after = before.changed(controller=Rpf())
+        assert after.controller == Rpf()
+        np.testing.assert_array_equal(after.positions, before.positions)
+        np.testing.assert_array_equal(after.velocities, before.velocities)
+        assert after.snapshot.seen.time == before.time
+
+    def test_obstacles_and_robots_come_and_go(self) -> None:
+        before = self.moving()
+        emptier = Environment("emptier", self.ROOM.boundary, self.ROOM.obstacles[1:], self.ROOM.starts)
+        after = before.changed(environment=emptier)
+        assert after.environment is emptier
+        fewer = after.changed(
+            team=Team.homogeneous(4), positions=after.positions[:4], velocities=after.velocities[:4]
+        )
+        fewer.step()
+        assert fewer.positions.shape == (4, 2)
+
+    @pytest.mark.parametrize("controller", [Lloyd(), Rpf(k_rep=50.0, rho_0=9.0)], ids=["lloyd", "rpf"])
+    def test_robots_that_lean_on_something_are_no_fault(self, controller: Controller) -> None:
+        simulation = Simulation(self.ROOM, controller, self.ROOM.start().sample(10, seed=1))
+        for k in range(600):
+            simulation.step()
+            if k % 20 == 0:
+                simulation.changed()
+
+    def test_robots_within_a_new_obstacle_are_named(self) -> None:
+        before = self.moving()
+        x, y = before.positions[2].tolist()
+        block = PolygonObstacle(
+            ((x - 0.3, y - 0.3), (x + 0.3, y - 0.3), (x + 0.3, y + 0.3), (x - 0.3, y + 0.3))
+        )
+        blocked = Environment("blocked", self.ROOM.boundary, (*self.ROOM.obstacles, block))
+        with pytest.raises(StartError, match=r"starts\[2\] = .* is inside an obstacle"):
+            before.changed(environment=blocked)
+
+    def test_wrong_sizes_and_numbers_are_named(self) -> None:
+        before = self.moving()
+        with pytest.raises(ParameterError, match="team: 3 robots, but 6 starts"):
+            before.changed(team=Team.homogeneous(3))
+        with pytest.raises(StartError, match=r"velocities: .* were wanted"):
+            before.changed(velocities=np.full((6, 2), np.nan))
+        with pytest.raises(ParameterError, match=r"pushes of shape \(2, 2\)"):
+            before.step(np.zeros((2, 2)))
+        with pytest.raises(ParameterError, match=r"pushes: .* finite newtons"):
+            before.step(np.full((6, 2), np.inf))
+
+    def test_pushed_robots_move_and_the_others_do_not_notice_by_force(self) -> None:
+        before = self.moving()
+        pushed, alone = before.copy(), before.copy()
+        pushes = np.zeros((6, 2))
+        pushes[0] = 0.0, 5.0
+        pushed.step(pushes)
+        alone.step()
+        np.testing.assert_array_equal(pushed.positions[1:], alone.positions[1:])
+        assert pushed.velocities[0, 1] > alone.velocities[0, 1] + 0.05

@@ -160,3 +160,64 @@ def test_heterogeneous_teams_keep_their_own_limits(empty: Environment) -> None:
     for _ in range(120):
         pair.step(np.full((2, 2), [100.0, 0.0]), DT)
     np.testing.assert_allclose(np.hypot(*pair.velocities.T), [1.0, 0.4], rtol=1e-9)
+
+
+FAR = np.array([[90.0, 90.0], [91.0, 90.0], [91.0, 91.0]])
+"""Somewhere there is always a wall."""
+
+
+def test_a_thrown_robot_brakes_as_hard_as_it_can() -> None:
+    team = Team.homogeneous(1, max_speed=1.0, max_acceleration=2.0, viscosity=0.5)
+    world = World((FAR,), team, np.zeros((1, 2)), np.array([[5.0, 0.0]]))
+    speeds = [5.0]
+    for _ in range(180):
+        # the controller would go on
+        world.step(np.array([[50.0, 0.0]]), 1 / 60)
+        speeds.append(float(world.velocities[0, 0]))
+    np.testing.assert_allclose(-np.diff(speeds)[:119], 2.0 / 60, rtol=1e-9)
+    np.testing.assert_allclose(speeds[121:], 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("mass", [1.0, 2.5])
+def test_pushes_know_no_limits(mass: float) -> None:
+    team = Team.homogeneous(2, mass=mass)
+    world = World((FAR,), team, np.array([[0.0, 0.0], [5.0, 0.0]]))
+    push = np.array([[0.0, 60.0], [0.0, 0.0]])
+    world.step(np.zeros((2, 2)), 0.01, push)
+    np.testing.assert_allclose(world.velocities, push / mass * 0.01, rtol=1e-12)
+
+
+def test_without_pushes_nothing_is_different() -> None:
+    team = Team.homogeneous(3)
+    places = np.array([[0.0, 0.0], [0.35, 0.0], [5.0, 5.0]])
+    forces = np.array([[1.5, 0.3], [-1.0, 0.2], [0.4, -2.0]])
+    one, other = World((FAR,), team, places), World((FAR,), team, places)
+    for _ in range(120):
+        one.step(forces, 1 / 60)
+        other.step(forces, 1 / 60, np.zeros((3, 2)))
+    np.testing.assert_array_equal(one.positions, other.positions)
+    np.testing.assert_array_equal(one.velocities, other.velocities)
+
+
+@pytest.mark.parametrize("force", [30.0, 300.0, 3000.0])
+def test_no_push_drives_a_robot_through_a_thin_wall(force: float) -> None:
+    wall = np.array([[1.0, -1.0], [1.02, -1.0], [1.02, 1.0], [1.0, 1.0]])
+    world = World((wall,), Team.homogeneous(1, radius=0.1), np.zeros((1, 2)))
+    for _ in range(60):
+        world.step(np.zeros((1, 2)), 1 / 60, np.array([[force, 0.0]]))
+        assert world.positions[0, 0] < 0.95
+
+
+def test_a_robot_on_a_spring_follows_the_hand_and_is_thrown() -> None:
+    world = World((FAR,), Team.homogeneous(1), np.zeros((1, 2)))
+    hand = np.array([[4.0, 1.0]])
+    for _ in range(120):
+        stretch = hand - world.positions
+        world.step(np.zeros((1, 2)), 1 / 60, 40.0 * stretch - 12.0 * world.velocities)
+    np.testing.assert_allclose(world.positions, hand, atol=0.05)
+    world.step(np.zeros((1, 2)), 1 / 60, np.array([[0.0, 240.0]]))
+    speed = float(world.velocities[0, 1])
+    assert speed > 3.0
+    for _ in range(int(speed / 2.0 * 60) + 60):
+        world.step(np.zeros((1, 2)), 1 / 60)
+    assert np.hypot(*world.velocities[0]) < 0.5
