@@ -19,6 +19,7 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 COMMANDS = {
     # name: (module, one line)
+    "demo": ("demo", "the interactive window: watch, touch, compare, go back in time"),
     "run": ("run", "one headless run, everything saved in a folder: record, cost, pictures, film"),
     "compare": ("compare", "several controllers from the same starts, side by side"),
     "check": ("check", "validate maps; area, free area, components, narrowest gap"),
@@ -31,6 +32,7 @@ COMMANDS = {
 }
 
 _EXAMPLES = (
+    ("robocov demo", "the interactive window; robocov demo --tour tells the story in three minutes"),
     ("robocov run rooms --video --out first-run", "six robots cover six rooms; pictures and a film"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),

@@ -74,12 +74,12 @@ class RunOptions:
     """Print one JSON object and nothing else."""
 
     def __post_init__(self) -> None:
-        _in_range("--robots", self.robots, 1, 10_000)
-        _in_range("--seed", self.seed, 0, 2**63 - 1)
-        _in_range("--duration", self.duration, 0.0, 1e6, "s")
-        _in_range("--lattice", self.lattice, 2, 2048)
-        _in_range("--fps", self.fps, 1, 240)
-        _in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        in_range("--robots", self.robots, 1, 10_000)
+        in_range("--seed", self.seed, 0, 2**63 - 1)
+        in_range("--duration", self.duration, 0.0, 1e6, "s")
+        in_range("--lattice", self.lattice, 2, 2048)
+        in_range("--fps", self.fps, 1, 240)
+        in_range("--film-speed", self.film_speed, 0.01, 1e4)
         from robocov.simulation import check_dt  # asking for help must not load the physics
 
         check_dt(self.dt)
@@ -93,24 +93,40 @@ class RunOptions:
 
     def picture_size(self) -> tuple[int, int] | None:
         """Return the size that was asked for (width, height), None when none was."""
-        if self.size is None:
-            return None
-        match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", self.size)
-        if not match:
-            raise ParameterError(
-                f"--size: {shown(self.size)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
-            )
-        width, height = int(match[1]), int(match[2])
-        _in_range("--size", width, 320, 7680, "pixels wide")
-        _in_range("--size", height, 240, 4320, "pixels high")
-        return width, height
+        return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
 
     def film_size(self) -> tuple[int, int]:
         """Return the size of film frames (width, height)."""
         return self.picture_size() or (1280, 720)
 
 
-def _in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
+def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height from a text like ``1280x720``.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, or beyond the limits.
+    """
+    match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
+    if not match:
+        raise ParameterError(
+            f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
+        )
+    width, height = int(match[1]), int(match[2])
+    in_range(option, width, least[0], most[0], "pixels wide")
+    in_range(option, height, least[1], most[1], "pixels high")
+    return width, height
+
+
+def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Check the value of an option.
+
+    Raises
+    ------
+    ParameterError
+        When it is out of range.
+    """
     if not low <= value <= high:
         wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
         raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")

@@ -293,16 +293,7 @@ def _even(frame: Frame) -> Frame:
 def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[BinaryIO]:
     """Run ffmpeg and give the pipe into it; when it ends badly, raise what it said."""
     height, width, _ = frame.shape
-    command = [
-        *(_ffmpeg(), "-y", "-nostdin", "-loglevel", "error"),
-        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-"),
-        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
-        # players take bt709 for high definition and bt601 otherwise unless the film says which
-        *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"),
-        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
-        *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
-        str(part),
-    ]
+    command = film_command(part, (width, height), fps)
     with tempfile.TemporaryFile() as said:
         # in a session of its own: Ctrl-C in a terminal goes to us alone, and we end the film properly
         process = subprocess.Popen(
@@ -327,6 +318,30 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
             lines = said.read().decode("utf-8", "replace").strip().splitlines()
             reason = lines[-1].strip() if lines else f"status {status}"
             raise OutputError(f"{path}: the film's encoder failed ({reason})")
+
+
+def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
+    """Return the encoder's command: raw RGB frames of an even size come in, an MP4 film goes to `path`.
+
+    A `streamed` film can be played up to where it has come, whatever happens to the encoder.
+
+    Raises
+    ------
+    OutputError
+        When there is no encoder.
+    """
+    flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
+    return [
+        *(_ffmpeg(), "-y", "-nostdin", "-loglevel", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"),
+        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
+        # players take bt709 for high definition and bt601 otherwise unless the film says which
+        *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"),
+        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+        *(("-g", f"{round(2 * fps)}") if streamed else ()),
+        *("-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"),
+        str(path),
+    ]
 
 
 def _ffmpeg() -> str:

@@ -129,6 +129,11 @@ class Simulation:
         return self._sensor
 
     @property
+    def memory(self) -> Any:
+        """What the controller remembers; not to be changed."""
+        return self._memory
+
+    @property
     def snapshot(self) -> Snapshot:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
@@ -236,6 +241,18 @@ class Simulation:
         twin._world = self._world.copy()
         twin._memory = deepcopy(self._memory)
         twin._snapshot = None  # it holds the memory that the step after it will hand on
+        return twin
+
+    def remembering(self, memory: Any) -> Simulation:
+        """Return a simulation in the same state whose controller remembers something else.
+
+        Parameters
+        ----------
+        memory : object
+            What the `memory` of a simulation was, of the same controller and number of robots.
+        """
+        twin = self.copy()
+        twin._memory = deepcopy(memory)
         return twin
 
     def changed(

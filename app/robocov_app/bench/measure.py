@@ -25,7 +25,7 @@ class Row:
     Attributes
     ----------
     part : str
-        ``step``, ``cost``, ``render`` or ``start``.
+        ``step``, ``cost``, ``render``, ``window`` or ``start``.
     name : str
         What is timed: ``one step``.
     parameters : dict

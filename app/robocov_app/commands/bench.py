@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
     from robocov_app.bench.measure import Row
 
-PARTS = ("step", "cost", "render", "start")
+PARTS = ("step", "cost", "render", "window", "start")
 
 TITLES = {
     "step": "A step of RAPF on campus",
     "cost": "The exact coverage cost, in a unit square with random obstacles",
     "render": "Pictures of 1280 x 720",
+    "window": "The window of 1280 x 720 on rooms, in use",
     "start": "Until a command begins",
 }
 
@@ -43,9 +44,10 @@ class Arguments:
     """
 
     part: Annotated[
-        tyro.conf.Positional[Literal["step", "cost", "render", "start", "all"]], tyro.conf.arg(metavar="PART")
+        tyro.conf.Positional[Literal["step", "cost", "render", "window", "start", "all"]],
+        tyro.conf.arg(metavar="PART"),
     ] = "all"
-    """What to measure: step, cost, render, start or all."""
+    """What to measure: step, cost, render, window, start or all."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
     json: bool = False

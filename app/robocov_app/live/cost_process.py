@@ -11,12 +11,15 @@ import signal
 import sys
 import threading
 import time
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
 
 _PAUSE = 0.05
 """Seconds between two words on how far a map is."""
@@ -93,18 +96,29 @@ class Process:
         began = time.perf_counter()
         try:
             result = cost(question.positions)
+            path = path_of(cost, question)
         except RobocovError as error:
             # on a map that is about to be replaced, robots may well be where there were obstacles
             self._say(Failed(self._generation, str(error)))
             return
         seconds = time.perf_counter() - began
-        self._say(values_of(self._generation, question.time, result, seconds))
+        self._say(values_of(self._generation, question, result, seconds, path))
 
     def _say(self, message: object) -> None:
         try:
             send(self._target, message)
         except OSError:
             os._exit(0)
+
+
+def path_of(cost: CoverageCost, question: Question) -> Array | None:
+    """Return the path that a question asks for, None where its point is not free."""
+    if question.point is None:
+        return None
+    try:
+        return cost.path(question.positions, question.point)
+    except RobocovError:
+        return None
 
 
 def main() -> None:

@@ -85,10 +85,13 @@ class CostWorker:
         self._talking().build(self._last)
         return self._generation
 
-    def ask(self, time: float, positions: Array) -> None:
-        """Ask for the cost of (n, 2) m positions; the answer bears the same time."""
+    def ask(self, time: float, positions: Array, topic: int = 0, point: Array | None = None) -> None:
+        """Ask for the cost of (n, 2) m positions; the answer bears the same time and topic.
+
+        With a `point`, (2,) m, also for the shortest path from there to its nearest robot.
+        """
         if self._last is not None:
-            self._talking().ask(Question(time, np.array(positions, dtype=float)))
+            self._talking().ask(Question(time, np.array(positions, dtype=float), topic, point))
 
     def poll(self) -> list[Event]:
         """Return what has happened since the last call."""

@@ -31,10 +31,16 @@ class Build:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Please evaluate the cost of (n, 2) m positions, of whatever map is ready."""
+    """Please evaluate the cost of (n, 2) m positions, of whatever map is ready.
+
+    With a `point`, (2,) m, the shortest path from there to its nearest robot too. What is said of the
+    `topic` comes back with the answer.
+    """
 
     time: float
     positions: Array
+    topic: int = 0
+    point: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +96,8 @@ class Values:
     corner: IntArray
     last_corner: IntArray
     seconds: float
+    topic: int = 0
+    path: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +113,19 @@ class Answer:
     result : CoverageResult
     seconds : float
         What the evaluation took.
+    topic : int
+        What the question said.
+    path : (w, 2) m or None
+        Way-points from the question's point to its nearest robot, both ends included; empty where none
+        can come, None where nothing was asked, or the point is not free.
     """
 
     generation: int
     time: float
     result: CoverageResult
     seconds: float
+    topic: int = 0
+    path: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +146,21 @@ class Failed:
 Event: TypeAlias = Building | Ready | Answer | Failed
 
 
-def values_of(generation: int, time: float, result: CoverageResult, seconds: float) -> Values:
+def values_of(
+    generation: int, question: Question, result: CoverageResult, seconds: float, path: Array | None
+) -> Values:
     """Return what is to be sent of a result."""
     kept = {item.name: getattr(result, item.name) for item in fields(Values) if hasattr(result, item.name)}
     # half as long on the way
     kept |= {name: kept[name].astype(np.int32) for name in _INDICES}
-    return Values(generation=generation, time=time, seconds=seconds, **kept)
+    return Values(
+        generation=generation,
+        time=question.time,
+        seconds=seconds,
+        topic=question.topic,
+        path=path,
+        **kept,
+    )
 
 
 def answer_of(values: Values, ready: Ready) -> Answer:
@@ -148,7 +172,7 @@ def answer_of(values: Values, ready: Ready) -> Answer:
     }
     kept |= {name: kept[name].astype(np.intp) for name in _INDICES}
     result = CoverageResult(points=ready.sites.points, corners=ready.corners, **kept)
-    return Answer(values.generation, values.time, result, values.seconds)
+    return Answer(values.generation, values.time, result, values.seconds, values.topic, values.path)
 
 
 def send(stream: BinaryIO, message: object) -> None:

@@ -13,7 +13,7 @@ import pygame
 
 from robocov.arrays import Array
 from robocov_app.view import sprites
-from robocov_app.view.clipping import clipped_polygon, clipped_segment
+from robocov_app.view.clipping import FAR, clipped_polygon, clipped_segment
 from robocov_app.view.fonts import label, text_width
 from robocov_app.view.theme import Colour
 
@@ -82,6 +82,16 @@ class Canvas:
         ends = clipped_segment(start[0], start[1], end[0], end[1])
         if ends is not None:
             pygame.draw.aaline(self.surface, colour, *ends, width)
+
+    def segments(self, ends: Array, colour: Colour, width: int = 1) -> None:
+        """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
+        if len(ends) and np.abs(ends).max() > FAR:
+            for x1, y1, x2, y2 in ends.tolist():
+                self.line((x1, y1), (x2, y2), colour, width)
+            return
+        surface, draw = self.surface, pygame.draw.aaline
+        for x1, y1, x2, y2 in ends.tolist():
+            draw(surface, colour, (x1, y1), (x2, y2), width)
 
     def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
         """Draw a dashed smooth line."""

@@ -17,11 +17,17 @@ FORCE_LENGTH = 46.0
 VELOCITY_LENGTH = 34.0
 """Length of the arrow of a robot at its largest speed in pixels at scale 1."""
 
-_HEADS = {"attraction": "full", "repulsion_robots": "open", "repulsion_obstacle": "dot"}
+_HEADS = {
+    "attraction": "full",
+    "repulsion_robots": "open",
+    "repulsion_obstacle": "dot",
+    "viscosity": "open",
+}
 _WORDS = {
     "attraction": "attraction",
     "repulsion_robots": "repulsion from robots",
     "repulsion_obstacle": "repulsion from obstacle",
+    "viscosity": "viscosity",
     "resultant": "resultant force",
 }
 
@@ -41,7 +47,7 @@ def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width:
 
 
 class ForceTerm(Layer):
-    """One term of the controller's force as arrows, or their sum.
+    """One term of the controller's force as arrows, or their sum; or the world's viscosity.
 
     Lengths saturate, since repulsion grows without limit: a force that would give the largest
     acceleration has 63 % of `FORCE_LENGTH`.
@@ -58,6 +64,8 @@ class ForceTerm(Layer):
         if scene.snapshot is None:
             return None
         decision = scene.snapshot.decision
+        if self.term == "viscosity":
+            return -scene.team.viscosity[:, None] * scene.snapshot.velocities
         return decision.forces if self.term == "resultant" else decision.terms.get(self.term)
 
     def _style(self, canvas: Canvas) -> tuple[Colour, float, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +17,7 @@ import shapely
 
 from robocov.arrays import Array
 from robocov_app.view import sprites
-from robocov_app.view.camera import round_length
+from robocov_app.view.camera import Camera, round_length
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.scene import Scene
 from robocov_app.view.spacing import fitted_radii, mark_size
@@ -104,8 +104,7 @@ class Cells(Layer):
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         width = canvas.width(canvas.theme.line)
-        for x1, y1, x2, y2 in _once(np.hstack([corners, corners[following]])).tolist():
-            canvas.line((x1, y1), (x2, y2), canvas.theme.cell_edge, width)
+        canvas.segments(_once(np.hstack([corners, corners[following]])), canvas.theme.cell_edge, width)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -237,11 +236,18 @@ class Starts(Layer):
     name = "starts"
     title = "Starts"
 
+    def __init__(self) -> None:
+        self._kept: tuple[Array, object, Array, float] | None = None
+
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.starts is None:
             return
-        centers = canvas.camera.to_pixels(scene.starts)
-        radius = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
+        view = canvas.camera, canvas.scale
+        if self._kept is None or self._kept[0] is not scene.starts or self._kept[1] != view:
+            centers = canvas.camera.to_pixels(scene.starts)
+            radius = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
+            self._kept = scene.starts, view, centers, radius
+        centers, radius = self._kept[2:]
         for center in centers.tolist():
             self._ring(canvas, center[0], center[1], radius)
 
@@ -303,7 +309,7 @@ class Robots(Layer):
         for robot, (center, radius) in enumerate(zip(centers, radii, strict=True)):
             fill = theme.robots[canvas.hues[robot]]
             ring = min(1.6 * canvas.scale, _rounded(0.3 * radius))
-            text = str(robot + 1)
+            text = str(scene.number(robot))
             if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * canvas.scale:
                 text = ""
             canvas.stamp(partial(sprites.disc, radius, fill, theme.robot_ring, ring, edge, text), center)
@@ -328,11 +334,16 @@ def drawn_radii(canvas: Canvas, scene: Scene) -> list[float]:
     Large enough for a number where there is room; in a crowd smaller, so that discs keep apart, but
     never below the true size.
     """
+    return _drawn_radii(scene, canvas.camera, canvas.scale)
+
+
+@lru_cache(maxsize=8)  # several layers ask in each frame
+def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> list[float]:
     if scene.snapshot is None:
         return []
-    centers = canvas.camera.to_pixels(scene.snapshot.positions)
-    true = scene.team.radius * canvas.camera.zoom
-    radii = fitted_radii(centers, true, SMALLEST * canvas.scale, READABLE * canvas.scale)
+    centers = camera.to_pixels(scene.snapshot.positions)
+    true = scene.team.radius * camera.zoom
+    radii = fitted_radii(centers, true, SMALLEST * scale, READABLE * scale)
     return [_rounded(radius) for radius in np.minimum(radii, 400.0).tolist()]
 
 

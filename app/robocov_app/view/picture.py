@@ -24,6 +24,7 @@ from robocov_app.view.furniture import (
     Status,
     legend_rows,
 )
+from robocov_app.view.knowledge import CursorPath, RayScan, SensedObstacles
 from robocov_app.view.layers import (
     Boundary,
     Cells,
@@ -35,12 +36,14 @@ from robocov_app.view.layers import (
     Robots,
     Starts,
 )
-from robocov_app.view.theme import LIGHT, Theme, robot_hues
+from robocov_app.view.marks import Failed, Selection
+from robocov_app.view.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.view.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from robocov.arrays import IntArray
     from robocov.environment import Environment
     from robocov_app.view.scene import Scene
 
@@ -60,6 +63,8 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         Grid(),
         Obstacles(),
         Boundary(),
+        SensedObstacles(),
+        RayScan(),
         Ranges("sensing"),
         Ranges("communication"),
         Links(),
@@ -72,7 +77,11 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         ForceTerm("attraction"),
         ForceTerm("repulsion_robots"),
         ForceTerm("repulsion_obstacle"),
+        ForceTerm("viscosity"),
         ForceTerm("resultant"),
+        CursorPath(),
+        Failed(),
+        Selection(),
         Robots(),
         ColourBar(),
         Legend(),
@@ -110,6 +119,14 @@ def scale_for(size: tuple[int, int]) -> float:
     """
     fitting = min(size[0] / 1024, size[1] / 576)
     return min(max(round(fitting * 8) / 8, 0.875), 6.0)
+
+
+def _hues(scene: Scene, previous: IntArray) -> IntArray:
+    """Return the index of each robot's colour: in a small team it stays with the robot's number."""
+    numbers = scene.numbers
+    if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:
+        return np.array(numbers, dtype=np.intp) - 1
+    return robot_hues(len(scene.team), scene.adjacency, previous)
 
 
 class Painter:
@@ -211,7 +228,7 @@ class Painter:
         """Draw `scene` on the whole of `surface`, which has this painter's size."""
         if surface.get_size() != self.size:
             self.resize(surface.get_size(), self.scale)
-        self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
+        self._hues = _hues(scene, self._hues)
         entries = self.legend_entries(scene)
         shown = frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)

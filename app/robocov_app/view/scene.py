@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
@@ -14,6 +17,7 @@ from robocov.voronoi import partition
 
 if TYPE_CHECKING:
     from robocov_app.view.field import Field
+    from robocov_app.view.sensed import Sensed
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,18 @@ class Scene:
         The distances to the nearest robot.
     field_limit : float, m
         Where the scale of their colours ends.
+    numbers : (n,) int or None
+        What people call the robots; by default 1, 2, 3, ...
+    failed : dict of number to (x, y) m
+        Robots that do not work any more.
+    selected : int or None
+        Row of the robot that is asked about.
+    scans : list of (position (2,), ends (rays, 2)) m
+        What range sensors measure all around.
+    sensed : Sensed or None
+        The obstacle points that were sensed so far.
+    path : (w, 2) m or None
+        Shortest path from a place to its nearest robot.
     """
 
     environment: Environment
@@ -60,6 +76,16 @@ class Scene:
     cost: str = ""
     field: Field | None = None
     field_limit: float = 1.0
+    numbers: Sequence[int] | None = None
+    failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)
+    selected: int | None = None
+    scans: Sequence[tuple[Array, Array]] = ()
+    sensed: Sensed | None = None
+    path: Array | None = None
+
+    def number(self, robot: int) -> int:
+        """Return what people call the robot of a row."""
+        return robot + 1 if self.numbers is None else self.numbers[robot]
 
     @property
     def has_goals(self) -> bool:
@@ -83,9 +109,11 @@ class Scene:
     ) -> Scene:
         """Return the scene of `snapshot` with the Voronoi cells of all its robots.
 
-        The cells that the law used are not taken: where communication is limited they overlap.
+        The cells that the law used are not taken where communication is limited: they overlap there.
         """
-        cells = partition(snapshot.positions, environment.region)
+        cells = snapshot.decision.cells
+        if cells is None or not np.isinf(team.communication_range).all():
+            cells = partition(snapshot.positions, environment.region)
         return cls(
             environment,
             team,

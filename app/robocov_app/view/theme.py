@@ -179,6 +179,7 @@ LIGHT = Theme(
         "attraction": rgb("0B7A6F"),
         "repulsion_robots": rgb("D9480F"),
         "repulsion_obstacle": rgb("A81E62"),
+        "viscosity": rgb("6B7280"),
         "resultant": rgb("1B2330"),
     },
     robots=tuple(rgb(code) for code in _MUTED),
@@ -214,6 +215,7 @@ DARK = Theme(
         "attraction": rgb("2DD4BF"),
         "repulsion_robots": rgb("FF9354"),
         "repulsion_obstacle": rgb("FF7AB6"),
+        "viscosity": rgb("A9B4C4"),
         "resultant": rgb("FFFFFF"),
     },
     # the darkest three would sink into the background

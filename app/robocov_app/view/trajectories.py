@@ -21,6 +21,10 @@ SECTION = 16.0
 """Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
 
 
+FADE_STEPS = 12
+"""Shades of a trajectory that fades."""
+
+
 class Trajectories(Layer):
     """Where the robots went.
 
@@ -43,6 +47,7 @@ class Trajectories(Layer):
         self._drawn = 0
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
+        self._fading: tuple[object, pygame.Surface] | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         trail = scene.trail
@@ -60,6 +65,8 @@ class Trajectories(Layer):
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         for path, end, colour in zip(self._open, ends, colours, strict=True):
+            if path[-1][0] != path[-1][0]:  # nan: not there yet
+                continue
             # mostly below the robot's disc, where seams do not show
             canvas.outline(np.array([*path, end]), colour, canvas.width(width / canvas.scale), closed=False)
 
@@ -69,6 +76,11 @@ class Trajectories(Layer):
         for row in rows:
             delta = row - last
             far = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= PIECE * PIECE
+            joins = np.isnan(last[:, 0]) & ~np.isnan(row[:, 0])
+            if joins.any():
+                for robot in np.nonzero(joins)[0].tolist():
+                    self._open[robot] = [row[robot].tolist()]
+                last[joins] = row[joins]
             if far.any():
                 for robot in np.nonzero(far)[0].tolist():
                     self._open[robot].append(row[robot].tolist())
@@ -105,11 +117,7 @@ class Trajectories(Layer):
         """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
         size = canvas.surface.get_size()
         key = (canvas.camera, canvas.theme.name, canvas.scale, size, self.colours, trail.shape[1])
-        continues = (
-            key == self._key
-            and 0 < self._drawn <= len(trail)
-            and np.array_equal(trail[self._drawn - 1], self._last_row)
-        )
+        continues = key == self._key and self._drawn > 0 and self._found(trail)
         if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
             self._key, self._drawn = key, 0
@@ -117,17 +125,57 @@ class Trajectories(Layer):
         self._page.set_clip(canvas.surface.get_clip())
         return self._page, continues
 
+    def _found(self, trail: Array) -> bool:
+        """Look for the row that was drawn last; where old rows were thinned it has come forward."""
+        if self._drawn <= len(trail) and _same(trail[self._drawn - 1], self._last_row):
+            return True
+        rows = np.flatnonzero(_same_rows(trail[: self._drawn], self._last_row))
+        if len(rows):
+            self._drawn = int(rows[-1]) + 1
+        return len(rows) > 0
+
     def _faded(self, canvas: Canvas, trail: Array, time: Array, colours: list[Colour], width: int) -> None:
+        """Draw the last seconds; what is a little older than now stays on a page for a moment."""
         fade = self.fade or 0.0
-        begin = int(np.searchsorted(time, time[-1] - fade))
-        rows = np.unique(np.linspace(begin, len(trail) - 1, 40).astype(int))
-        points = canvas.camera.to_pixels(trail[rows])
-        age = (time[-1] - time[rows[:-1]]) / max(fade, 1e-9)
+        refreshed = int(np.floor(time[-1] / (fade / FADE_STEPS)))
+        size = canvas.surface.get_size()
+        key = (canvas.camera, canvas.theme.name, canvas.scale, size, trail.shape[1], refreshed, len(colours))
+        if self._fading is None or self._fading[0] != key:
+            page = pygame.Surface(size, pygame.SRCALPHA, 32)
+            page.set_clip(canvas.surface.get_clip())
+            begin = int(np.searchsorted(time, time[-1] - fade))
+            self._fade_onto(page, canvas, trail[begin:], time[begin:], colours, width)
+            self._fading = (key, page)
+            self._drawn = len(trail)
+        canvas.surface.blit(self._fading[1], (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        fresh = bounded(canvas.camera.to_pixels(trail[min(self._drawn, len(trail)) - 1 :: 2]))
+        ends = bounded(canvas.camera.to_pixels(trail[-1:]))
+        paths = np.concatenate([fresh, ends])
         for robot, colour in enumerate(colours):
-            path = points[:, robot].tolist()
-            for k, old in enumerate(age.tolist()):
-                shade = mix(colour, canvas.theme.background, min(0.9, 0.9 * old))
-                canvas.line(path[k], path[k + 1], shade, width)
+            if np.isfinite(paths[:, robot]).all():
+                canvas.outline(paths[:, robot], colour, width, closed=False)
+
+    def _fade_onto(
+        self,
+        page: pygame.Surface,
+        canvas: Canvas,
+        trail: Array,
+        time: Array,
+        colours: list[Colour],
+        width: int,
+    ) -> None:
+        rows = np.unique(np.linspace(0, len(trail) - 1, 4 * FADE_STEPS + 1).astype(int))
+        points = bounded(canvas.camera.to_pixels(trail[rows]))
+        age = np.clip((time[-1] - time[rows]) / max(self.fade or 0.0, 1e-9), 0.0, 1.0)
+        for first in range(0, len(rows) - 1, 4):
+            last = min(first + 4, len(rows) - 1)
+            part = 1.0 - age[first : last + 1].mean()
+            for robot, colour in enumerate(colours):
+                path = points[first : last + 1, robot]
+                if not np.isfinite(path).all() or np.ptp(path, axis=0).max() < 0.5:
+                    continue
+                shade = mix(canvas.theme.background, colour, 0.1 + 0.9 * part)
+                pygame.draw.lines(page, shade, False, path.tolist(), width)
 
     def _of_robots(self, canvas: Canvas) -> list[Colour]:
         theme, n = canvas.theme, len(canvas.hues)
@@ -148,3 +196,13 @@ class Trajectories(Layer):
                 sketch.onto(canvas.surface)
 
         return [LegendEntry("trajectory", glyph, self.colours)] if scene.trail is not None else []
+
+
+def _same(row: Array, other: Array) -> bool:
+    return row.shape == other.shape and np.array_equal(row, other, equal_nan=True)
+
+
+def _same_rows(rows: Array, other: Array) -> Array:
+    if rows.shape[1:] != other.shape:
+        return np.zeros(len(rows), dtype=bool)
+    return np.asarray(((rows == other) | (np.isnan(rows) & np.isnan(other))).all(axis=(1, 2)))

@@ -1,0 +1,105 @@
+"""The interactive window, used for some seconds with its live cost, without a display."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import pygame
+
+from robocov.mapfile import load_map
+from robocov_app.bench.measure import Case, Parameters, Row
+from robocov_app.demo.costs import LATTICE, WorkerCosts
+from robocov_app.demo.desk import Desk
+from robocov_app.demo.opening import display
+from robocov_app.demo.scenario import Law, Limits, Scenario
+from robocov_app.demo.session import Session
+from robocov_app.demo.window import FPS, Window
+from robocov_app.view.picture import standard_layers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SIZE = (1280, 720)
+
+DRAWING_GOAL = {50: 4e-3}
+"""Wanted seconds for the drawing of a frame, by number of robots."""
+
+FRAME_GOALS = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30}
+"""Wanted seconds for everything that a frame takes."""
+
+LONGEST = 50e-3
+"""Seconds that no frame may exceed."""
+
+_CROWD = 100
+"""From so many robots on they are smaller, so that there is room for them."""
+
+
+def cases(*, quick: bool = False) -> list[Case]:
+    """Return a case for each size of a team."""
+    return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200)]
+
+
+def _used(n: int, seconds: float) -> Iterator[Row]:
+    limits = Limits(radius=0.05) if n >= _CROWD else Limits()
+    start = "uniform" if n > 10 else None
+    session = Session(Scenario(load_map("rooms"), (Law("rapf"),), n, start, limits=limits))
+    with display(headless=True):
+        shown = {layer.name for layer in standard_layers() if layer.default}
+        desk = Desk(session, WorkerCosts(LATTICE), shown, Path(), "rooms")
+        window = Window(desk, SIZE, 1.0)
+        try:
+            frames, drawing, answers = _played(window, seconds)
+        finally:
+            desk.costs.close()
+        bare = _bare(len(frames))
+    size: Parameters = {"robots": n}
+    yardstick = "clear and flip", bare
+    note = f"{answers / seconds:.0f} costs a second"
+    yield Row(
+        "window", "all of a frame", size, median(frames), *yardstick, goal_seconds=FRAME_GOALS[n], note=note
+    )
+    yield Row("window", "drawing", size, median(drawing), *yardstick, goal_seconds=DRAWING_GOAL.get(n))
+    longest = f"of {len(frames)} frames"
+    yield Row("window", "the longest", size, max(frames), *yardstick, goal_seconds=LONGEST, note=longest)
+
+
+def _played(window: Window, seconds: float) -> tuple[list[float], list[float], int]:
+    """Return what each frame took, what its drawing took, and how many costs were answered."""
+    clock = pygame.time.Clock()
+    frames: list[float] = []
+    drawing: list[float] = []
+    # the first moments prepare the map's cost and draw all that is kept afterwards
+    for _ in range(FPS):
+        window.frame(clock.tick(FPS) / 1000.0)
+    curve = window.desk.lane.curve
+    known = len(curve)
+    began = before = perf_counter()
+    while perf_counter() - began < seconds:
+        now = perf_counter()
+        window.advance(now - before)
+        before, drawn = now, perf_counter()
+        window.draw()
+        done = perf_counter()
+        frames.append(done - now)
+        drawing.append(done - drawn)
+        clock.tick(FPS)
+    return frames, drawing, len(curve) - known
+
+
+def _bare(rounds: int) -> float:
+    """Return what filling, copying and flipping an empty window takes."""
+    screen = pygame.display.get_surface()
+    assert screen is not None
+    empty = pygame.Surface(SIZE)
+    taken = []
+    for _ in range(rounds):
+        began = perf_counter()
+        empty.fill((255, 255, 255))
+        screen.blit(empty, (0, 0))
+        pygame.display.flip()
+        taken.append(perf_counter() - began)
+    return median(taken)

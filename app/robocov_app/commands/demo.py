@@ -1,0 +1,193 @@
+"""``robocov demo``: the interactive window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from robocov.errors import ParameterError
+from robocov_app.options import in_range, parsed_gains, parsed_size
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov_app.demo.opening import Opening
+    from robocov_app.demo.session import Session
+    from robocov_app.recording import Frame
+
+
+@dataclass
+class Arguments:
+    """The interactive window: watch a team cover a map, touch it, compare controllers, go back in time.
+
+    Everything has a key: press F1. Settings of the look are remembered.
+
+    Example: robocov demo museum --controllers rapf rpf lloyd --robots 8
+    """
+
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
+    """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
+    controllers: tuple[str, ...] = ("rapf",)
+    """Up to four, side by side: names, or mine.py:MyController."""
+    gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
+    """Gains of the first controller, as in --set k_rep=0.3."""
+    robots: int = 6
+    """Number of robots."""
+    start: str | None = None
+    """Named start of the map; the map's first by default."""
+    seed: int = 0
+    """Seed of the starting positions."""
+    dt: float = 1 / 60
+    """Control period in seconds."""
+    radius: float = 0.1
+    """Radius of a robot in metres."""
+    speed: float = 1.0
+    """Simulated seconds per second at the beginning."""
+    paused: bool = False
+    """Begin paused."""
+    tour: bool = False
+    """Play the guided tour of three minutes."""
+    theme: Literal["light", "dark"] | None = None
+    """Colours; by default those of the last time."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size of the window in pixels; by default that of the last time."""
+    scale: float | None = None
+    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
+    lattice: int = 128
+    """The live coverage cost is evaluated on a lattice of N x N sites."""
+    show: tuple[str, ...] = ()
+    """Layers to show besides the usual ones: distances, scan, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers not to show."""
+    folder: Path = Path()
+    """Where screenshots, films, runs and maps are saved."""
+    frames: int | None = None
+    """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
+    out: Path | None = None
+    """Folder for these frames: 000000.png, 000001.png, ..."""
+    video: Path | None = None
+    """Render the window without a display to this film; with --tour, all of the tour."""
+
+    def __post_init__(self) -> None:
+        in_range("--robots", self.robots, 1, 1000)
+        in_range("--seed", self.seed, 0, 2**63 - 1)
+        in_range("--lattice", self.lattice, 2, 1024)
+        in_range("--speed", self.speed, 0.01, 1000.0)
+        if self.scale is not None:
+            in_range("--scale", self.scale, 0.5, 4.0)
+        if self.frames is not None:
+            in_range("--frames", self.frames, 1, 1_000_000)
+        if not 1 <= len(self.controllers) <= 4:
+            raise ParameterError(f"--controllers: {len(self.controllers)}, but 1 to 4 were wanted")
+        if self.out is not None and self.frames is None:
+            raise ParameterError("--out: nothing to write there; --frames N was wanted beside it")
+        if self.frames is not None and self.out is None and self.video is None:
+            raise ParameterError("--frames: --out DIR or --video FILE was wanted beside it")
+        if self.video is not None and self.frames is None and not self.tour:
+            raise ParameterError("--video: --frames N or --tour was wanted beside it")
+        if self.video is not None and self.video.suffix.lower() != ".mp4":
+            raise ParameterError(f"--video: {str(self.video)!r}, but a name ending in .mp4 was wanted")
+        self.pixels()
+
+    @property
+    def headless(self) -> bool:
+        """Whether no display is wanted."""
+        return self.frames is not None or self.video is not None
+
+    def pixels(self) -> tuple[int, int] | None:
+        """Return the size that was asked for, None when none was."""
+        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
+
+
+def command(options: Arguments) -> int:
+    """Open the window, or render it."""
+    from robocov_app.demo.opening import Opening
+    from robocov_app.view.picture import checked_layers
+
+    session = session_of(options)
+    opening = Opening(
+        session,
+        options.map,
+        options.folder,
+        theme=options.theme,
+        size=options.pixels(),
+        scale=options.scale,
+        also=checked_layers("--show", options.show),
+        without=checked_layers("--hide", options.hide),
+        headless=options.headless,
+        laws=options.controllers,
+        lattice=options.lattice,
+    )
+    if options.headless:
+        return rendered(opening, options)
+    with opening.window() as window:
+        if options.tour:
+            window.do("tour")
+        window.run()
+    return 0
+
+
+def session_of(options: Arguments) -> Session:
+    """Return the session that the options describe."""
+    from robocov.mapfile import load_map
+    from robocov_app.demo.scenario import Law, Limits, Scenario
+    from robocov_app.demo.session import Session
+
+    laws = tuple(Law(name) for name in options.controllers)
+    laws = (Law(options.controllers[0], parsed_gains(options.gains)), *laws[1:])
+    scenario = Scenario(
+        load_map(options.map),
+        laws,
+        options.robots,
+        options.start,
+        options.seed,
+        Limits(radius=options.radius),
+        options.dt,
+    )
+    session = Session(scenario)
+    session.clock.speed = options.speed
+    session.playing = not options.paused
+    return session
+
+
+def rendered(opening: Opening, options: Arguments) -> int:
+    """Render frames of the window without a display."""
+    from robocov_app.demo.film import pixels
+    from robocov_app.demo.opening import HEADLESS_FPS
+    from robocov_app.interruption import Interruption
+    from robocov_app.output import prepared
+    from robocov_app.progress import progress
+    from robocov_app.recording import kept_frames, save_film, save_frames
+
+    if options.out is not None:
+        prepared(options.out, overwrite=False)
+    with opening.window() as window, Interruption() as stop:
+        if options.tour:
+            window.do("tour")
+        count = options.frames
+        if count is None:
+            assert window.tour is not None
+            count = round(window.tour.seconds * HEADLESS_FPS)
+        with progress("frames", count) as update:
+
+            def frames() -> Iterator[Frame]:
+                for done in range(count):
+                    if stop.requested:
+                        return
+                    window.frame(1.0 / HEADLESS_FPS)
+                    yield pixels(window.screen)
+                    update(done + 1)
+
+            if options.video is not None:
+                shown = frames() if options.out is None else kept_frames(options.out, frames())
+                save_film(options.video, shown, fps=HEADLESS_FPS)
+            else:
+                assert options.out is not None
+                save_frames(options.out, frames())
+    for target in (options.out, options.video):
+        if target is not None:
+            print(f"saved {target}")
+    return 130 if stop.requested else 0

@@ -1,0 +1,82 @@
+"""The clock: how many steps of the simulation are due, at any speed, without ever holding a frame up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
+"""Simulated seconds per second; infinite for as fast as it goes."""
+
+LONGEST_FRAME = 0.1
+"""What a frame took beyond so many seconds is not made up for."""
+
+_PATIENT = 16.0
+"""Where no time runs out, "as fast as it goes" is a speed like any other: this one."""
+
+
+def speed_words(speed: float) -> str:
+    """Return a speed as people write it.
+
+    >>> [speed_words(s) for s in SPEEDS[2:4]], speed_words(math.inf)
+    (['0.5×', '1×'], 'max')
+    """
+    return "max" if math.isinf(speed) else f"{speed:g}×"
+
+
+@dataclass
+class Clock:
+    """Turns seconds that have passed into steps.
+
+    Attributes
+    ----------
+    dt : float, s
+        Control period.
+    speed : float
+        Simulated seconds per second.
+    budget : float, s
+        So long the steps of one frame may take, infinite to make them all whatever they take.
+    behind : bool
+        Whether the last frame's steps were more than its budget.
+    """
+
+    dt: float
+    speed: float = 1.0
+    budget: float = 0.008
+    behind: bool = False
+    _due: float = 0.0
+
+    def advance(self, seconds: float, step: Callable[[], bool]) -> int:
+        """Make the steps that are due after so many seconds; return how many were made.
+
+        `step` makes one and says whether to go on. What does not fit into the budget is dropped: the run
+        becomes slower, the window does not.
+        """
+        speed = _PATIENT if math.isinf(self.speed) and math.isinf(self.budget) else self.speed
+        wanted = math.inf
+        if math.isfinite(speed):
+            self._due += min(seconds, LONGEST_FRAME) * speed
+            wanted = math.floor(self._due / self.dt + 1e-9)
+        began, made = perf_counter(), 0
+        self.behind = False
+        while made < wanted:
+            made += 1
+            try:
+                go_on = step()
+            except BaseException:
+                self._due = 0.0
+                raise
+            if not go_on:
+                self._due = 0.0
+                return made
+            if perf_counter() - began > self.budget:
+                self.behind = math.isfinite(wanted) and made < wanted
+                break
+        if math.isfinite(wanted):
+            self._due = 0.0 if self.behind else max(self._due - made * self.dt, 0.0)
+        return made

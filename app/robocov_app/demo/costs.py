@@ -1,0 +1,210 @@
+"""The exact cost of all panes beside the window: asked for in turn, each answer with its own time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from robocov.cost import CoverageCost
+from robocov.errors import RobocovError
+from robocov_app.live.cost_process import path_of
+from robocov_app.live.cost_worker import CostWorker
+from robocov_app.live.messages import Answer, Building, Failed, Question, Ready
+from robocov_app.view.field import Field, FieldLattice
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.cost import CoverageResult
+    from robocov.environment import Environment
+
+LATTICE = 128
+"""Sites along a side."""
+
+_PANES = 1 << 20
+"""More than there will ever be."""
+
+_PATIENCE = 0.5
+"""Seconds after which an answer is not waited for any more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The newest that is known of a pane's cost.
+
+    Attributes
+    ----------
+    time : float, s
+        For which moment.
+    result : CoverageResult
+    path : (w, 2) m or None
+        From the cursor to its nearest robot.
+    """
+
+    time: float
+    result: CoverageResult
+    path: Array | None
+    sites: FieldLattice
+
+    @cached_property
+    def field(self) -> Field:
+        """The distances as layers want them; made only where one is shown."""
+        return Field(self.sites, self.result)
+
+
+class Costs(Protocol):
+    """Where the window has its costs from."""
+
+    known: dict[int, Known]
+    """By pane; of the map as it is."""
+
+    state: str
+    """What is to be said about a map that is not ready yet, or why there is no cost; else empty."""
+
+    def environment(self, environment: Environment) -> None:
+        """Take another map from now on."""
+
+    def forget(self) -> None:
+        """Leave out what has been asked and is not yet answered: it was of another run."""
+
+    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
+        """Ask for the cost of (n, 2) m positions, and for a path from a point."""
+
+    def poll(self) -> list[tuple[int, Known]]:
+        """Return what has been answered since the last call, by pane."""
+
+    def close(self) -> None:
+        """End."""
+
+
+class DirectCosts:
+    """Computes at once, in this process: for pictures that must not depend on the machine's speed.
+
+    Parameters
+    ----------
+    lattice : int
+    """
+
+    def __init__(self, lattice: int = LATTICE) -> None:
+        self.known: dict[int, Known] = {}
+        self.state = ""
+        self._lattice = lattice
+        self._cost: CoverageCost | None = None
+        self._asked: dict[int, Question] = {}
+
+    def environment(self, environment: Environment) -> None:
+        """Take another map from now on."""
+        self.known, self.state, self._cost = {}, "", None
+        try:
+            self._cost = CoverageCost(environment, self._lattice)
+        except RobocovError as error:
+            self.state = f"no cost: {error}"
+            return
+        self._sites = FieldLattice(self._cost.sites)
+
+    def forget(self) -> None:
+        """Leave out what has been asked."""
+        self._asked, self.known = {}, {}
+
+    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
+        """Ask; the answer is there at the next `poll`."""
+        self._asked[pane] = Question(time, np.array(positions), pane, point)
+
+    def poll(self) -> list[tuple[int, Known]]:
+        """Return the answers."""
+        asked, self._asked = self._asked, {}
+        answers = []
+        for pane, question in asked.items():
+            if self._cost is None:
+                continue
+            try:
+                result = self._cost(question.positions)
+            except RobocovError:
+                continue
+            self.known[pane] = Known(question.time, result, path_of(self._cost, question), self._sites)
+            answers.append((pane, self.known[pane]))
+        return answers
+
+    def close(self) -> None:
+        """Nothing is to be ended."""
+
+
+class WorkerCosts:
+    """Has it computed by another process, which is asked about one pane after the other.
+
+    Parameters
+    ----------
+    lattice : int
+    """
+
+    def __init__(self, lattice: int = LATTICE) -> None:
+        self.known: dict[int, Known] = {}
+        self.state = ""
+        self._lattice = lattice
+        self._worker = CostWorker()
+        self._generation = -1
+        self._waiting: dict[int, Question] = {}
+        self._out = -1.0
+        self._ready = False
+        self._run = 0
+        self._sites: FieldLattice | None = None
+
+    def environment(self, environment: Environment) -> None:
+        """Take another map from now on."""
+        self._generation = self._worker.environment(environment, self._lattice)
+        self.known, self._waiting, self._ready, self._out = {}, {}, False, -1.0
+        self.state = "cost: preparing the map"
+
+    def forget(self) -> None:
+        """Leave out what has been asked; answers that are on their way are passed over."""
+        self._waiting, self.known, self._run = {}, {}, self._run + 1
+
+    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
+        """Ask; what was asked about the pane before and is not yet on its way is forgotten.
+
+        It keeps its place among the panes that wait, so that each has its turn.
+        """
+        self._waiting[pane] = Question(time, np.array(positions), pane, point)
+        self._send()
+
+    def poll(self) -> list[tuple[int, Known]]:
+        """Return the answers that have come."""
+        answers = []
+        for event in self._worker.poll():
+            if event.generation != self._generation:
+                continue
+            if isinstance(event, Building):
+                left = f", {event.seconds_left:.0f} s left" if event.seconds_left >= 1.0 else ""
+                self.state = f"cost: preparing the map, {event.fraction:.0%}{left}"
+            elif isinstance(event, Ready):
+                self._ready, self.state = True, ""
+                self._sites = FieldLattice(event.sites)
+            elif isinstance(event, Answer) and self._sites is not None:
+                self._out = -1.0
+                run, pane = divmod(event.topic, _PANES)
+                if run == self._run:
+                    self.known[pane] = Known(event.time, event.result, event.path, self._sites)
+                    answers.append((pane, self.known[pane]))
+            elif isinstance(event, Failed):
+                self._out = -1.0
+                if not self._ready:
+                    self.state = f"no cost: {event.message}"
+        self._send()
+        return answers
+
+    def close(self) -> None:
+        """End the other process."""
+        self._worker.close()
+
+    def _send(self) -> None:
+        now = perf_counter()
+        if not self._waiting or not self._ready or 0.0 <= now - self._out < _PATIENCE:
+            return
+        pane = next(iter(self._waiting))
+        question = self._waiting.pop(pane)
+        topic = self._run * _PANES + pane
+        self._worker.ask(question.time, question.positions, topic, question.point)
+        self._out = now

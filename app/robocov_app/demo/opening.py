@@ -1,0 +1,182 @@
+"""Opening the window: with a display or without, from the command line's options."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.errors import InputError
+from robocov_app.demo.costs import LATTICE, DirectCosts, WorkerCosts
+from robocov_app.demo.desk import Desk
+from robocov_app.demo.settings import Settings, load_settings, save_settings, settings_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from robocov_app.demo.costs import Costs
+    from robocov_app.demo.session import Session
+    from robocov_app.demo.window import Window
+
+NO_DISPLAY = (
+    "no display: the window needs one (over ssh, try ssh -X); "
+    "--frames N --out DIR renders it without, and robocov run needs none"
+)
+
+HEADLESS_FPS = 30
+"""Frames per second of what is rendered without a display."""
+
+
+@contextmanager
+def display(*, headless: bool) -> Iterator[None]:
+    """Start pygame's display, real or not.
+
+    Raises
+    ------
+    InputError
+        When there is none: SDL would silently open a window that nobody sees, and run for ever.
+    """
+    if headless:
+        os.environ["SDL_VIDEODRIVER"] = "dummy"
+    elif sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    ):
+        raise InputError(NO_DISPLAY)
+    import pygame
+
+    try:
+        pygame.display.init()
+    except pygame.error:
+        raise InputError(NO_DISPLAY) from None
+    if not headless and pygame.display.get_driver() in ("offscreen", "dummy", "evdev"):
+        wanted = os.environ.get("SDL_VIDEODRIVER", "")
+        if pygame.display.get_driver() != wanted:
+            pygame.display.quit()
+            raise InputError(NO_DISPLAY)
+    pygame.font.init()
+    pygame.key.set_repeat(350, 40)
+    try:
+        yield
+    finally:
+        pygame.display.quit()
+
+
+def screen_scale() -> float:
+    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
+    import pygame
+
+    sizes = pygame.display.get_desktop_sizes()
+    height = max((size[1] for size in sizes), default=1080)
+    return float(min(max(round(height / 1080 * 4) / 4, 1.0), 3.0))
+
+
+class Opening:
+    """How a window is opened.
+
+    Parameters
+    ----------
+    session : Session
+    map_name : str
+    folder : Path
+        Where things are saved.
+    theme, size, scale
+        None for what was used last.
+    shown : names of layers or None
+    headless : bool
+        Draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes.
+    laws : names of controllers
+        Beside those that are there anyway.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        map_name: str,
+        folder: Path,
+        *,
+        theme: str | None = None,
+        size: tuple[int, int] | None = None,
+        scale: float | None = None,
+        also: frozenset[str] = frozenset(),
+        without: frozenset[str] = frozenset(),
+        headless: bool = False,
+        laws: tuple[str, ...] = (),
+        lattice: int = LATTICE,
+    ) -> None:
+        self.session, self.map_name, self.folder = session, map_name, folder
+        self.theme, self.size, self.scale = theme, size, scale
+        self.also, self.without = also, without
+        self.headless, self.laws, self.lattice = headless, laws, lattice
+
+    @contextmanager
+    def window(self) -> Iterator[Window]:
+        """Give the window; settings are read before and kept afterwards.
+
+        Raises
+        ------
+        InputError
+            When there is no display.
+        """
+        with display(headless=self.headless):
+            from robocov_app.demo.window import Window
+            from robocov_app.view.picture import standard_layers
+
+            file = None if self.headless else settings_file()
+            settings, trouble = load_settings(file)
+            layers = standard_layers()
+            shown = {layer.name for layer in layers if layer.default}
+            if settings.shown is not None:
+                shown = {layer.name for layer in layers} & set(settings.shown)
+            shown = (shown | self.also) - self.without
+            costs: Costs = DirectCosts(self.lattice) if self.headless else WorkerCosts(self.lattice)
+            try:
+                desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
+                desk.theme = self.theme or settings.theme
+                desk.fade = settings.fade
+                desk.say(trouble)
+                if self.headless:
+                    self.session.clock.budget = float("inf")
+                size = self.size or (settings.width, settings.height)
+                scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+                if self.size is None and not self.headless:
+                    size = fitting(size)
+                window = Window(desk, size, scale, patient=self.headless)
+                window.panel.show_tab(settings.tab)
+                yield window
+                save_settings(settings_of(window, settings, self.scale), file)
+            finally:
+                costs.close()
+
+    def frames(self, window: Window, count: int, each: Callable[[Window], None]) -> None:
+        """Draw `count` frames without a display, and hand each on."""
+        for _ in range(count):
+            window.frame(1.0 / HEADLESS_FPS)
+            each(window)
+
+
+def fitting(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size, or what of it the desktop has room for."""
+    import pygame
+
+    wide, high = max(pygame.display.get_desktop_sizes(), default=size)
+    return min(size[0], wide), min(size[1], high)
+
+
+def settings_of(window: Window, before: Settings, scale: float | None) -> Settings:
+    """Return what is worth remembering of a window."""
+    from robocov_app.demo.panel import TABS
+
+    width, height = window.screen.get_size()
+    changes = {
+        "theme": window.desk.theme,
+        "fade": window.desk.fade,
+        "shown": tuple(sorted(window.desk.shown)),
+        "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
+        "width": min(max(width, 900), 7680),
+        "height": min(max(height, 600), 4320),
+    }
+    if scale is not None:
+        changes["scale"] = scale
+    return before.model_copy(update=changes)

@@ -1,0 +1,155 @@
+"""The mouse: what is pressed, dragged and let go where, and what that means."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.demo.layout import inside
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.demo.arena import Arena
+    from robocov_app.demo.chart import Chart
+    from robocov_app.demo.desk import Desk
+    from robocov_app.demo.panel import Panel
+
+WHEEL = 1.15
+"""How far one notch of the wheel magnifies."""
+
+DOUBLE = 0.35
+"""Seconds between the two clicks of a double click, at most."""
+
+_SLIP = 5.0
+"""Pixels that a click may move."""
+
+
+class Pointer:
+    """Turns events of the mouse into what panel, arena, chart and tools do.
+
+    Parameters
+    ----------
+    desk, arena, chart, panel
+    interrupt : callable
+        Called when something is pressed in the arena: the tour ends.
+    """
+
+    def __init__(
+        self, desk: Desk, arena: Arena, chart: Chart, panel: Panel, interrupt: Callable[[], object]
+    ) -> None:
+        self._desk, self._arena, self._chart, self._panel = desk, arena, chart, panel
+        self._interrupt = interrupt
+        self.at = (0, 0)
+        self._drag = ""
+        self._held = 0
+        self._pressed_at = (0, 0)
+        self._last_click = -1.0, (0, 0)
+
+    @property
+    def dragging(self) -> bool:
+        """Whether a button is held down on something."""
+        return bool(self._drag)
+
+    def take(self, event: pygame.event.Event, now: float) -> None:
+        """Take an event of the mouse at a time in seconds."""
+        layout = self._arena.layout
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        # an open menu may hang over the arena; a slider may be dragged beyond the panel
+        over_panel = inside(layout.panel, self.at) or self._panel.unfolded
+        if not self._drag and (over_panel or event.type in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONUP)):
+            self._panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif over_panel and not self._drag:
+            self._desk.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.stop_typing()
+            self._pressed(event, now)
+        elif event.type == pygame.MOUSEWHEEL and self._arena.pane_at(self.at) is not None:
+            amount = getattr(event, "precise_y", event.y) or event.y
+            self._arena.zoom(WHEEL ** float(np.clip(amount, -5, 5)), self.at)
+
+    def leave(self) -> None:
+        """The cursor is not in the window any more."""
+        self._desk.cursor = None
+
+    def _pressed(self, event: pygame.event.Event, now: float) -> None:
+        desk, layout = self._desk, self._arena.layout
+        if self._drag:  # a second button while the first is held
+            return
+        pane = self._arena.pane_at(event.pos)
+        self._pressed_at = event.pos
+        if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
+            if event.button == 1:
+                self._interrupt()
+                self._drag = "time"
+                desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
+            return
+        if pane is None or event.button not in (1, 2, 3):
+            return
+        if event.button != 1:
+            self._drag = "pan"
+            return
+        self._interrupt()
+        pane = min(pane, len(desk.session.lanes) - 1)
+        if desk.active != pane:
+            desk.active = pane
+            desk.version += 1
+        then, where = self._last_click
+        double = now - then < DOUBLE and _far(where, event.pos) < _SLIP
+        self._last_click = now, event.pos
+        if double and desk.tool.name in ("polygon", "wall"):
+            desk.attempt(lambda: desk.tool.finish(desk.session))
+            return
+        point = self._arena.to_world(event.pos, pane)
+        number, reach = self._arena.robot_at(event.pos, pane), self._arena.reach(pane)
+        desk.attempt(lambda: desk.tool.press(desk.session, point, reach, number))
+        if desk.tool is desk.hand and number is not None:
+            self._panel.show_tab("robot")
+        self._drag = "pan" if desk.tool is desk.hand and not desk.hand.holds else "tool"
+        self._held = pane
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        desk = self._desk
+        pane = self._arena.pane_at(event.pos)
+        over = inside(self._arena.layout.panel, event.pos)
+        desk.cursor = self._arena.to_world(event.pos, pane) if pane is not None and not over else None
+        self._chart.hover = event.pos if not self._drag else None
+        if self._drag == "time":
+            time = self._chart.time_at(event.pos[0])
+            desk.attempt(lambda: desk.look_at(time))
+        elif self._drag == "pan":
+            self._arena.pan(*event.rel)
+        elif self._drag == "tool":
+            point = self._arena.to_world(event.pos, self._pane())
+            desk.attempt(lambda: desk.tool.move(desk.session, point))
+        elif desk.cursor is not None:
+            desk.tool.move(desk.session, desk.cursor)
+
+    def _released(self, event: pygame.event.Event) -> None:
+        desk, drag = self._desk, self._drag
+        if drag == "tool" and event.button != 1:
+            return
+        self._drag = ""
+        clicked = _far(event.pos, self._pressed_at) < _SLIP
+        if drag == "tool":
+            point = self._arena.to_world(event.pos, self._pane())
+            desk.attempt(lambda: desk.tool.release(desk.session, point))
+        elif drag == "pan" and clicked and event.button == 3:
+            desk.attempt(lambda: desk.tool.finish(desk.session))
+        elif drag == "pan" and clicked and desk.tool is desk.hand:
+            desk.hand.selected = None
+            desk.version += 1
+
+    def _pane(self) -> int:
+        return min(self._held, len(self._arena.layout.panes) - 1)
+
+
+def _far(a: tuple[int, int], b: tuple[int, int]) -> float:
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -1,0 +1,64 @@
+"""What the window remembers from one time to the next, in the user's folder for settings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from robocov.atomic import written
+from robocov.errors import OutputError
+
+FOLDER = "ROBOCOV_SETTINGS"
+"""Environment variable with another folder for the settings; empty for none."""
+
+
+class Settings(BaseModel):
+    """How the window looks, not what happens in it."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    theme: Literal["light", "dark"] = "light"
+    scale: float | None = Field(default=None, ge=0.5, le=4.0)
+    width: int = Field(default=1280, ge=900, le=7680)
+    height: int = Field(default=720, ge=600, le=4320)
+    shown: tuple[str, ...] | None = None
+    tab: str = "parameters"
+    fade: bool = False
+
+
+def settings_file() -> Path | None:
+    """Return where the settings are kept, None where they are not to be."""
+    named = os.environ.get(FOLDER)
+    if named is not None:
+        return Path(named) / "window.json" if named else None
+    from platformdirs import user_config_path
+
+    return user_config_path("robocov", appauthor=False) / "window.json"
+
+
+def load_settings(file: Path | None) -> tuple[Settings, str]:
+    """Return the settings, and what to tell if they could not be read: the defaults are used then."""
+    if file is None:
+        return Settings(), ""
+    try:
+        return Settings.model_validate_json(file.read_bytes()), ""
+    except FileNotFoundError:
+        return Settings(), ""
+    except (OSError, ValidationError, ValueError):
+        return Settings(), f"{file} could not be read: default settings"
+
+
+def save_settings(settings: Settings, file: Path | None) -> str:
+    """Write the settings, whole or not at all; return what to tell if that failed."""
+    if file is None:
+        return ""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with written(file) as part:
+            part.write_text(settings.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    except (OSError, OutputError) as error:
+        return f"settings not saved: {error}"
+    return ""

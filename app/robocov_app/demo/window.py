@@ -1,0 +1,433 @@
+"""The window: events in, frames out. What happens between is the desk's and the session's."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov.atomic import written
+from robocov.errors import RobocovError
+from robocov_app.demo.actions import all_actions
+from robocov_app.demo.arena import Arena
+from robocov_app.demo.chart import Chart
+from robocov_app.demo.desk import free_name, plain
+from robocov_app.demo.film import FPS as FILM_FPS
+from robocov_app.demo.film import Film, pixels
+from robocov_app.demo.inspector import Report, explain
+from robocov_app.demo.lane import with_failed
+from robocov_app.demo.layout import SMALLEST, inside, laid_out
+from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_report, draw_tour
+from robocov_app.demo.panel import TABS, Panel
+from robocov_app.demo.pointer import Pointer
+from robocov_app.demo.status import draw_status, facts
+from robocov_app.demo.tour import Tour
+from robocov_app.recording import png_bytes
+from robocov_app.view.picture import standard_layers
+from robocov_app.view.theme import theme_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.demo.desk import Desk
+
+FPS = 60
+"""Frames per second that are aimed at."""
+
+_ASKED_AGAIN = 0.2
+"""Seconds between two looks of the inspector."""
+
+_SELDOM = 0.1
+"""Seconds after which the panel looks at its widgets also while nobody is near."""
+
+_PAN = 60
+"""Pixels that a key pans."""
+
+_GOES_ON_WITH = frozenset({"help", "theme", "screenshot", "film", "panel", "fullscreen", "quit"})
+"""What may be done without ending the tour."""
+
+_OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+
+
+class Window:
+    """Shows a desk and lets it be touched.
+
+    Parameters
+    ----------
+    desk : Desk
+    size : (width, height), px
+    scale : float
+        Of text and lines.
+    patient : bool
+        Nobody watches: films wait for their encoder instead of leaving frames out.
+    """
+
+    def __init__(self, desk: Desk, size: tuple[int, int], scale: float, *, patient: bool = False) -> None:
+        self.desk = desk
+        self.scale = scale
+        self.closed = False
+        self.help = False
+        self.tour: Tour | None = None
+        self.film: Film | None = None
+        self.titles = {layer.name: layer.title for layer in standard_layers()}
+        self.screen = pygame.display.set_mode(size, pygame.RESIZABLE)
+        pygame.display.set_caption("robocov")
+        with suppress(AttributeError, pygame.error), warnings.catch_warnings():
+            # pygame-ce has no other way yet to give a window of the display module a least size
+            warnings.simplefilter("ignore", DeprecationWarning)
+            pygame.Window.from_display_module().minimum_size = SMALLEST
+        self.arena = Arena(desk, theme_named(desk.theme))
+        self.chart = Chart(desk)
+        self.panel = Panel(desk, self.titles, self.do)
+        self.palette = Palette(desk, self.titles)
+        self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
+        self._patient = patient
+        self._keys = {key: action.name for action in all_actions(self.titles) for key in action.keys}
+        self._own = self._what_to_do()
+        self._arranged: tuple[object, ...] | None = None
+        self._report: Report | None = None
+        self._report_at = 0.0
+        self._now = 0.0
+        self._rate = float(FPS)
+        self._steps_rate = 0.0
+        self._serial = -1
+        self._unseen = 0.0
+        self._arrange()
+
+    # frames
+
+    def run(self) -> None:
+        """Go on until the window is closed."""
+        clock = pygame.time.Clock()
+        before = perf_counter()
+        try:
+            while not self.closed:
+                now = perf_counter()
+                self.frame(now - before)
+                before = now
+                clock.tick(FPS)
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End what is going on beside the window."""
+        if self.film is not None:
+            self.desk.attempt(self.toggle_film)
+        self.desk.costs.close()
+
+    def frame(self, seconds: float) -> None:
+        """Take what has happened, let so many seconds pass, and draw."""
+        self.advance(seconds)
+        if not self.closed:
+            self.draw()
+            if self.film is not None:
+                self.film.add(self.screen, seconds)
+
+    def advance(self, seconds: float) -> None:
+        """Take what has happened, and let so many seconds pass."""
+        for event in pygame.event.get():
+            self.take(event)
+        if self.closed:
+            return
+        self._now += seconds
+        if seconds > 0:
+            self._rate += 0.05 * (min(1.0 / seconds, 1000.0) - self._rate)
+        self._pass_time(seconds)
+        self._ask_costs()
+        self._arrange()
+        self._update_panel(seconds)
+
+    def _pass_time(self, seconds: float) -> None:
+        desk, session = self.desk, self.desk.session
+        desk.pass_time(seconds)
+        if self.tour is not None:
+            self.tour.advance(seconds)
+            if self.tour.done:
+                self.tour = None
+        playing = session.playing
+        try:
+            steps = session.advance(seconds)
+            for lane in session.lanes:
+                session.snapshot(lane)  # what is decided belongs to the simulation, not to drawing
+        except RobocovError as error:
+            steps = 0
+            desk.say(plain(str(error)), trouble=True)
+        if session.playing != playing:
+            desk.version += 1
+            if session.settled:
+                desk.say(f"settled at {session.time:.1f} s")
+        if seconds > 0:
+            self._steps_rate += 0.1 * (steps / seconds - self._steps_rate)
+        desk.look_at_map()
+
+    def _ask_costs(self) -> None:
+        """Ask for the cost of what is shown, and note the answers that tell of the present."""
+        desk, session = self.desk, self.desk.session
+        if session.serial != self._serial:
+            self._serial = session.serial
+            desk.costs.forget()
+        point = None
+        if "path" in desk.shown and desk.cursor is not None:
+            point = np.array(desk.cursor)
+        for lane in session.lanes:
+            positions = session.positions(lane)
+            known = desk.costs.known.get(lane.number)
+            if (
+                known is not None
+                and point is None
+                and abs(known.time - session.time) < 1e-9
+                and np.array_equal(known.result.positions, positions)
+            ):
+                continue
+            desk.costs.ask(lane.number, session.time, positions, point)
+        for pane, known in desk.costs.poll():
+            for lane in session.lanes:
+                if lane.number == pane and known.time <= lane.time + 1e-9:
+                    lane.curve.add(known.time, known.result.mean_distance)
+
+    def _arrange(self) -> None:
+        """Lay the window out anew when its size, look or number of panes is another."""
+        desk, session = self.desk, self.desk.session
+        size = self.screen.get_size()
+        panes = len(session.lanes)
+        rows = self.arena.shared_rows() if panes > 1 and self._arranged else 1
+        low_x, low_y, high_x, high_y = session.environment.region.bounds
+        aspect = (high_x - low_x) / (high_y - low_y)
+        outer = (size, self.scale, desk.panel, desk.theme)
+        key = (outer, panes, round(aspect, 3), max(rows, 1))
+        if key == self._arranged:
+            return
+        before, self._arranged = self._arranged, key
+        theme = theme_named(desk.theme)
+        layout = laid_out(size, self.scale, panes, aspect, panel=desk.panel, legend_rows=max(rows, 1))
+        self.layout, self.theme = layout, theme
+        self.arena.arrange(layout, theme)
+        self.chart.arrange(layout, theme)
+        if before is None or outer != before[0]:
+            self.panel.arrange(layout, theme)
+
+    def _update_panel(self, seconds: float) -> None:
+        """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
+        self._unseen += seconds
+        self.panel.covered = self.tour is not None
+        near = inside(self.layout.panel, self.pointer.at) or self.panel.busy
+        if near or self._unseen >= _SELDOM:
+            self.panel.update(self._unseen)
+            self._unseen = 0.0
+
+    def draw(self) -> None:
+        """Draw everything, and show it."""
+        layout, theme, desk = self.layout, self.theme, self.desk
+        if len(layout.panes) > 1:
+            self.screen.fill(theme.background, pygame.Rect(layout.arena))
+        self.arena.draw(self.screen)
+        self.chart.draw(self.screen)
+        filmed = None if self.film is None else self.film.frames / FILM_FPS
+        draw_status(self.screen, layout, theme, facts(desk, self._rate, self._steps_rate, filmed))
+        if layout.panel[2] and self.tour is not None:
+            draw_tour(self.screen, layout, theme, self.tour)
+        elif layout.panel[2]:
+            self.panel.draw(self.screen)
+            if self.panel.tab == "robot":
+                self._inspect()
+                draw_report(self.screen, self.panel.body, theme, layout.scale, self._report)
+                self.panel.draw_over(self.screen)
+        if self.tour is not None and not layout.panel[2]:
+            draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
+        draw_message(self.screen, desk, layout, theme)
+        if self.help:
+            draw_help(self.screen, layout, theme, self.titles)
+        elif self.palette.open:
+            self.palette.draw(self.screen, layout, theme)
+        pygame.display.flip()
+
+    def _inspect(self) -> None:
+        """Let the inspector explain the robot that is asked, a few times a second."""
+        number = self.desk.selected
+        if number is None:
+            self._report = None
+        elif self._report is None or not 0.0 <= self._now - self._report_at < _ASKED_AGAIN:
+            self._report_at = self._now
+            self._report = report_on(self.desk, number)
+
+    # doing
+
+    def do(self, name: str) -> None:
+        """Do the action of this name."""
+        if self.tour is not None and name in ("back", "forward"):
+            self.tour.skip(1 if name == "forward" else -1)
+            return
+        if name not in _GOES_ON_WITH and self._end_tour() and name in ("cancel", "tour"):
+            return
+        if name == "cancel" and (self.help or self.palette.open):
+            self.help = self.palette.open = False
+            return
+        if name in self._own:
+            self.desk.attempt(self._own[name])
+        else:
+            self.desk.do(name)
+        self._report = None
+        if name in ("robot:next", "robot:previous"):
+            self.panel.show_tab("robot")
+
+    def _what_to_do(self) -> dict[str, Callable[[], object]]:
+        return {
+            "fit": self.arena.fit,
+            "zoom:in": lambda: self.arena.zoom(1.25, self._middle()),
+            "zoom:out": lambda: self.arena.zoom(0.8, self._middle()),
+            "pan:left": lambda: self.arena.pan(_PAN, 0),
+            "pan:right": lambda: self.arena.pan(-_PAN, 0),
+            "pan:up": lambda: self.arena.pan(0, _PAN),
+            "pan:down": lambda: self.arena.pan(0, -_PAN),
+            "tab": self._next_tab,
+            "fullscreen": self._fullscreen,
+            "screenshot": self.screenshot,
+            "film": self.toggle_film,
+            "help": self._toggle_help,
+            "palette": self.palette.show,
+            "tour": self._start_tour,
+            "save:run": self._save_run,
+            "quit": self._quit,
+        }
+
+    def _end_tour(self) -> bool:
+        if self.tour is None:
+            return False
+        self.tour.end()
+        self.tour = None
+        self.desk.say("the tour has ended")
+        return True
+
+    def _middle(self) -> tuple[float, float]:
+        if self.arena.pane_at(self.pointer.at) is not None:
+            return self.pointer.at
+        left, top, width, height = self.layout.panes[0]
+        return left + width / 2, top + height / 2
+
+    def _next_tab(self) -> None:
+        self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
+
+    def _fullscreen(self) -> None:
+        pygame.display.toggle_fullscreen()
+        self.screen = pygame.display.get_surface() or self.screen
+
+    def _toggle_help(self) -> None:
+        self.help = not self.help
+
+    def _quit(self) -> None:
+        self.closed = True
+
+    def _start_tour(self) -> None:
+        self.tour = Tour(self.desk, self.arena.fit)
+
+    def _save_run(self) -> str:
+        from robocov_app.demo.keeping import save_run
+
+        return save_run(self.desk)
+
+    def screenshot(self) -> str:
+        """Save what is in the window as a PNG."""
+        target = free_name(self.desk.folder, "robocov", ".png")
+        with written(target) as part:
+            part.write_bytes(png_bytes(pixels(self.screen)))
+        return f"screenshot saved: {target}"
+
+    def toggle_film(self) -> str:
+        """Begin to record what is in the window, or end it."""
+        if self.film is None:
+            target = free_name(self.desk.folder, "robocov", ".mp4")
+            self.film = Film(target, self.screen.get_size(), patient=self._patient)
+            self.desk.filming = True
+            return f"recording {target}; F9 ends it"
+        film, self.film = self.film, None
+        self.desk.filming = False
+        film.close()
+        left_out = f", {film.left_out} frames left out" if film.left_out else ""
+        return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
+
+    # events
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take one event."""
+        if event.type == pygame.QUIT:
+            self.closed = True
+        elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+            self.screen = pygame.display.get_surface() or self.screen
+        elif event.type == pygame.KEYDOWN:
+            self._key(event)
+        elif event.type == pygame.TEXTINPUT and self.palette.open:
+            self.palette.type(event.text)
+        elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
+            self.help = self.palette.open = False
+        elif event.type in _OF_THE_MOUSE:
+            self.pointer.take(event, self._now)
+        elif event.type == pygame.WINDOWLEAVE:
+            self.pointer.leave()
+        else:
+            self.panel.take(event)
+
+    def _key(self, event: pygame.event.Event) -> None:
+        if self.palette.open:
+            self._palette_key(event)
+            return
+        if self.panel.typing and event.key not in (pygame.K_F1, pygame.K_F9, pygame.K_F12):
+            if event.key == pygame.K_ESCAPE:
+                self.panel.stop_typing()
+            else:
+                self.panel.take(event)
+            return
+        name = self._keys.get(key_of(event))
+        if name is not None:
+            self.do(name)
+
+    def _palette_key(self, event: pygame.event.Event) -> None:
+        palette = self.palette
+        if event.key == pygame.K_ESCAPE:
+            palette.open = False
+        elif event.key == pygame.K_BACKSPACE:
+            palette.erase()
+        elif event.key in (pygame.K_UP, pygame.K_DOWN):
+            palette.move(1 if event.key == pygame.K_DOWN else -1)
+        elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
+            palette.open = False
+            if palette.is_command():
+                self.desk.attempt(lambda: self.desk.command(palette.text))
+            elif palette.found:
+                self.do(palette.found[palette.chosen].name)
+
+
+def key_of(event: pygame.event.Event) -> str:
+    """Return what a pressed key is called in the list of actions."""
+    name = pygame.key.name(event.key)
+    if name.startswith("[") and name.endswith("]") and len(name) > 2:
+        name = name[1:-1]  # of the key pad
+    parts = []
+    if event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META):
+        parts.append("ctrl")
+    if event.mod & pygame.KMOD_ALT:
+        parts.append("alt")
+    if event.mod & pygame.KMOD_SHIFT:
+        parts.append("shift")
+    return "+".join([*parts, name])
+
+
+def report_on(desk: Desk, number: int) -> Report:
+    """Return what the inspector says of a robot of the chosen pane."""
+    session, lane = desk.session, desk.lane
+    circumstances = session.circumstances(lane)
+    if number in circumstances.failed:
+        x, y = circumstances.failed[number]
+        verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
+        return Report(f"Robot {number}", verdict, ())
+    return explain(
+        session.snapshot(lane),
+        circumstances.limits.team(len(circumstances.numbers)),
+        with_failed(circumstances),
+        circumstances.numbers.index(number),
+        names=circumstances.numbers,
+        recent=session.recent(lane, number),
+    )
