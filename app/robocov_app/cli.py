@@ -22,6 +22,7 @@ COMMANDS = {
     "demo": ("demo", "the interactive window: watch, touch, compare, go back in time"),
     "run": ("run", "one headless run, everything saved in a folder: record, cost, pictures, film"),
     "compare": ("compare", "several controllers from the same starts, side by side"),
+    "replay": ("replay", "a saved run or comparison again: in the window, or as frames and a film"),
     "check": ("check", "validate maps; area, free area, components, narrowest gap"),
     "maps": ("maps", "list the bundled maps"),
     "controllers": ("controllers", "list the controllers and their gains"),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robocov.cost import CoverageCost
     from robocov_app.interruption import Interruption
     from robocov_app.options import RunOptions
+    from robocov_app.panes import Shown
     from robocov_app.plot_coverage import Moment
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
@@ -131,16 +132,27 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
 
 
 def save_comparison_moving(
-    runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions, stop: Interruption
+    runs: Mapping[str, Run],
+    cost: CoverageCost | None,
+    folder: Path,
+    options: RunOptions,
+    stop: Interruption,
 ) -> None:
     """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
-    from robocov_app.panes import comparison_frames, pane_layout
-    from robocov_app.recording import frame_rows
-
-    records = [run.record for run in runs.values()]
     if not (options.frames or options.video):
         return
     shown = shown_in_films(list(runs.values()), cost, options)
+    save_panes_moving(list(runs.values()), shown, folder, options, stop)
+
+
+def save_panes_moving(
+    runs: Sequence[Run], shown: Shown, folder: Path, options: RunOptions, stop: Interruption
+) -> None:
+    """Write ``frames/`` and ``comparison.mp4`` of runs side by side, with what is to be shown."""
+    from robocov_app.panes import comparison_frames, pane_layout
+    from robocov_app.recording import frame_rows
+
+    records = [run.record for run in runs]
     layout = pane_layout(records, options.theme, options.colours, options.picture_size(), shown)
     longest = max(records, key=len)
     total = len(frame_rows(longest.time, options.fps, options.film_speed, FILM_HOLD))
@@ -149,7 +161,7 @@ def save_comparison_moving(
         "comparison.mp4",
         lambda: comparison_frames(
             records,
-            [(run.history.time, run.history.mean_distance) for run in runs.values()],
+            [(run.history.time, run.history.mean_distance) for run in runs],
             layout,
             theme=options.theme,
             colours=options.colours,

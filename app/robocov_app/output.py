@@ -21,6 +21,7 @@ _OF_A_COMPARISON = (
     *("comparison.json", "comparison.csv", "comparison.mp4"),
     *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
 )
+_OF_A_REPLAY = ("replay.json", "run.mp4", "comparison.mp4")
 """Files that a result consists of, beside ``frames/`` and the folders of a comparison's runs."""
 
 
@@ -89,8 +90,9 @@ def cleared(folder: Path) -> Path:
 
 
 def _holds_result(folder: Path) -> bool:
-    return _content(folder / "run.json", "robocov-run") is not None or (
-        _content(folder / "comparison.json", "robocov-comparison") is not None
+    return any(
+        _content(folder / f"{kind}.json", f"robocov-{kind}") is not None
+        for kind in ("run", "comparison", "replay")
     )
 
 
@@ -104,6 +106,7 @@ def _content(path: Path, kind: str) -> dict[str, Any] | None:
 
 
 def _clear(folder: Path) -> None:
+    files: tuple[str, ...]
     comparison = _content(folder / "comparison.json", "robocov-comparison")
     if comparison is not None:
         for name in comparison.get("folders", ()):
@@ -112,9 +115,14 @@ def _clear(folder: Path) -> None:
                 _clear(part)
                 with suppress(OSError):
                     part.rmdir()
-    elif _content(folder / "run.json", "robocov-run") is None:
+        files = _OF_A_COMPARISON
+    elif _content(folder / "run.json", "robocov-run") is not None:
+        files = _OF_A_RUN
+    elif _content(folder / "replay.json", "robocov-replay") is not None:
+        files = _OF_A_REPLAY
+    else:
         return
-    for name in _OF_A_RUN if comparison is None else _OF_A_COMPARISON:
+    for name in files:
         (folder / name).unlink(missing_ok=True)
     for part in folder.glob(".*.part.*"):  # of a run that was killed
         part.unlink()

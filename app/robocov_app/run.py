@@ -15,7 +15,7 @@ from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.building import FILM_LATTICE, cost_for_pictures
+from robocov_app.building import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.interruption import Interruption
 from robocov_app.output import finite, write_csv
 from robocov_app.progress import progress
@@ -168,18 +168,25 @@ def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOption
 
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
-    """Return the last moments of runs on one map, to be drawn, with what `cost` knows of the map."""
+    """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
+
+    The others are on the same map, but for robots that failed at other places.
+    """
     from robocov_app.plot_coverage import Moment
     from robocov_app.view.field import Field, FieldLattice
 
-    cost = cost_for_pictures(runs[0].record.environment, cost)
+    drawn, moments = runs[0].record.environment, []
+    cost = cost_for_pictures(drawn, cost)
     lattice = FieldLattice(cost.sites)
-    return [
-        Moment.last_of(
-            run.record, Field(lattice, cost(run.record.positions[-1])), float(run.history.mean_distance[-1])
-        )
-        for run in runs
-    ]
+    for run in runs:
+        record = run.record
+        if record.environment != drawn:
+            drawn = record.environment
+            cost = built_cost(drawn, cost.lattice, quiet=True)
+            lattice = FieldLattice(cost.sites)
+        field = Field(lattice, cost(record.positions[-1]))
+        moments.append(Moment.last_of(record, field, float(run.history.mean_distance[-1])))
+    return moments
 
 
 def cost_title(record: Record) -> str:
@@ -232,9 +239,9 @@ def save_moving(
 
 
 def save_run_moving(
-    run: Run, cost: CoverageCost, folder: Path, options: RunOptions, stop: Interruption
+    run: Run, cost: CoverageCost | None, folder: Path, options: RunOptions, stop: Interruption
 ) -> None:
-    """Write ``frames/`` and ``run.mp4`` as the options say."""
+    """Write ``frames/`` and ``run.mp4`` as the options say; for `cost` see `shown_in_films`."""
     from robocov_app.recording import frame_rows
 
     if not (options.frames or options.video):
@@ -263,10 +270,11 @@ def check_layers(options: RunOptions) -> None:
         checked_layers("--hide", options.hide)
 
 
-def shown_in_films(runs: Sequence[Run], cost: CoverageCost, options: RunOptions) -> Shown:
+def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> Shown:
     """Return what films of runs on one map show, all on one scale of colours.
 
     The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
+    Where no `cost` of the map is there, it is made if it is needed.
     """
     from robocov_app.panes import Shown
     from robocov_app.view.field import Fields
@@ -276,7 +284,10 @@ def shown_in_films(runs: Sequence[Run], cost: CoverageCost, options: RunOptions)
     also, without = checked_layers("--show", options.show), checked_layers("--hide", options.hide)
     if not also & {"distances", "geodesic_cells"}:
         return Shown(also, without)
-    cost = cost_for_pictures(runs[0].record.environment, cost, FILM_LATTICE)
+    environment = runs[0].record.environment
+    if cost is None:
+        cost = built_cost(environment, FILM_LATTICE, quiet=options.json)
+    cost = cost_for_pictures(environment, cost, FILM_LATTICE)
     farthest = max(float(reached.max(initial=0.0)) for reached in _reached(runs, cost))
     return Shown(also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from robocov.errors import OutputError
@@ -30,7 +30,8 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
                 os.fsync(file.fileno())
         part.replace(target)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # where the folder is none, there is no part to be removed either
+            part.unlink()
         raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
     except BaseException:
         part.unlink(missing_ok=True)

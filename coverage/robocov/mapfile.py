@@ -63,7 +63,7 @@ def load_map(source: str | Path) -> Environment:
         known = bundled_maps()
         if source in known:
             path = known[source]
-        elif Path(source).is_file():
+        elif _is_file(source):
             path = Path(source)
         else:
             raise MapError(unknown_name("map", source, known))
@@ -167,6 +167,13 @@ def bundled_maps() -> dict[str, Path]:
         if files:
             return {file.stem: file for file in files}
     return {}
+
+
+def _is_file(source: str) -> bool:
+    try:
+        return Path(source).is_file()
+    except OSError:  # as of a name that is longer than any file's
+        return False
 
 
 def _is_name(source: str) -> bool:

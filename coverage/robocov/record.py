@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,6 +53,9 @@ class Record:
         nan where none.
     obstacle_points : (T, n, 2) m
         The nearest obstacle point that each robot sensed, nan where none.
+    session : dict
+        Where the run comes from, if it is a part of a session in the window and was not simply begun and
+        left alone; see `robocov_app.demo.kept`. Empty otherwise.
     """
 
     environment: Environment
@@ -69,6 +72,7 @@ class Record:
     forces: Array
     goals: Array
     obstacle_points: Array
+    session: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -108,6 +112,7 @@ class Record:
             "dt_s": self.dt,
             "duration_s": float(self.time[-1]),
             "lattice": lattice,
+            **({"session": dict(self.session)} if self.session else {}),
             "versions": versions(),
             "summary": dict(summary or {}),
         }
@@ -158,6 +163,7 @@ class Record:
                 start=run["start"],
                 seed=run["seed"],
                 dt=float(run["dt_s"]),
+                session=dict(run.get("session", {})),
                 **arrays,
             )
         except FileNotFoundError as error:
@@ -226,6 +232,7 @@ class Recorder:
 
     def record(self) -> Record:
         """Return what was collected so far."""
+        arrays: dict[str, Any] = {name: np.array(rows) for name, rows in self._rows.items()}
         return Record(
             environment=self._environment,
             team=self._team,
@@ -236,7 +243,7 @@ class Recorder:
             seed=self._seed,
             dt=self._dt,
             time=np.array(self._time),
-            **{name: np.array(rows) for name, rows in self._rows.items()},
+            **arrays,
         )
 
 

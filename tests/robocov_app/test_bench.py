@@ -12,7 +12,7 @@ import pytest
 from called import complaint
 from matplotlib.figure import Figure
 
-from robocov_app.bench import cost, plot, render, start, step
+from robocov_app.bench import cost, plot, render, start, step, window
 from robocov_app.bench.measure import InTurn, Row
 from robocov_app.cli import main
 from robocov_app.commands import bench
@@ -93,6 +93,7 @@ def small(monkeypatch):
     monkeypatch.setattr(cost, "random_map", lambda vertices: cost_map(vertices))
     monkeypatch.setattr(start, "WORDS", {"import robocov": ("-c", "import robocov")})
     monkeypatch.setattr(render, "cases", lambda quick: [partial(render._frames, "rooms", 6, quick)])
+    monkeypatch.setattr(window, "cases", lambda quick: [partial(window._used, 6, 0.5)])
 
 
 def cost_map(vertices, real=cost.random_map):
@@ -104,7 +105,7 @@ def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     target = tmp_path / "ratios.png"
     assert main(["bench", "all", "--quick", "--json", "--plot", str(target)]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {row["part"] for row in found["rows"]} == {"step", "cost", "render", "start"}
+    assert {row["part"] for row in found["rows"]} == {"step", "cost", "render", "window", "start"}
     assert set(found["machine"]) == {"python", "system", "processor", "cores", "packages"}
     for row in found["rows"]:
         assert list(row) == KEYS

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_pixels import ONE, TWO, changed, drawn, nearest
 from drawn_run import explained
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from written_words import check_glyph, glyphs
 
-from robocov_app.view.theme import LIGHT
+from robocov.robots import Team
+from robocov_app.view.forces import ForceTerm
+from robocov_app.view.theme import DARK, LIGHT
 
 
 @settings(deadline=None, max_examples=25)
@@ -40,7 +45,64 @@ def test_terms_differ_by_more_than_hue():
     for term in ("attraction", "repulsion_robots", "repulsion_obstacle"):
         pixels, _ = changed(explained(ONE, forces=np.array([[1.0, 0.0]])), f"force_{term}")
         shapes.add(tuple(map(tuple, pixels.tolist())))
-    assert len(shapes) == 3
+    pixels, _ = changed(explained(ONE, velocities=np.array([[-1.0, 0.0]])), "force_viscosity")
+    shapes.add(tuple(map(tuple, pixels.tolist())))
+    assert len(shapes) == 4
+
+
+def gliding(*velocity, viscosity=1.0, positions=ONE):
+    """Return a scene of robots of one velocity in a world of a viscosity."""
+    scene = explained(positions, velocities=np.tile(np.array(velocity, dtype=float), (len(positions), 1)))
+    return replace(scene, team=Team.homogeneous(len(positions), viscosity=viscosity))
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.floats(0, 2 * np.pi))
+def test_viscosity_points_against_the_velocity(angle):
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    pixels, painter = changed(gliding(*0.8 * direction), "force_viscosity")
+    away = painter.camera.to_world(pixels.astype(float)) - ONE[0]
+    middle = away.mean(axis=0) / np.linalg.norm(away.mean(axis=0))
+    assert middle @ -direction > 0.98
+    assert (away @ -direction).min() > 0
+
+
+def test_viscosity_ends_in_a_bar_across():
+    """It is no arrow: it pulls nowhere, it only slows down."""
+    pixels, painter = changed(gliding(-0.8, 0.0), "force_viscosity")
+    center = painter.camera.to_pixels(ONE)[0]
+    heights = [np.ptp(pixels[pixels[:, 0] == x][:, 1]) for x in range(pixels[:, 0].min(), pixels[:, 0].max())]
+    assert max(heights[:-6]) <= 4 * painter.scale
+    assert max(heights[-6:]) >= 6 * painter.scale
+    assert abs(pixels[:, 1].mean() - center[1]) < 1
+
+
+def test_viscosity_grows_with_speed_and_with_the_worlds_viscosity():
+    reach = []
+    for speed, viscosity in ((0.0, 1.0), (0.3, 1.0), (0.9, 1.0), (0.9, 3.0), (0.9, 1e5), (0.9, 0.0)):
+        pixels, painter = changed(gliding(speed, 0.0, viscosity=viscosity), "force_viscosity")
+        center = painter.camera.to_pixels(ONE)[0]
+        reach.append((center[0] - pixels[:, 0]).max() if len(pixels) else 0.0)
+    assert reach[0] == reach[5] == 0.0
+    assert 10 < reach[1] < reach[2] < reach[3] < reach[4] < 75
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_viscosity_has_its_colour_and_its_words(theme):
+    scene = gliding(-0.9, 0.0)
+    frame, painter = drawn(scene, "force_viscosity", theme=theme)
+    start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
+    assert nearest(frame, start, theme.forces["viscosity"]) < 25
+    assert painter.legend(scene) == ["viscosity"]
+    (picture,) = glyphs(ForceTerm("viscosity"), scene, theme)
+    check_glyph(picture, theme, theme.forces["viscosity"])
+
+
+def test_viscosity_of_robots_out_of_sight_is_left_out():
+    pixels, _ = changed(
+        gliding(0.9, 0.0, positions=np.array([[500.0, 4.0], [4.0, -900.0]])), "force_viscosity"
+    )
+    assert len(pixels) == 0
 
 
 @pytest.mark.parametrize("kind", ["sensing", "communication"])

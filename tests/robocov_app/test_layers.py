@@ -11,11 +11,14 @@ from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, neare
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.environment import Environment, PolygonObstacle
+from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.starts import UniformStart
+from robocov.voronoi import partition
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.layers import drawn_radii
 from robocov_app.view.picture import Painter, standard_layers
+from robocov_app.view.scene import Scene
 from robocov_app.view.theme import DARK, LIGHT, readable_on, robot_hues
 from robocov_app.view.trajectories import Trajectories
 
@@ -275,6 +278,67 @@ class TestRobots:
         for first, second in pairwise(frames):
             assert (first != second).any()
         assert np.roll(frames[0], 1, axis=1).tolist() == frames[4].tolist()
+
+
+class TestNumbers:
+    def patch(self, frame, painter, place, reach=9):
+        x, y = np.rint(painter.camera.to_pixels(np.array(place))).astype(int)
+        return frame[y - reach : y + reach + 1, x - reach : x + reach + 1]
+
+    def test_robots_are_called_by_theirs(self):
+        """What is called 7 looks as the seventh of seven does, number and colour."""
+        several = np.column_stack([np.full(7, 1.0), np.arange(7.0) + 0.5])
+        several[6] = 4.0
+        expected, painter = drawn(explained(several), "robots")
+        named = replace(explained(np.array([[4.0, 4.0], [6.0, 6.0]])), numbers=(7, 2))
+        frame, _ = drawn(named, "robots")
+        assert (self.patch(frame, painter, (4.0, 4.0)) == self.patch(expected, painter, (4.0, 4.0))).all()
+        unnamed, _ = drawn(replace(named, numbers=None), "robots")
+        assert (self.patch(unnamed, painter, (4.0, 4.0)) != self.patch(expected, painter, (4.0, 4.0))).any()
+        assert [named.number(row) for row in (0, 1)] == [7, 2]
+        assert [explained(TWO).number(row) for row in (0, 1)] == [1, 2]
+
+    @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+    def test_in_a_small_team_colours_stay_with_them(self, theme):
+        places = np.array([[1.0, 1.0], [4.0, 4.0], [7.0, 7.0]])
+        painter = Painter(SQUARE, SIZE, theme)
+        painter.show({"robots", "cells"})
+        for numbers in ((1, 2, 3), (1, 3), (3,), (2, 9)):
+            rows = [3 if number == 9 else number for number in numbers]
+            positions = places[np.array(rows) - 1]
+            frame = painter.frame(replace(explained(positions), numbers=numbers)).astype(int)
+            for number, place in zip(numbers, positions, strict=True):
+                pixel = painter.camera.to_pixels(place)
+                assert nearest(frame, pixel - np.array([0.0, 5.0]), theme.robots[number - 1]) < 30
+                assert distance(frame, pixel + np.array([0.0, 30.0]), theme.cell(number - 1)) == 0
+
+    def test_numbers_beyond_the_hues_do_not_matter(self):
+        scene = replace(explained(TWO), numbers=(4, 10))
+        _, painter = drawn(scene, "robots")
+        assert painter._hues.tolist() == [0, 1]
+
+
+class TestCells:
+    def scene(self, reach):
+        scene = explained(TWO, communication_range=reach)
+        used = partition(np.array([[1.0, 4.0], [3.0, 4.0]]), SQUARE.region)
+        decision = replace(scene.snapshot.decision, cells=used)
+        snapshot = Snapshot(scene.snapshot.seen, decision)
+        return Scene.of(SQUARE, scene.team, snapshot), used
+
+    def test_those_of_the_law_are_drawn_where_all_hear_all(self):
+        scene, used = self.scene(np.inf)
+        assert scene.cells is used.polygons
+        assert scene.centroids is used.centroid
+        frame, painter = drawn(scene, "cells")
+        assert nearest(frame, painter.camera.to_pixels(np.array([2.0, 6.0])), LIGHT.cell_edge) < 70
+        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(1)) == 0
+
+    def test_those_of_all_robots_where_the_laws_overlap(self):
+        scene, _ = self.scene(3.0)
+        frame, painter = drawn(scene, "cells")
+        assert nearest(frame, painter.camera.to_pixels(np.array([3.0, 5.0])), LIGHT.cell_edge) < 70
+        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(0)) == 0
 
 
 class TestTrajectories:

@@ -28,7 +28,7 @@ ABOVE, PANEL, ROW, LEFT, RIGHT = 92, 270, 26, 400, 90
 GAP = 66
 """Pixels between what belongs to one part and the next, for its heading."""
 
-HEADINGS = {"step": "Simulated step", "render": "Pictures", "start": "Start"}
+HEADINGS = {"step": "Simulated step", "render": "Pictures", "window": "Window", "start": "Start"}
 
 MARKS = ("o", "s", "^", "D")
 

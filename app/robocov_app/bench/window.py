@@ -17,7 +17,7 @@ from robocov_app.demo.desk import Desk
 from robocov_app.demo.opening import display
 from robocov_app.demo.scenario import Law, Limits, Scenario
 from robocov_app.demo.session import Session
-from robocov_app.demo.window import FPS, Window
+from robocov_app.demo.window import FPS, Window, undisturbed
 from robocov_app.view.picture import standard_layers
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
         desk = Desk(session, WorkerCosts(LATTICE), shown, Path(), "rooms")
         window = Window(desk, SIZE, 1.0)
         try:
-            frames, drawing, answers = _played(window, seconds)
+            with undisturbed():
+                frames, drawing, answers = _played(window, seconds)
         finally:
             desk.costs.close()
         bare = _bare(len(frames))

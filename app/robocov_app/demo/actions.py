@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from robocov_app.demo.tools import toolbox
 
+KEY_REPEAT = (350, 40)
+"""Milliseconds after which a key that is held down is pressed again, the first time and from then on."""
+
 
 @dataclass(frozen=True)
 class Action:
@@ -127,6 +130,16 @@ _OTHERS = (
     Action("tour", "The guided tour", "Help", ("f2",)),
     Action("quit", "Quit", "Help", ("ctrl+q",)),
 )
+
+
+REPEATING = frozenset(
+    {
+        *("step", "slower", "faster", "more", "fewer", "undo", "redo", "wider", "narrower"),
+        *("back", "forward", "back:second", "forward:second", "robot:next", "robot:previous"),
+        *("zoom:in", "zoom:out", "pan:left", "pan:right", "pan:up", "pan:down"),
+    }
+)
+"""What is done again and again while its key is held down."""
 
 
 def layer_actions(titles: dict[str, str]) -> list[Action]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import pygame
 
 from robocov_app.demo.desk import FADE
 from robocov_app.demo.overlays import tag
+from robocov_app.view import sprites
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.furniture import legend_rows, legend_strip
@@ -56,6 +58,8 @@ class Arena:
         self._strip: pygame.Surface | None = None
         self._strip_key: object = None
         self._camera: Camera | None = None
+        self.hovered = -1, -1
+        """Pane and number of the robot under the cursor."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Make the painters fit the layout and the theme."""
@@ -258,10 +262,23 @@ class Arena:
                 row = list(scene.numbers).index(number)
                 ends = canvas.camera.to_pixels(np.array([scene.snapshot.positions[row], target]))
                 canvas.dashes(ends[0].tolist(), ends[1].tolist(), self.theme.ink, canvas.width(1.5), dash=3.0)
+        if pane == self.hovered[0] and scene.snapshot is not None and scene.numbers is not None:
+            self._draw_hovered(canvas, scene, self.hovered[1])
         preview = self.desk.tool.preview(self.desk.session)
         if preview is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
+
+    def _draw_hovered(self, canvas: Canvas, scene: Scene, number: int) -> None:
+        """Draw a fine ring around the robot under the cursor: it can be taken hold of."""
+        if scene.snapshot is None or scene.numbers is None or number not in scene.numbers:
+            return
+        row = list(scene.numbers).index(number)
+        if row == scene.selected:
+            return
+        radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+        center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
+        canvas.stamp(partial(sprites.ring, radius, self.theme.ink, 1.2 * canvas.scale), center)
 
     def _draw_preview(self, canvas: Canvas, preview: Preview) -> None:
         accent = self.theme.final

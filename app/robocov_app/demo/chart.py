@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -225,7 +226,9 @@ class Chart:
         """Write each pane's value at the right, with the gap to the best; none over another."""
         session, theme, scale = self.desk.session, self.theme, self.layout.scale
         _, right, _ = self._span
-        values = {lane.number: lane.curve.at(session.time) for lane in session.lanes}
+        # costs come in one after the other: they are compared at a time for which all are known
+        time = min([session.time, *(lane.curve.last_time for lane in session.lanes if len(lane.curve))])
+        values = {lane.number: lane.curve.at(time) for lane in session.lanes}
         known = {number: value for number, value in values.items() if np.isfinite(value)}
         if not known:
             return
@@ -233,7 +236,7 @@ class Chart:
         lanes = sorted(
             (each for each in session.lanes if each.number in known), key=lambda each: -known[each.number]
         )
-        now = np.full(len(lanes), session.time)
+        now = np.full(len(lanes), time)
         wanted = place(now, np.array([known[lane.number] for lane in lanes]))[:, 1]
         rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
         for y, lane in zip(rows, lanes, strict=True):
@@ -256,18 +259,6 @@ class Chart:
         thick = max(4, round(5 * scale))
         box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
-        done = pygame.Rect(box)
-        done.width = max(round((right - left) * session.end / end), thick)
-        pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.4), done, border_radius=thick)
-        if not session.live:
-            seen = pygame.Rect(box)
-            seen.width = max(round((right - left) * session.time / end), thick)
-            pygame.draw.rect(canvas.surface, theme.final, seen, border_radius=thick)
-        for event in session.events:
-            x = left + (right - left) * event.time / end
-            pygame.draw.circle(
-                canvas.surface, theme.ink, (round(x), round(middle)), max(2, round(2.5 * scale))
-            )
         canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
         words = "live" if session.live else "past"
         if session.live and session.history.thinned:
@@ -282,25 +273,28 @@ class Chart:
         )
 
     def _cursor(self, screen: pygame.Surface) -> None:
-        """Draw the handle on the time line, and the line through the plot."""
+        """Draw how far the run has come, the handle on the time line, and the line through the plot."""
         theme, scale, session = self.theme, self.layout.scale, self.desk.session
-        x = self.column(session.time)
-        _, top, _, height = self.layout.chart
-        _, track_top, _, track = self.layout.track
-        colour = theme.final if not session.live else theme.faint
-        if not session.live:
-            screen.fill(
-                colour,
-                pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale)),
-            )
         canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-
+        _, top, _, height = self.layout.chart
+        middle = self.layout.track[1] + 0.5 * self.layout.track[3]
+        thick = max(4, round(5 * scale))
+        x, begin = self.column(session.time), round(self.column(0.0))
+        bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
+        if not session.live:
+            bars.append((x, theme.final))
+            line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
+            screen.fill(theme.final, line)
+        for end, colour in bars:
+            bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
+            pygame.draw.rect(screen, colour, bar, border_radius=thick)
+        dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
+        for event in session.events:
+            canvas.stamp(dot, (self.column(event.time), middle))
+        fill = theme.ink if session.live else theme.final
         radius = round(2 * 6.5 * scale) / 2
-        fill = theme.final if not session.live else theme.ink
-        canvas.stamp(
-            lambda shift: sprites.disc(radius, fill, theme.background, 2.0 * scale, theme.faint, "", shift),
-            (x, track_top + track / 2),
-        )
+        handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
+        canvas.stamp(handle, (x, middle))
 
     def _hovered(self, screen: pygame.Surface) -> None:
         """Tell what was at the time under the cursor: an event near it, or the values."""

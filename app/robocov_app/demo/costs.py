@@ -97,7 +97,7 @@ class DirectCosts:
 
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
-        self.known, self.state, self._cost = {}, "", None
+        self.known, self.state, self._cost, self._asked = {}, "", None, {}
         try:
             self._cost = CoverageCost(environment, self._lattice)
         except RobocovError as error:
@@ -177,6 +177,8 @@ class WorkerCosts:
             if event.generation != self._generation:
                 continue
             if isinstance(event, Building):
+                # also once more, after the other process had ended
+                self._ready = False
                 left = f", {event.seconds_left:.0f} s left" if event.seconds_left >= 1.0 else ""
                 self.state = f"cost: preparing the map, {event.fraction:.0%}{left}"
             elif isinstance(event, Ready):

@@ -297,6 +297,7 @@ class Desk:
         name = next((name for name in self.laws if name not in there), self.laws[0])
         self.session.add_pane(Law(name))
         self.active = len(self.session.lanes) - 1
+        self.say("all begin anew, from the same starts")
 
     def next_pane(self) -> None:
         """Choose the next pane."""
@@ -433,7 +434,11 @@ class Desk:
         elif word == "time":
             self.look_at(_positive(word, rest))
         elif word == "robot":
-            self.hand.selected = _whole(word, rest)
+            number = _whole(word, rest)
+            circumstances = self.session.circumstances(self.lane)
+            if number not in {*circumstances.numbers, *circumstances.failed}:
+                raise ParameterError(f"there is no robot {number}")
+            self.hand.selected = number
         else:
             known = [*parameters, *COMMAND_WORDS]
             raise InputError(unknown_name("command", word, known))

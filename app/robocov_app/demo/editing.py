@@ -11,6 +11,7 @@ import shapely
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
+from robocov.strictjson import place
 
 if TYPE_CHECKING:
     from robocov.environment import Environment, Obstacle
@@ -64,12 +65,14 @@ def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
 
 
 def obstacle_at(environment: Environment, point: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the number of the topmost obstacle within `reach` metres of a point, None if there is none."""
-    place = shapely.Point(point)
-    for index in range(len(environment.obstacles) - 1, -1, -1):
-        if shapely.distance(environment.obstacles[index].polygon, place) <= reach:
-            return index
-    return None
+    """Return the number of the obstacle at a point, or else of the nearest within `reach` metres.
+
+    Of several it is the topmost; None if there is none.
+    """
+    away = shapely.distance([shape.polygon for shape in environment.obstacles], shapely.Point(point))
+    if not len(away) or away.min() > reach:
+        return None
+    return int(np.flatnonzero(away == away.min())[-1])
 
 
 def words_for(obstacle: Obstacle) -> str:
@@ -87,7 +90,9 @@ def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
         When they are too few, or enclose nothing.
     """
     ring = _rounded(points)
-    if len(ring) < 3 or shapely.Polygon(ring).area < SHORTEST**2:
+    if len(ring) > 2 and ring[0] == ring[-1]:
+        ring = ring[:-1]
+    if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
         raise MapError("a polygon needs three corners that enclose something")
     if not shapely.Polygon(ring).is_valid:
         raise MapError("the polygon's outline crosses itself")
@@ -129,8 +134,6 @@ def _rounded(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ..
         point = round(float(x), 4), round(float(y), 4)
         if not ring or point != ring[-1]:
             ring.append(point)
-    if len(ring) > 2 and ring[0] == ring[-1]:
-        ring.pop()
     return tuple(ring)
 
 
@@ -142,8 +145,15 @@ def _checked(environment: Environment) -> Environment:
             return from_json(to_json(replace(environment, starts=starts)), "map")
         except MapError as error:
             # an obstacle on a start takes that start away, nothing else
-            blocked = [name for name in starts if f"starts.{name}" in str(error)]
+            message = str(error).removeprefix("map: ")
+            blocked = [name for name in starts if _is_about(message, name)]
             if not blocked:
-                raise MapError(str(error).removeprefix("map: ")) from None
+                raise MapError(message) from None
             for name in blocked:
                 del starts[name]
+
+
+def _is_about(message: str, start: str) -> bool:
+    """Whether a message begins with the place of a start, or of something in it."""
+    where = place(("starts", start))
+    return message.startswith(tuple(f"{where}{after}" for after in (":", ".", "[")))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array, IntArray
     from robocov.environment import Environment
+    from robocov.observation import Decision
     from robocov_app.demo.scenario import Law, Limits
 
 MOST_BYTES = 24_000_000
@@ -54,7 +55,7 @@ class Circumstances:
     numbers: tuple[int, ...]
     failed: Mapping[int, tuple[float, float]]
 
-    @cached_property
+    @property
     def solid(self) -> Environment:
         """The map with the robots that failed as obstacles, which is what the others sense."""
         if not self.failed:
@@ -62,6 +63,7 @@ class Circumstances:
         return _with_wrecks(self.environment, tuple(self.failed.values()), self.limits.radius)
 
 
+# circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
 @lru_cache(maxsize=8)
 def _with_wrecks(
     environment: Environment, places: tuple[tuple[float, float], ...], radius: float
@@ -79,12 +81,15 @@ class State(NamedTuple):
     positions, velocities : (n, 2) m and m/s
     memory : object
         What the controller remembered; None where it can do without.
+    recorded : Decision or None
+        What was decided then, where it comes from a record.
     """
 
     circumstances: Circumstances
     positions: Array
     velocities: Array
     memory: Any
+    recorded: Decision | None = None
 
 
 class Moment(NamedTuple):
@@ -140,6 +145,10 @@ class History:
         """The steps of the moments, ascending; not to be changed."""
         return self._steps
 
+    def since(self, k: int) -> list[Moment]:
+        """Return the moments from number `k` on."""
+        return self._moments[k:]
+
     def time(self, k: int) -> float:
         """Return the time of moment `k`, s."""
         return self._steps[k] * self.dt
@@ -179,7 +188,7 @@ class History:
         return twin
 
     def coarsest(self, first: int = 0) -> int:
-        """Return the least power of two, in steps, of which all multiples from moment `first` on are there."""
+        """Return the least power of two whose multiples, as steps from moment `first` on, are all there."""
         steps = np.array(self._steps[first:])
         stride = 1
         # what was touched is kept at any step: gaps alone do not tell

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from copy import deepcopy
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS
+from robocov.controllers import CONTROLLERS, Individually
 from robocov.errors import StartError
 from robocov.relocation import relocated
 from robocov.simulation import Simulation
@@ -16,15 +17,34 @@ from robocov_app.demo.trail import Trail
 from robocov_app.view.sensed import Sensed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from robocov.arrays import Array
     from robocov.environment import Environment
+    from robocov.observation import Decision
+    from robocov.robots import Team
     from robocov_app.demo.scenario import Law
-
 
 SENSED_EVERY = 3
 """What is sensed is noted at every so many steps."""
+
+_WITHOUT_MEMORY = (*CONTROLLERS.values(), Individually)
+"""Controllers that remember nothing but what makes the next decision quicker."""
+
+
+class Wanted(NamedTuple):
+    """How a lane is to go on.
+
+    Attributes
+    ----------
+    circumstances : Circumstances
+    positions, velocities : (n, 2) m and m/s, or None
+        By default the present ones.
+    """
+
+    circumstances: Circumstances
+    positions: Array | None = None
+    velocities: Array | None = None
 
 
 class Lane:
@@ -88,6 +108,16 @@ class Lane:
         """Return the row of a robot by its number; None where it does not work."""
         return self.numbers.index(number) if number in self.numbers else None
 
+    def decide(self) -> Decision:
+        """Let the controller decide on the present, which the next step carries out.
+
+        Raises
+        ------
+        ParameterError
+            When it fails.
+        """
+        return self.simulation.snapshot.decision
+
     def step(self, pushes: Array | None = None) -> None:
         """Make one control step."""
         if self._steps % SENSED_EVERY == 0:
@@ -100,35 +130,32 @@ class Lane:
     def state(self) -> State:
         """Return what is needed to go on from here."""
         simulation = self.simulation
-        return State(
-            self.circumstances,
-            simulation.positions,
-            simulation.velocities,
-            None if type(simulation.controller) in CONTROLLERS.values() else simulation.memory,
-        )
+        without = type(simulation.controller) in _WITHOUT_MEMORY
+        # who wrote a controller may have it change what it remembers
+        memory = None if without else deepcopy(simulation.memory)
+        return State(self.circumstances, simulation.positions, simulation.velocities, memory)
 
-    def resume(self, state: State, time: float, starts: Array) -> None:
-        """Go on from an earlier state."""
-        self.circumstances = state.circumstances
-        self.simulation = resumed(state, self.simulation.dt, time)
-        self.starts = starts
-        self.sensed.cut(time)
-
-    def change(
-        self,
-        circumstances: Circumstances,
-        positions: Array | None = None,
-        velocities: Array | None = None,
-    ) -> None:
-        """Go on from here in other circumstances; what cannot be leaves everything as it was.
-
-        Robots that do not fit any more are pushed out of what is in the way.
+    def resume(self, state: State, simulation: Simulation, starts: Array, trail: Trail) -> None:
+        """Go on from an earlier state.
 
         Parameters
         ----------
-        circumstances : Circumstances
-        positions, velocities : (n, 2)
-            By default the present ones.
+        state : State
+        simulation : Simulation
+            What `resumed` returns of it.
+        starts : (n, 2) m
+        trail : Trail
+            Up to then, of the robots that worked then.
+        """
+        self.circumstances, self.simulation = state.circumstances, simulation
+        self.starts, self.trail = starts, trail
+        self.sensed = self.sensed.copy()
+        self.sensed.cut(simulation.time)
+
+    def changed(self, wanted: Wanted) -> Simulation:
+        """Return the simulation that goes on from here as wanted; the lane stays as it is.
+
+        Robots that do not fit any more are pushed out of what is in the way.
 
         Raises
         ------
@@ -137,35 +164,30 @@ class Lane:
         ParameterError
             When the controller or the team does not take a value.
         """
-        old = self.simulation
-        positions = old.positions if positions is None else positions
-        velocities = old.velocities if velocities is None else velocities
-        same_law = circumstances.law == self.circumstances.law
-        team = circumstances.limits.team(len(circumstances.numbers))
-        environment = with_failed(circumstances)
-        controller = old.controller if same_law else circumstances.law.made()
-        try:
-            new = old.changed(
+        old, circumstances = self.simulation, wanted.circumstances
+        environment, team = circumstances.solid, circumstances.limits.team(len(circumstances.numbers))
+        # the same controller goes on remembering
+        controller = None if circumstances.law == self.law else circumstances.law.made()
+        return _fitted(
+            lambda positions, velocities: old.changed(
                 environment=environment,
-                controller=None if same_law else controller,
+                controller=controller,
                 team=team,
                 positions=positions,
                 velocities=velocities,
-            )
-        except StartError:
-            placed = relocated(environment, positions, team)
-            moved = np.hypot(*(placed - positions).T) > 1e-3
-            new = old.changed(
-                environment=environment,
-                controller=None if same_law else controller,
-                team=team,
-                positions=placed,
-                velocities=np.where(moved[:, None], 0.0, velocities),
-            )
+            ),
+            environment,
+            team,
+            old.positions if wanted.positions is None else wanted.positions,
+            old.velocities if wanted.velocities is None else wanted.velocities,
+        )
+
+    def take(self, circumstances: Circumstances, simulation: Simulation) -> None:
+        """Go on with what `changed` returned."""
         if circumstances.numbers != self.numbers:
-            self._renumber(self.numbers, circumstances.numbers, new.positions)
-        self.simulation, self.circumstances = new, circumstances
-        self.trail.add(self.time, new.positions, always=True)
+            self._renumber(self.numbers, circumstances.numbers, simulation.positions)
+        self.simulation, self.circumstances = simulation, circumstances
+        self.trail.add(self.time, simulation.positions, always=True)
 
     def _renumber(self, before: Sequence[int], after: Sequence[int], positions: Array) -> None:
         """Let trail and starts follow the robots that are there now."""
@@ -198,7 +220,7 @@ def simulation_of(
         As `Simulation`.
     """
     return Simulation(
-        with_failed(circumstances),
+        circumstances.solid,
         circumstances.law.made(),
         positions,
         circumstances.limits.team(len(circumstances.numbers)),
@@ -209,8 +231,44 @@ def simulation_of(
 
 
 def resumed(state: State, dt: float, time: float) -> Simulation:
-    """Return a simulation that goes on from a state, with what the controller remembered."""
-    simulation = simulation_of(state.circumstances, state.positions, dt, state.velocities, time)
+    """Return a simulation that goes on from a state, with what the controller remembered.
+
+    Raises
+    ------
+    StartError, ParameterError
+        When there is no room for robots that were pressed too far into something, or the controller
+        cannot begin any more.
+    """
+    circumstances = state.circumstances
+    simulation = _fitted(
+        lambda positions, velocities: simulation_of(circumstances, positions, dt, velocities, time),
+        circumstances.solid,
+        circumstances.limits.team(len(circumstances.numbers)),
+        state.positions,
+        state.velocities,
+    )
     if state.memory is not None:
         simulation = simulation.remembering(state.memory)
     return simulation
+
+
+def _fitted(
+    make: Callable[[Array, Array], Simulation],
+    environment: Environment,
+    team: Team,
+    positions: Array,
+    velocities: Array,
+) -> Simulation:
+    """Return what `make` makes of (n, 2) m and m/s; robots that do not fit come to rest where they do.
+
+    Raises
+    ------
+    StartError
+        When there is no room for a robot.
+    """
+    try:
+        return make(positions, velocities)
+    except StartError:
+        placed = relocated(environment, positions, team)
+        moved = np.hypot(*(placed - positions).T) > 1e-3
+        return make(placed, np.where(moved[:, None], 0.0, velocities))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import floor
 from typing import NamedTuple, TypeAlias
 
 from robocov_app.view.spacing import columns_for
@@ -16,6 +17,7 @@ STATUS = 26
 GAP = 2
 LEGEND_ROW = 22
 SMALLEST = (900, 600)
+"""Width and height at scale 1 that everything has room in."""
 
 
 class Layout(NamedTuple):
@@ -25,6 +27,7 @@ class Layout(NamedTuple):
     ----------
     size : (width, height)
     scale : float
+        As it was asked for, or what of it the window has room for.
     arena, chart, track, status : Box
     panel : Box
         Of no width while it is hidden.
@@ -76,7 +79,8 @@ def laid_out(
     ((0, 0, 960, 518), (960, 0, 320, 720))
     """
     width, height = size
-    wide = min(round(PANEL * scale), width // 2) if panel else 0
+    scale = min(scale, largest_scale(size))
+    wide = min(round(PANEL * scale), width - 1) if panel else 0
     left = width - wide
     status = round(STATUS * scale)
     track = round(TRACK * scale)
@@ -108,6 +112,15 @@ def laid_out(
         boxes,
         (0, 0, left, legend),
     )
+
+
+def largest_scale(size: tuple[int, int]) -> float:
+    """Return the largest scale that a window has room for: in steps, so that text does not tremble.
+
+    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480))]
+    [1.0, 1.125, 3.5, 0.625]
+    """
+    return max(floor(8 * min(size[0] / SMALLEST[0], size[1] / SMALLEST[1])) / 8, 0.25)
 
 
 def inside(box: Box, pixel: tuple[float, float]) -> bool:

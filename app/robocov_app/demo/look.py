@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import pygame_gui
+from pygame_gui import UIManager
+from pygame_gui.core import UIAppearanceTheme
 
 from robocov_app.view.fonts import font_path
 from robocov_app.view.theme import LIGHT, mix
@@ -13,6 +14,12 @@ if TYPE_CHECKING:
     from robocov_app.view.theme import Colour, Theme
 
 FONT = "robocov"
+
+TEXT = {"": (12.0, False), "#header": (11.0, True), "#unit": (11.0, False), "#small": (11.0, False)}
+"""Size at scale 1 of text, and whether it is bold, by style."""
+
+BAR = 10.0
+"""Pixels at scale 1 that a scroll bar is wide."""
 
 
 def hexed(colour: Colour) -> str:
@@ -60,6 +67,7 @@ def gui_theme(theme: Theme, scale: float) -> dict[str, Any]:
         "link_text": hexed(accent),
     }
     radius = str(round(4 * scale))
+    knob = mix(panel, ink, 0.3)
     plain = {
         "border_width": "1",
         "shadow_width": "0",
@@ -68,6 +76,7 @@ def gui_theme(theme: Theme, scale: float) -> dict[str, Any]:
     }
     text = {"name": FONT, "size": str(round(12 * scale)), "bold": "0", "italic": "0"}
     bold = {**text, "bold": "1"}
+    left = {"text_horiz_alignment": "left"}
     chosen = {
         "normal_bg": hexed(accent),
         "normal_text": hexed(on_accent),
@@ -113,7 +122,7 @@ def gui_theme(theme: Theme, scale: float) -> dict[str, Any]:
                 **plain,
                 "enable_arrow_buttons": "0",
                 "sliding_button_width": str(round(12 * scale)),
-                "shape_corner_radius": str(round(3 * scale)),
+                "shape_corner_radius": str(round(6 * scale)),
             },
         },
         "horizontal_slider.#sliding_button": {
@@ -123,25 +132,46 @@ def gui_theme(theme: Theme, scale: float) -> dict[str, Any]:
                 "active_bg": hexed(mix(accent, ink, 0.3)),
                 "normal_border": hexed(accent),
             },
-            "misc": {**plain, "shape_corner_radius": str(round(3 * scale))},
+            "misc": {**plain, "shape_corner_radius": str(round(5 * scale))},
         },
         "vertical_scroll_bar": {
             "colours": {"dark_bg": hexed(panel), "normal_border": hexed(panel)},
-            "misc": {**plain, "enable_arrow_buttons": "0"},
+            "misc": {**plain, "border_width": "0", "enable_arrow_buttons": "0"},
+        },
+        "vertical_scroll_bar.#sliding_button": {
+            "colours": {
+                "normal_bg": hexed(knob),
+                "hovered_bg": hexed(mix(panel, ink, 0.45)),
+                "active_bg": hexed(mix(panel, ink, 0.55)),
+                "normal_border": hexed(panel),
+                "hovered_border": hexed(panel),
+                "active_border": hexed(panel),
+            },
+            "misc": {
+                **plain,
+                "border_width": str(max(1, round(2 * scale))),
+                "shape_corner_radius": str(round(0.5 * BAR * scale)),
+            },
         },
         "text_entry_line": {
             "colours": {"dark_bg": hexed(field), "normal_border": hexed(line)},
             "font": text,
             "misc": {**plain, "padding": f"{round(5 * scale)},{round(2 * scale)}"},
         },
-        "drop_down_menu": {"misc": {**plain, "expand_direction": "down"}},
-        "drop_down_menu.#selected_option": {"font": text, "misc": {**plain, "border_width": "0"}},
-        "drop_down_menu.#expand_button": {"misc": {**plain, "border_width": "0"}},
+        "drop_down_menu": {
+            "misc": {**plain, "expand_direction": "down", "open_button_width": str(round(20 * scale))}
+        },
+        "drop_down_menu.#selected_option": {"font": text, "misc": {**plain, **left, "border_width": "0"}},
+        "drop_down_menu.#expand_button": {
+            "font": {**text, "size": str(round(11 * scale))},
+            "misc": {**plain, "border_width": "0"},
+        },
         "drop_down_menu.#drop_down_options_list": {
             "font": text,
             "colours": {"dark_bg": hexed(field)},
             "misc": {"list_item_height": str(round(24 * scale)), "border_width": "1", "shape": "rectangle"},
         },
+        "@selection_list_item": {"misc": {**left, "border_width": "0", "shape": "rectangle"}},
         "tool_tip": {"misc": {"rect_width": str(round(210 * scale)), "border_width": "0"}},
         "tool_tip.text_box": {
             "colours": {
@@ -152,13 +182,45 @@ def gui_theme(theme: Theme, scale: float) -> dict[str, Any]:
             "font": {**text, "size": str(round(11 * scale))},
             "misc": {"border_width": "1", "padding": f"{round(7 * scale)},{round(5 * scale)}"},
         },
-        "check_box": {"font": text, "misc": {**plain, "shape_corner_radius": str(round(3 * scale))}},
+        "check_box": {"font": text, "misc": {**plain, "text_offset": str(round(6 * scale))}},
     }
 
 
-def manager_of(size: tuple[int, int], theme: Theme, scale: float) -> pygame_gui.UIManager:
+class _Theme(UIAppearanceTheme):
+    """Finds the ids of a widget by a key that costs nothing to make.
+
+    The library's key is a text of some ten thousand letters, which takes half of the time in which a
+    widget is made.
+    """
+
+    def build_all_combined_ids(
+        self,
+        element_base_ids: list[str | None] | None,
+        element_ids: list[str] | None,
+        class_ids: list[str | None] | None,
+        object_ids: list[str | None] | None,
+    ) -> list[str]:
+        """Return all ids of a widget, the most telling first."""
+        ids = (element_base_ids, element_ids, class_ids, object_ids)
+        known: dict[Any, list[str]] = self.__dict__.setdefault("known_ids", {})
+        key = tuple(tuple(each or ()) for each in ids)
+        if key not in known:
+            known[key] = super().build_all_combined_ids(*ids)
+        return known[key]
+
+
+class _Manager(UIManager):
+    def create_new_theme(self, theme_path: Any = None) -> UIAppearanceTheme:
+        """Return a theme of ours."""
+        theme = _Theme(self.resource_loader, self._locale)
+        if theme_path is not None:
+            theme.load_theme(theme_path)
+        return theme
+
+
+def manager_of(size: tuple[int, int], theme: Theme, scale: float) -> UIManager:
     """Return a manager with our look and font."""
-    manager = pygame_gui.UIManager(size, enable_live_theme_updates=False)
+    manager = _Manager(size, enable_live_theme_updates=False)
     regular, bold = font_path(), font_path(True)
     if regular is not None and bold is not None:
         manager.add_font_paths(FONT, str(regular), str(bold))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
+from robocov_app.demo.actions import KEY_REPEAT
 from robocov_app.demo.costs import LATTICE, DirectCosts, WorkerCosts
 from robocov_app.demo.desk import Desk
 from robocov_app.demo.settings import Settings, load_settings, save_settings, settings_file
@@ -56,7 +57,7 @@ def display(*, headless: bool) -> Iterator[None]:
             pygame.display.quit()
             raise InputError(NO_DISPLAY)
     pygame.font.init()
-    pygame.key.set_repeat(350, 40)
+    pygame.key.set_repeat(*KEY_REPEAT)
     try:
         yield
     finally:

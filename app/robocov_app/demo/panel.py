@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.controllers import controller_kind
+from robocov.errors import ParameterError
 from robocov_app.demo.actions import all_actions
 from robocov_app.demo.clock import SPEEDS, speed_words
-from robocov_app.demo.pages import MARGIN, WIDE, keep_page, parameters_page, robot_page, show_page
+from robocov_app.demo.pages import (
+    GAP,
+    MARGIN,
+    WIDE,
+    columns,
+    keep_page,
+    parameters_page,
+    robot_page,
+    show_page,
+)
 from robocov_app.demo.scenario import MOST_PANES
 from robocov_app.demo.widgets import Widgets
+from robocov_app.view.theme import LIGHT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     import pygame
 
@@ -22,8 +34,7 @@ if TYPE_CHECKING:
     from robocov_app.view.theme import Theme
 
 TABS = ("parameters", "show", "robot", "keep")
-_QUARTER = 69.5
-"""Width of four buttons side by side."""
+_TAB_WIDTHS = (86, 64, 64, 64)
 
 
 class Panel:
@@ -45,6 +56,8 @@ class Panel:
         Where the page is, in the window.
     covered : bool
         Something else is drawn in its place: it takes no events.
+    widgets : Widgets or None
+        None while the panel is hidden.
     """
 
     def __init__(self, desk: Desk, titles: dict[str, str], do: Callable[[str], None]) -> None:
@@ -52,18 +65,27 @@ class Panel:
         self.tab = TABS[0]
         self.body: Box = (0, 0, 0, 0)
         self.covered = False
+        self.widgets: Widgets | None = None
+        self._box: Box = (0, 0, 0, 0)
+        self._theme: Theme | None = None
         self._actions = {action.name: action for action in all_actions(titles)}
-        self._widgets: Widgets | None = None
         self._structure: object = None
         self._version = -1
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Build everything for a layout and a theme."""
+        """Build what another layout and theme need."""
+        widgets, self._box, self._theme = self.widgets, layout.panel, theme
         self._structure = None
-        self._widgets = None
-        if layout.panel[2]:
-            self._widgets = Widgets(layout.size, layout.panel, theme, layout.scale, self._actions, self._do)
-            self._refresh(self._widgets)
+        if not layout.panel[2]:
+            self.stop_typing()
+            self.widgets = None
+            return
+        if widgets is not None and widgets.theme is theme and widgets.scale == layout.scale:
+            widgets.resize(layout.size, layout.panel)
+        else:
+            self.stop_typing()
+            self.widgets = Widgets(layout.size, layout.panel, theme, layout.scale, self._actions, self._do)
+        self._refresh()
 
     def show_tab(self, name: str) -> None:
         """Turn to a page."""
@@ -73,46 +95,55 @@ class Panel:
 
     def update(self, seconds: float) -> None:
         """Let the widgets live, and say what the desk says."""
-        if self._widgets is None:
+        if self.widgets is None:
             return
-        if self._version != self.desk.version or self._structure != self._wanted():
-            self._refresh(self._widgets)
-        self._widgets.manager.update(seconds)
+        if self.covered:
+            if self.widgets.typed_into is not None or self.widgets.open_menu is not None:
+                self.widgets.let_go()
+                self.widgets.manager.update(seconds)
+            return
+        ended = self.widgets.ended()
+        if ended or self._version != self.desk.version or self._structure != self._wanted():
+            self._refresh()
+        self.widgets.manager.update(seconds)
+
+    def fill(self, screen: pygame.Surface) -> None:
+        """Draw what is behind the widgets."""
+        if self._theme is not None:
+            screen.fill(self._theme.panel, self._box)
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw the widgets."""
-        if self._widgets is not None:
-            self._widgets.manager.draw_ui(screen)
-
-    def draw_over(self, screen: pygame.Surface) -> None:
-        """Draw again what must lie on top of the inspector's words: an open menu."""
-        if self.unfolded:
-            self.draw(screen)
+        if self.widgets is not None:
+            self.widgets.manager.draw_ui(screen)
 
     @property
     def busy(self) -> bool:
-        """Whether it must keep up with every frame: somebody types, or a menu is open."""
-        return self.typing or self.unfolded or self._version != self.desk.version
+        """Whether it must keep up with every frame: somebody uses it, or something is different."""
+        widgets = self.widgets
+        used = widgets is not None and (self.typing or self.unfolded or widgets.held)
+        return used or self._version != self.desk.version
 
     @property
     def typing(self) -> bool:
         """Whether keys go into a field."""
-        return self._widgets is not None and self._widgets.typing
+        return self.widgets is not None and self.widgets.typed_into is not None
 
     def stop_typing(self) -> None:
-        """Take the keys away from all fields."""
-        if self.typing and self._widgets is not None:
-            self._widgets.stop_typing()
+        """Take the keys away from all fields, and close menus."""
+        if self.widgets is not None and (self.typing or self.unfolded):
+            self.widgets.let_go()
+            self.widgets.ended()
             self.desk.version += 1
 
     @property
     def unfolded(self) -> bool:
         """Whether a menu is open, which may hang over other things."""
-        return self._widgets is not None and not self.covered and self._widgets.unfolded
+        return self.widgets is not None and not self.covered and self.widgets.open_menu is not None
 
     def take(self, event: pygame.event.Event) -> bool:
         """Give an event to the widgets; return whether one of them took it."""
-        return self._widgets is not None and not self.covered and self._widgets.take(event)
+        return self.widgets is not None and not self.covered and self.widgets.take(event)
 
     # building
 
@@ -120,158 +151,199 @@ class Panel:
         """Return all on which it depends what widgets there are."""
         desk, session = self.desk, self.desk.session
         laws = tuple(session.circumstances(lane).law.name for lane in session.lanes)
-        return (
-            *(laws, desk.active, self.tab, desk.map_name, tuple(desk.starts()), session.scenario.start_name),
-            tuple(desk.laws),
-        )
+        starts = tuple(session.environment.starts)
+        return laws, desk.active, self.tab, desk.map_name, starts, session.scenario.start_name, *desk.laws
 
-    def _refresh(self, widgets: Widgets) -> None:
+    def _refresh(self) -> None:
+        assert self.widgets is not None
         wanted = self._wanted()
         if wanted != self._structure:
             self._structure = wanted
-            self._build(widgets)
-        self._sync(widgets)
+            self._build(self.widgets)
+        self._sync(self.widgets)
         self._version = self.desk.version
 
     def _build(self, widgets: Widgets) -> None:
-        widgets.clear()
-        y = self._environment(widgets, 8.0)
+        y = self._environment(widgets, 8)
         y = self._controllers(widgets, y)
         y = self._run(widgets, y)
         y = self._tools(widgets, y)
-        wide = WIDE / len(TABS)
-        for k, name in enumerate(TABS):
-            style = "#chosen_tab" if name == self.tab else "#small"
+        widgets.section("tabs", None, y, lambda: self._tabs(widgets))
+        y += 34
+        left, _, width, height = widgets.place
+        top = round(y * widgets.scale)
+        self.body = (left, top, width, max(height - top, 0))
+        if self.tab == "parameters":
+            parameters_page(widgets, self.desk, y)
+        elif self.tab == "show":
+            show_page(widgets, self.desk, y, self.titles)
+        elif self.tab == "robot":
+            robot_page(widgets, y)
+        else:
+            keep_page(widgets, y)
+
+    def _tabs(self, widgets: Widgets) -> None:
+        x = float(MARGIN)
+        for name, width in zip(TABS, _TAB_WIDTHS, strict=True):
 
             def turn(name: str = name) -> None:
                 self.show_tab(name)
 
-            widgets.button(
-                name.capitalize(), widgets.rect(MARGIN + k * wide, y, wide - 2, 26), turn, style=style
-            )
-        top = round((y + 32) * widgets.scale)
-        left, _, width, height = widgets.place
-        self.body = (left, top, width, height - top)
-        if self.tab == "parameters":
-            parameters_page(widgets, self.desk, top)
-        elif self.tab == "show":
-            show_page(widgets, self.desk, top, self.titles)
-        elif self.tab == "robot":
-            robot_page(widgets, top)
-        else:
-            keep_page(widgets, top)
+            rect = widgets.rect(x, 0, width, 26)
+            widgets.button(name.capitalize(), rect, turn, name=f"tab:{name}", style="#small")
+            x += width + GAP
 
     def _environment(self, widgets: Widgets, y: float) -> float:
         desk, rect = self.desk, widgets.rect
+        maps, starts, start = desk.maps(), desk.starts(), desk.session.scenario.start_name
+        files = short_names(maps)
+        names = {name: file for file, name in files.items()}
 
         def number(what: str, text: str) -> None:
             desk.attempt(lambda: desk.command(f"{what} {text}"))
 
-        widgets.label("ENVIRONMENT", rect(MARGIN, y, WIDE, 18), style="#header")
-        y += 20
-        widgets.menu(
-            desk.maps(),
-            desk.map_name,
-            rect(MARGIN, y, 172, 28),
-            lambda name: desk.attempt(lambda: desk.open_map(name)),
-        )
-        widgets.menu(
-            desk.starts(),
-            desk.session.scenario.start_name,
-            rect(MARGIN + 178, y, 118, 28),
-            lambda name: desk.attempt(lambda: desk.restart(start=name)),
-        )
-        y += 33
-        widgets.label("Robots", rect(MARGIN, y, 50, 26))
-        widgets.entry("robots", "", rect(MARGIN + 52, y, 44, 26), lambda text: number("robots", text))
-        widgets.does("−", rect(MARGIN + 99, y, 24, 26), "fewer")
-        widgets.does("+", rect(MARGIN + 126, y, 24, 26), "more")
-        widgets.label("Seed", rect(MARGIN + 168, y, 36, 26))
-        widgets.entry("seed", "", rect(MARGIN + 206, y, 60, 26), lambda text: number("seed", text))
-        widgets.does("↻", rect(MARGIN + 270, y, 26, 26), "seed")
-        return y + 34
+        def open_map(name: str) -> None:
+            desk.attempt(lambda: desk.open_map(names.get(name, name)))
+
+        def begin(name: str) -> None:
+            desk.attempt(lambda: desk.restart(start=name))
+
+        def build() -> None:
+            widgets.label("ENVIRONMENT", rect(MARGIN, 0, WIDE, 18), style="#header")
+            now = files.get(desk.map_name, desk.map_name)
+            widgets.menu("map", list(names), now, rect(MARGIN, 20, 172, 28), open_map)
+            widgets.menu("start", starts, start, rect(MARGIN + 178, 20, 118, 28), begin)
+            widgets.label("Robots", rect(MARGIN, 53, 50, 26))
+            widgets.entry("robots", "", rect(MARGIN + 52, 53, 44, 26), lambda text: number("robots", text))
+            widgets.does("−", rect(MARGIN + 99, 53, 24, 26), "fewer")
+            widgets.does("+", rect(MARGIN + 126, 53, 24, 26), "more")
+            widgets.label("Seed", rect(MARGIN + 168, 53, 36, 26))
+            widgets.entry("seed", "", rect(MARGIN + 206, 53, 60, 26), lambda text: number("seed", text))
+            widgets.does("↻", rect(MARGIN + 270, 53, 26, 26), "seed")
+
+        widgets.section("environment", (desk.map_name, *maps, *starts, start), y, build)
+        return y + 87
 
     def _controllers(self, widgets: Widgets, y: float) -> float:
-        desk, session = self.desk, self.desk.session
-        count = len(session.lanes)
-        title = "CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE"
-        widgets.label(title, widgets.rect(MARGIN, y, WIDE, 18), style="#header")
-        y += 20
+        desk, session, rect = self.desk, self.desk.session, widgets.rect
         now = [session.circumstances(lane).law.name for lane in session.lanes]
-        names = {str(controller_kind(name).label): name for name in dict.fromkeys([*desk.laws, *now])}
-        labels = {name: label for label, name in names.items()}
-        places = min(count + 1, MOST_PANES)
-        columns = 3 if places == 3 else 2
-        wide = (WIDE - 6 * (columns - 1)) / columns
-        for k in range(places):
-            x, row = MARGIN + (k % columns) * (wide + 6), y + (k // columns) * 32
-            if k == count:
-                text = "+ compare" if count == 1 else "+"
-                widgets.does(text, widgets.rect(x, row, wide, 28), "pane:add")
-                continue
+        labels = law_labels([*desk.laws, *now])
+        names = {label: name for name, label in labels.items()}
+        count = len(now)
 
-            def choose(label: str, pane: int = k) -> None:
-                desk.attempt(lambda: desk.set_law(pane, names[label]))
+        def pane(k: int, x: float, row: float, width: float) -> None:
+            def choose(label: str) -> None:
+                desk.attempt(lambda: desk.set_law(k, names[label]))
 
-            def close(pane: int = k) -> None:
-                desk.active = pane
+            def close() -> None:
+                desk.active = k
                 self._do("pane:remove")
 
             room = 26 if count > 1 else 0
-            widgets.menu(list(names), labels[now[k]], widgets.rect(x, row, wide - room, 28), choose)
+            place = rect(x, row, width - room, 28)
+            widgets.menu(f"law:{k}", list(names), labels[now[k]], place, choose)
             if room:
-                rect = widgets.rect(x + wide - 24, row, 24, 28)
-                widgets.button("×", rect, close, tip="Remove this pane", style="#small")
-        return y + 32 * (-(-places // columns)) + 4
+                place, name = rect(x + width - 24, row, 24, 28), f"close:{k}"
+                widgets.button("×", place, close, name=name, tip="Remove this pane", style="#small")
+
+        def build() -> None:
+            title = "CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE"
+            widgets.label(title, rect(MARGIN, 0, WIDE, 18), style="#header")
+            if count == 2:  # three in a row, for which the third is small
+                places = [(x, 20.0, width) for x, width in columns(2, WIDE - 28 - GAP)]
+                places.append((MARGIN + WIDE - 28.0, 20.0, 28.0))
+            else:
+                places = [(x, row, width) for row in (20.0, 52.0) for x, width in columns(2)]
+            for k in range(count):
+                pane(k, *places[k])
+            if count < MOST_PANES:
+                x, row, width = places[count]
+                widgets.does("+ compare" if count != 2 else "+", rect(x, row, width, 28), "pane:add")
+
+        widgets.section("controllers", (tuple(now), tuple(labels)), y, build)
+        return y + (56 if count < 3 else 88)
 
     def _run(self, widgets: Widgets, y: float) -> float:
-        widgets.label("RUN", widgets.rect(MARGIN, y, WIDE, 18), style="#header")
-        y += 20
-        for k, (text, action) in enumerate(
-            (("Pause", "pause"), ("Step", "step"), ("Settle", "settle"), ("Restart", "restart"))
-        ):
-            widgets.does(text, widgets.rect(MARGIN + k * (_QUARTER + 6), y, _QUARTER, 28), action)
-        y += 33
-        widgets.label("Speed", widgets.rect(MARGIN, y, 50, 22))
-        widgets.slider(
-            "speed",
-            widgets.rect(MARGIN + 52, y + 3, 188, 16),
-            SPEEDS.index(1.0),
-            (0, len(SPEEDS) - 1),
-            lambda place: self.desk.attempt(lambda: self.desk.set_speed(SPEEDS[round(place)])),
-        )
-        self._speed = widgets.label("1×", widgets.rect(MARGIN + 248, y, 48, 22))
-        return y + 28
+        rect = widgets.rect
+        does = (("Pause", "pause"), ("Step", "step"), ("Settle", "settle"), ("Restart", "restart"))
+
+        def speed(place: float) -> None:
+            self.desk.attempt(lambda: self.desk.set_speed(SPEEDS[round(place)]))
+
+        def build() -> None:
+            widgets.label("RUN", rect(MARGIN, 0, WIDE, 18), style="#header")
+            for (x, width), (text, action) in zip(columns(len(does)), does, strict=True):
+                widgets.does(text, rect(x, 20, width, 28), action)
+            widgets.label("Speed", rect(MARGIN, 53, 50, 22))
+            place = rect(MARGIN + 52, 57, 194, 14)
+            widgets.slider("speed", place, SPEEDS.index(1.0), (0.0, len(SPEEDS) - 1.0), speed)
+            widgets.label("1×", rect(MARGIN + 254, 53, 42, 22), name="speed")
+
+        widgets.section("run", None, y, build)
+        return y + 81
 
     def _tools(self, widgets: Widgets, y: float) -> float:
-        widgets.label("MOUSE", widgets.rect(MARGIN, y, WIDE, 18), style="#header")
-        y += 20
-        for k, tool in enumerate(self.desk.tools.values()):
-            x, row = MARGIN + (k % 4) * (_QUARTER + 6), y + (k // 4) * 30
-            widgets.does(tool.title, widgets.rect(x, row, _QUARTER, 26), f"tool:{tool.name}")
-        return y + 66
+        def build() -> None:
+            widgets.label("MOUSE", widgets.rect(MARGIN, 0, WIDE, 18), style="#header")
+            for k, tool in enumerate(self.desk.tools.values()):
+                x, width = columns(4)[k % 4]
+                place = widgets.rect(x, 20 + 30 * (k // 4), width, 26)
+                widgets.does(tool.title, place, f"tool:{tool.name}")
+
+        widgets.section("tools", None, y, build)
+        return y + 86
 
     # keeping up
 
     def _sync(self, widgets: Widgets) -> None:
         desk, session = self.desk, self.desk.session
-        widgets.caption("pause", "Pause" if session.playing else "Play")
+        widgets.say("button", "pause", "Pause" if session.playing else "Play")
         widgets.mark("pause", not session.playing)
         widgets.mark("settle", session.stop_when_settled)
+        widgets.say("button", "film", "End film" if desk.filming else "Record film")
         widgets.mark("film", desk.filming)
+        widgets.mark("fade", desk.fade)
+        widgets.say("button", "theme", "Dark" if self._theme is LIGHT else "Light")
+        for name in TABS:
+            widgets.mark(f"tab:{name}", name == self.tab, ("#chosen_tab", "#small"))
         for name in desk.tools:
             widgets.mark(f"tool:{name}", desk.tool.name == name)
-        widgets.say("robots", str(session.scenario.robots))
-        widgets.say("seed", str(session.scenario.seed))
+        widgets.fill("robots", str(session.scenario.robots))
+        widgets.fill("seed", str(session.scenario.seed))
         speed = session.clock.speed
         widgets.slide("speed", min(range(len(SPEEDS)), key=lambda k: abs(_order(SPEEDS[k]) - _order(speed))))
-        if self._speed.text != speed_words(speed):
-            self._speed.set_text(speed_words(speed))
+        widgets.say("label", "speed", speed_words(speed))
         for each in desk.parameters():
             widgets.slide(each.name, each.place())
-            widgets.say(each.name, each.words())
+            widgets.fill(each.name, each.words())
         for name in self.titles:
             widgets.tick(name, name in desk.shown)
+
+
+def short_names(files: list[str]) -> dict[str, str]:
+    """Return what maps are called in the menu, by what they are: files without their folders.
+
+    >>> short_names(["rooms", "/tmp/a/rooms-1.json", "a/x.json", "b/x.json"])
+    {'rooms': 'rooms', '/tmp/a/rooms-1.json': 'rooms-1.json', 'a/x.json': 'a/x.json', 'b/x.json': 'b/x.json'}
+    """
+    names = [Path(file).name for file in files]
+    return {file: name if names.count(name) == 1 else file for file, name in zip(files, names, strict=True)}
+
+
+def law_labels(names: Iterable[str]) -> dict[str, str]:
+    """Return what controllers are called in the menu, by their names; no two are called the same.
+
+    >>> law_labels(["rapf", "lloyd"])
+    {'rapf': 'RAPF', 'lloyd': 'LA'}
+    """
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(names):
+        try:
+            label = str(controller_kind(name).label)
+        except ParameterError:  # of a saved run, and gone since
+            label = name.rpartition(":")[2]
+        found[name] = label if label not in found.values() else f"{label} ({name})"
+    return found
 
 
 def _order(speed: float) -> float:

@@ -76,7 +76,9 @@ class Parameter:
         """Return where the slider stands, 0 to 1: logarithmic, so that halves and doubles are as far."""
         if self.value is None or math.isinf(self.value):
             return 1.0
-        if self.low <= 0.0:
+        if self.high <= self.low:
+            part = 0.0
+        elif self.low <= 0.0:
             part = (self.value - self.low) / (self.high - self.low)
         elif self.value <= 0.0:
             part = 0.0
@@ -85,14 +87,14 @@ class Parameter:
         return min(max(part, 0.0), _END if self.optional else 1.0)
 
     def at(self, place: float) -> float | None:
-        """Return the value of a place of the slider, to three digits."""
+        """Return the value of a place of the slider, to three digits, never beyond its ends."""
         if self.optional and place > _END:
             return None
         if self.low <= 0.0:
             value = self.low + place * (self.high - self.low)
         else:
             value = self.low * (self.high / self.low) ** place
-        return float(f"{value:.3g}")
+        return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def words(self) -> str:
         """Return the value as people type it."""
@@ -121,7 +123,7 @@ def gain_parameters(law: Law) -> list[Parameter]:
     """Return a slider for each gain of a controller."""
     found = []
     for name, gain in law.known.items():
-        usual = gain.default if gain.default else 1.0
+        usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
         if usual > 0 and gain.low >= 0:
             low, high = max(usual / SPAN, gain.low), min(usual * SPAN, gain.high)
             low = low if low > 0 else usual / SPAN

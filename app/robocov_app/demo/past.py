@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from copy import deepcopy
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.errors import ParameterError
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.sensor import RangeSensor
 from robocov.solid import solid_pieces
-from robocov_app.demo.lane import with_failed
 
 if TYPE_CHECKING:
+    from robocov.controllers.base import Controller
+    from robocov.environment import Environment
     from robocov_app.demo.history import Circumstances, State
 
 
@@ -20,18 +25,32 @@ class Past:
     """Explains states; it keeps what many of them have in common."""
 
     def __init__(self) -> None:
-        self._circumstances: Circumstances | None = None
+        # as many as there are panes, and some more
+        self._explaining = lru_cache(maxsize=8)(_Explaining)
 
     def snapshot(self, state: State, time: float) -> Snapshot:
-        """Return the moment as it was; a controller that fails on it decided nothing."""
-        circumstances = state.circumstances
-        if circumstances is not self._circumstances:
-            environment = with_failed(circumstances)
-            self._region = environment.region
-            self._sensor = RangeSensor(solid_pieces(environment))
-            self._team = circumstances.limits.team(len(circumstances.numbers))
+        """Return the moment as it was; a controller that fails on it decided nothing.
+
+        Parameters
+        ----------
+        state : State
+        time : float, s
+        """
+        return self._explaining(state.circumstances).snapshot(state, time)
+
+
+class _Explaining:
+    """What states of the same circumstances have in common."""
+
+    def __init__(self, circumstances: Circumstances) -> None:
+        self._region = circumstances.solid.region
+        self._sensor = _sensor_in(circumstances.solid)
+        self._team = circumstances.limits.team(len(circumstances.numbers))
+        self._controller: Controller | None = None
+        with suppress(ParameterError):  # what a saved run was made with may be gone
             self._controller = circumstances.law.made()
-            self._circumstances = circumstances
+
+    def snapshot(self, state: State, time: float) -> Snapshot:
         seen = Observations(
             positions=state.positions,
             velocities=state.velocities,
@@ -40,11 +59,36 @@ class Past:
             region=self._region,
             time=time,
         )
-        memory = state.memory
+        decision = self._decision(seen, state)
+        if state.recorded is not None and not _agree(decision, state.recorded):
+            # the controller is not what it was
+            decision = state.recorded
+        return Snapshot(seen, decision)
+
+    def _decision(self, seen: Observations, state: State) -> Decision:
+        nothing = Decision(np.zeros_like(seen.positions))
+        if self._controller is None:
+            return nothing
         try:
+            # it may change what it remembers, and is asked again
+            memory = deepcopy(state.memory)
             if memory is None:
                 memory = self._controller.begin(self._region, self._team)
             decision = self._controller.decide(seen, memory)
-        except Exception:  # a user's controller may do anything
-            decision = Decision(np.zeros_like(state.positions))
-        return Snapshot(seen, decision)
+            good = isinstance(decision, Decision) and all(
+                isinstance(rows, np.ndarray) and rows.shape == seen.positions.shape
+                for rows in (decision.forces, *(() if decision.goals is None else (decision.goals,)))
+            )
+        except (Exception, SystemExit):  # a user's controller may do anything
+            return nothing
+        return decision if good and np.isfinite(decision.forces).all() else nothing
+
+
+def _agree(decision: Decision, recorded: Decision) -> bool:
+    """Whether a decision that was made again, with all that explains it, is the recorded one."""
+    return bool(np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9))
+
+
+@lru_cache(maxsize=4)
+def _sensor_in(environment: Environment) -> RangeSensor:
+    return RangeSensor(solid_pieces(environment))

@@ -44,6 +44,7 @@ class Pointer:
         self._interrupt = interrupt
         self.at = (0, 0)
         self._drag = ""
+        self._button = 0
         self._held = 0
         self._pressed_at = (0, 0)
         self._last_click = -1.0, (0, 0)
@@ -55,14 +56,15 @@ class Pointer:
 
     def take(self, event: pygame.event.Event, now: float) -> None:
         """Take an event of the mouse at a time in seconds."""
-        layout = self._arena.layout
+        layout, moved = self._arena.layout, event.type == pygame.MOUSEMOTION
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
         # an open menu may hang over the arena; a slider may be dragged beyond the panel
         over_panel = inside(layout.panel, self.at) or self._panel.unfolded
-        if not self._drag and (over_panel or event.type in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONUP)):
+        # of moves the panel takes note by itself, once a frame
+        if not self._drag and (over_panel or event.type == pygame.MOUSEBUTTONUP) and not moved:
             self._panel.take(event)
-        if event.type == pygame.MOUSEMOTION:
+        if moved:
             self._moved(event)
         elif event.type == pygame.MOUSEBUTTONUP:
             self._released(event)
@@ -78,13 +80,14 @@ class Pointer:
     def leave(self) -> None:
         """The cursor is not in the window any more."""
         self._desk.cursor = None
+        self._chart.hover = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         desk, layout = self._desk, self._arena.layout
         if self._drag:  # a second button while the first is held
             return
         pane = self._arena.pane_at(event.pos)
-        self._pressed_at = event.pos
+        self._pressed_at, self._button = event.pos, event.button
         if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
             if event.button == 1:
                 self._interrupt()
@@ -134,7 +137,7 @@ class Pointer:
 
     def _released(self, event: pygame.event.Event) -> None:
         desk, drag = self._desk, self._drag
-        if drag == "tool" and event.button != 1:
+        if event.button != self._button:  # another one than the one that is held
             return
         self._drag = ""
         clicked = _far(event.pos, self._pressed_at) < _SLIP
@@ -143,7 +146,7 @@ class Pointer:
             desk.attempt(lambda: desk.tool.release(desk.session, point))
         elif drag == "pan" and clicked and event.button == 3:
             desk.attempt(lambda: desk.tool.finish(desk.session))
-        elif drag == "pan" and clicked and desk.tool is desk.hand:
+        elif drag == "pan" and clicked and event.button == 1 and desk.tool is desk.hand:
             desk.hand.selected = None
             desk.version += 1
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,12 +53,14 @@ class Law:
         """
         return make_controller(self.name, self.gains)
 
-    @property
+    # kept, for to look at a controller in a file is to run that file
+
+    @cached_property
     def label(self) -> str:
         """The controller as people call it."""
         return str(controller_kind(self.name).label)
 
-    @property
+    @cached_property
     def known(self) -> dict[str, Gain]:
         """What is known of its gains, by name."""
         return gains_of(controller_kind(self.name))
@@ -74,9 +77,29 @@ class Law:
         ParameterError
             When there is no such gain, or the value is out of range.
         """
-        law = replace(self, gains={**self.gains, gain: value})
-        law.made()
-        return law
+        gains = {**self.gains, gain: value}
+        replace(self, gains=gains).made()
+        return replace(self, gains={name: v for name, v in gains.items() if v != self.known[name].default})
+
+
+def gain_words(before: Law, after: Law) -> str:
+    """Return which gains differ, as people write them."""
+    changed = [name for name in after.known if before.value(name) != after.value(name)]
+    words = []
+    for name in changed:
+        value = after.value(name)
+        words.append(f"{name} = {'no limit' if value is None else f'{value:.3g}'}")
+    return ", ".join(words)
+
+
+def branch_words(law: Law) -> str:
+    """Return how a branch that was left is called."""
+    gains = ", ".join(
+        f"{name} {'no limit' if value is None else f'{value:.3g}'}"
+        for name, value in law.gains.items()
+        if value != law.known[name].default
+    )
+    return f"{law.label}, {gains}" if gains else law.label
 
 
 @dataclass(frozen=True)
@@ -126,6 +149,8 @@ class Scenario:
         Control period.
     given : (n, 2) m or None
         Starts that come from somewhere else, as from a saved run.
+    moving : (n, 2) m/s or None
+        Velocities there; at rest by default.
     """
 
     environment: Environment
@@ -136,6 +161,7 @@ class Scenario:
     limits: Limits = Limits()
     dt: float = DEFAULT_DT
     given: Array | None = None
+    moving: Array | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from robocov.arrays import Array
+    from robocov_app.demo.history import Circumstances, History
 
 RATE = 30.0
 """Most rows for each simulated second."""
@@ -85,3 +86,39 @@ class Trail:
         self._rows[: len(keep)] = self._rows[keep]
         self._times[: len(keep)] = self._times[keep]
         self._count = len(keep)
+
+
+def trail_of(history: History, pane: int, last: int) -> Trail:
+    """Return where the robots that worked in a pane at moment `last` went until then."""
+    numbers = history[last].states[pane].circumstances.numbers
+    trail = Trail(len(numbers))
+    before: Circumstances | None = None
+    rows: list[int] = []
+    their_rows: list[int] = []
+    latest = -np.inf
+    for k in range(last + 1):
+        time, state = history.time(k), history[k].states[pane]
+        if time - latest < 1.0 / RATE - 1e-6:
+            continue
+        if state.circumstances is not before:
+            before = state.circumstances
+            rows = [row for row, number in enumerate(numbers) if number in before.numbers]
+            their_rows = [before.numbers.index(numbers[row]) for row in rows]
+        places = np.full((len(numbers), 2), np.nan)
+        places[rows] = state.positions[their_rows]
+        trail.add(time, places)
+        latest = time
+    return trail
+
+
+def starts_of(history: History, pane: int, last: int) -> Array:
+    """Return where the robots that worked in a pane at moment `last` had come in, (n, 2) m."""
+    starts: dict[int, list[float]] = {}
+    before: Circumstances | None = None
+    for k in range(last + 1):
+        state = history[k].states[pane]
+        if state.circumstances is not before:
+            before = state.circumstances
+            for number, place in zip(before.numbers, state.positions.tolist(), strict=True):
+                starts.setdefault(number, place)
+    return np.array([starts[number] for number in history[last].states[pane].circumstances.numbers])

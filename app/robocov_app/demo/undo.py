@@ -23,8 +23,8 @@ class Edit:
     """
 
     words: str
-    back: Callable[[], None]
-    again: Callable[[], None]
+    back: Callable[[], object]
+    again: Callable[[], object]
 
 
 class Undo:

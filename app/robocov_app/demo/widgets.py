@@ -2,32 +2,44 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import pygame
 import pygame_gui
+from pygame_gui.core import UIContainer
 from pygame_gui.elements import (
     UIButton,
     UICheckBox,
     UIDropDownMenu,
     UIHorizontalSlider,
     UILabel,
-    UIPanel,
-    UIScrollingContainer,
     UITextEntryLine,
 )
 
-from robocov_app.demo.actions import key_words
-from robocov_app.demo.look import manager_of
+from robocov_app.demo.actions import KEY_REPEAT, key_words
+from robocov_app.demo.look import BAR, TEXT, manager_of
+from robocov_app.demo.sections import Glass, Scrolled, Section
+from robocov_app.view.fonts import shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from robocov_app.demo.actions import Action
     from robocov_app.demo.layout import Box
     from robocov_app.view.theme import Theme
 
-_NO_MARGINS = {"left": 0, "right": 0, "top": 0, "bottom": 0}
+MOST_PAGES = 12
+"""Pages that are kept although they are not open, so that turning to them costs nothing."""
+
+LONGEST_LIST = 268
+"""Pixels at scale 1 that an open menu is high at most."""
+
+_FAR = 100_000
+
+_INDENT = "\u00a0\u00a0"
+"""Before what a menu offers, where the library knows no padding."""
 
 
 class Widgets:
@@ -56,42 +68,112 @@ class Widgets:
         actions: dict[str, Action],
         do: Callable[[str], None],
     ) -> None:
-        self.size, self.place, self.scale = size, box, scale
+        self.size, self.place, self.theme, self.scale = size, box, theme, scale
         self._actions, self._do = actions, do
         self.manager = manager_of(size, theme, scale)
-        self.clear()
+        self._sections: dict[str, Section] = {}
+        self._pages: OrderedDict[object, Section] = OrderedDict()
+        self._now = Section(None, 0)
+        self._was_held = False
+        self._was_typing: UITextEntryLine | None = None
+        self._box = UIContainer(pygame.Rect(box), self.manager)
+        self._over = Glass(pygame.Rect(box), self.manager, starting_height=20)
+        self._into: Any = self._box
 
-    def clear(self) -> None:
-        """Begin anew, with an empty box."""
-        self.manager.clear_and_reset()  # type: ignore[no-untyped-call]
-        self._pressed: dict[Any, Callable[[], object]] = {}
-        self._chosen: dict[Any, Callable[[str], object]] = {}
-        self._typed: dict[Any, Callable[[str], object]] = {}
-        self._slid: dict[Any, Callable[[float], object]] = {}
-        self._switched: dict[Any, Callable[[bool], object]] = {}
-        self.buttons: dict[str, UIButton] = {}
-        self.entries: dict[str, UITextEntryLine] = {}
-        self.sliders: dict[str, UIHorizontalSlider] = {}
-        self.checks: dict[str, UICheckBox] = {}
-        self.box: Any = UIPanel(
-            pygame.Rect(self.place), manager=self.manager, object_id="#panel", margins=_NO_MARGINS
-        )
+    def resize(self, size: tuple[int, int], box: Box) -> None:
+        """Move everything into another box of another window; pages are built anew."""
+        self.size, self.place = size, box
+        self.manager.set_window_resolution(size)
+        for container in (self._box, self._over):
+            container.set_position(box[:2])
+            container.set_dimensions(box[2:])
+        self._forget_pages()
+
+    # sections
+
+    def section(self, name: str, key: object, y: float, build: Callable[[], object]) -> None:
+        """Have a section at a height: build it, unless it is there for the same key."""
+        top = round(y * self.scale)
+        there = self._sections.get(name)
+        if there is not None and there.key == key:
+            if there.top != top:
+                there.move(top)
+            return
+        if there is not None:
+            there.kill()
+        self._sections[name] = self._now = Section(key, top)
+        self._into = self._box
+        build()
+
+    def page(self, key: object, y: float, needed: float, build: Callable[[float], object]) -> None:
+        """Turn to a page from a height down; build it, unless it has been there before.
+
+        `build` is told what width a scroll bar takes because more height is needed than there is.
+        """
+        top = round(y * self.scale)
+        whole = (key, top)
+        open_page = self._sections.get("page")
+        if open_page is not None and open_page.key == whole:
+            return
+        if open_page is not None:
+            for element in open_page.elements:
+                element.hide()
+            self._pages[open_page.key] = open_page
+        kept = self._pages.pop(whole, None)
+        if kept is not None:
+            for element in kept.elements:
+                element.show()
+            self._sections["page"] = kept
+            return
+        while len(self._pages) >= MOST_PAGES:
+            self._pages.popitem(last=False)[1].kill()
+        self._sections["page"] = self._now = Section(whole, 0)
+        _, _, width, height = self.place
+        rect = pygame.Rect(0, top, width, max(height - top, 1))
+        bar = 0
+        if needed * self.scale <= rect.height:
+            self._into = UIContainer(rect, self.manager, container=self._box)
+        else:
+            bar = round(BAR * self.scale)
+            self._into = self._now.scrolled = Scrolled(rect, self.manager, self._box, bar)
+            self._into.set_scrollable_area_dimensions((width - bar, round(needed * self.scale)))
+        self._now.elements.append(self._into)
+        build(bar / self.scale)
+        if bar:  # or its knob would have sharp corners at first
+            self._into.vert_scroll_bar.sliding_button.rebuild()
+
+    def _forget_pages(self) -> None:
+        for page in self._pages.values():
+            page.kill()
+        self._pages.clear()
+        open_page = self._sections.pop("page", None)
+        if open_page is not None:
+            open_page.kill()
 
     def rect(self, x: float, y: float, width: float, height: float) -> pygame.Rect:
-        """Return a rectangle in pixels."""
+        """Return a rectangle in pixels, down from the section's top."""
         scale = self.scale
-        return pygame.Rect(round(x * scale), round(y * scale), round(width * scale), round(height * scale))
+        left, top = round(x * scale), self._now.top + round(y * scale)
+        return pygame.Rect(left, top, round(width * scale), round(height * scale))
 
     # making
 
+    def _made(self, element: Any, kind: str, name: str) -> None:
+        if self._into is self._box:  # what is in a page comes and goes with it
+            self._now.elements.append(element)
+        if name:
+            self._now.named[f"{kind}:{name}"] = element
+
     def label(
-        self, text: str, rect: pygame.Rect, *, style: str | None = None, box: Any = None, tip: str = ""
-    ) -> UILabel:
-        """Write a word; `style` is ``#header`` or ``#unit``."""
-        label = UILabel(rect, text, self.manager, box or self.box, object_id=style)
+        self, text: str, rect: pygame.Rect, *, name: str = "", style: str | None = None, tip: str = ""
+    ) -> None:
+        """Write a word, shortened where there is no room; `style` is ``#header`` or ``#unit``."""
+        size, bold = TEXT.get(style or "", TEXT[""])
+        text = shortened(text, round(size * self.scale), rect.width - 1, bold)
+        label = UILabel(rect, text, self.manager, self._into, object_id=style)
         if tip:
-            label.set_tooltip(tip)
-        return label
+            label.set_tooltip(escape(tip))
+        self._made(label, "label", name)
 
     def button(
         self,
@@ -100,46 +182,55 @@ class Widgets:
         call: Callable[[], object],
         *,
         name: str = "",
-        box: Any = None,
         tip: str = "",
         style: str | None = None,
-    ) -> UIButton:
+    ) -> None:
         """Make a button; one named as an action tells the action's key."""
         known = self._actions.get(name)
         if known is not None:
             keys = " or ".join(key_words(key) for key in known.keys)
             tip = f"{known.title} ({keys})" if keys else known.title
         button = UIButton(
-            rect, text, self.manager, box or self.box, tool_tip_text=tip or None, object_id=style
+            rect, text, self.manager, self._into, tool_tip_text=escape(tip) or None, object_id=style
         )
-        self._pressed[button] = call
-        if name:
-            self.buttons[name] = button
-        return button
+        self._now.calls[pygame_gui.UI_BUTTON_PRESSED, button] = lambda _: call()
+        self._made(button, "button", name)
 
-    def does(self, text: str, rect: pygame.Rect, action: str, box: Any = None) -> UIButton:
+    def does(self, text: str, rect: pygame.Rect, action: str) -> None:
         """Make a button that does an action."""
-        return self.button(text, rect, lambda: self._do(action), name=action, box=box)
+        self.button(text, rect, lambda: self._do(action), name=action)
 
     def menu(
-        self, options: list[str], now: str, rect: pygame.Rect, call: Callable[[str], object]
-    ) -> UIDropDownMenu:
-        """Make a menu that drops down."""
-        all_options: list[str | tuple[str, str]] = [*([] if now in options else [now]), *options]
-        room = round(min(260 * self.scale, self.size[1] - rect.bottom - 20))
-        menu = UIDropDownMenu(
-            all_options, now, rect, self.manager, self.box, expansion_height_limit=max(room, 60)
-        )
-        self._chosen[menu] = call
-        return menu
-
-    def entry(
-        self, name: str, text: str, rect: pygame.Rect, call: Callable[[str], object], box: Any = None
+        self, name: str, options: list[str], now: str, rect: pygame.Rect, call: Callable[[str], object]
     ) -> None:
+        """Make a menu that drops down; what there is no room for is shortened."""
+        size = round(TEXT[""][0] * self.scale)
+        room = rect.width - 52 * self.scale
+        whole = {_INDENT + shortened(each, size, room): each for each in (now, *options)}
+        if len(whole) < len({now, *options}):
+            whole = {_INDENT + each: each for each in (now, *options)}
+        short = {each: text for text, each in whole.items()}
+        shown: list[str | tuple[str, str]] = [*([] if now in options else [short[now]])]
+        shown += [short[each] for each in options]
+        high = round(min(LONGEST_LIST * self.scale, self.place[3] - rect.bottom - 8 * self.scale))
+        menu = UIDropDownMenu(
+            shown, short[now], rect, self.manager, self._over, expansion_height_limit=max(high, 60)
+        )
+
+        def chosen(text: str) -> object:
+            return call(whole.get(text, text))
+
+        self._now.calls[pygame_gui.UI_DROP_DOWN_MENU_CHANGED, menu] = chosen
+        self._now.menus.append(menu)
+        self._now.elements.append(menu)
+        self._now.named[f"menu:{name}"] = menu
+
+    def entry(self, name: str, text: str, rect: pygame.Rect, call: Callable[[str], object]) -> None:
         """Make a field that is called with its text when Enter is pressed."""
-        entry = UITextEntryLine(rect, self.manager, box or self.box, initial_text=text)
-        self._typed[entry] = call
-        self.entries[name] = entry
+        entry = UITextEntryLine(rect, self.manager, self._into, initial_text=text)
+        self._now.calls[pygame_gui.UI_TEXT_ENTRY_FINISHED, entry] = call
+        self._now.entries.append(entry)
+        self._made(entry, "entry", name)
 
     def slider(
         self,
@@ -148,110 +239,162 @@ class Widgets:
         now: float,
         span: tuple[float, float],
         call: Callable[[float], object],
-        box: Any = None,
     ) -> None:
         """Make a slider that is called with its value while it moves."""
-        slider = UIHorizontalSlider(rect, now, span, self.manager, box or self.box)
-        self._slid[slider] = call
-        self.sliders[name] = slider
+        slider = UIHorizontalSlider(rect, float(now), span, self.manager, self._into)
+        if slider.sliding_button is not None:
+            slider.sliding_button.set_hold_range((_FAR, _FAR))
+        self._now.calls[pygame_gui.UI_HORIZONTAL_SLIDER_MOVED, slider] = call
+        self._now.sliders.append(slider)
+        self._made(slider, "slider", name)
 
     def check(
-        self,
-        name: str,
-        text: str,
-        rect: pygame.Rect,
-        now: bool,
-        call: Callable[[bool], object],
-        box: Any,
-        tip: str,
+        self, name: str, text: str, rect: pygame.Rect, now: bool, call: Callable[[bool], object], tip: str
     ) -> None:
         """Make a check box."""
-        check = UICheckBox(rect, text, self.manager, box, initial_state=now, tool_tip_text=tip)
-        self._switched[check] = call
-        self.checks[name] = check
-
-    def scrolled(self, top: int, needed: float) -> tuple[Any, bool]:
-        """Return a container from `top` down, and whether it has a scroll bar because more is needed."""
-        _, _, width, height = self.place
-        rect = pygame.Rect(0, top, width, height - top)
-        if needed * self.scale <= rect.height:
-            panel = UIPanel(
-                rect, manager=self.manager, container=self.box, object_id="#panel", margins=_NO_MARGINS
-            )
-            return panel, False
-        box = UIScrollingContainer(rect, self.manager, container=self.box, allow_scroll_x=False)
-        box.set_scrollable_area_dimensions((width - round(18 * self.scale), round(needed * self.scale)))
-        return box, True
+        check = UICheckBox(rect, text, self.manager, self._into, initial_state=now, tool_tip_text=escape(tip))
+        self._now.calls[pygame_gui.UI_CHECK_BOX_CHECKED, check] = lambda _: call(True)
+        self._now.calls[pygame_gui.UI_CHECK_BOX_UNCHECKED, check] = lambda _: call(False)
+        self._made(check, "check", name)
 
     # keeping up
 
-    def mark(self, name: str, chosen: bool) -> None:
+    def find(self, kind: str, name: str) -> Any:
+        """Return a widget that is shown, None if there is none of that kind and name."""
+        wanted = f"{kind}:{name}"
+        for section in self._sections.values():
+            if wanted in section.named:
+                return section.named[wanted]
+        return None
+
+    def mark(self, name: str, chosen: bool, styles: tuple[str, str | None] = ("#chosen", None)) -> None:
         """Show a button as chosen, or not."""
-        button = self.buttons.get(name)
-        if button is None:
-            return
-        now = button.object_ids is not None and "#chosen" in button.object_ids
-        if now != chosen:
-            button.change_object_id("#chosen" if chosen else None)
+        button = self.find("button", name)
+        style = styles[0] if chosen else styles[1]
+        if button is not None and button.object_ids[-1] != style:
+            button.change_object_id(style)
 
-    def caption(self, name: str, text: str) -> None:
-        """Let a button show a text."""
-        if name in self.buttons and self.buttons[name].text != text:
-            self.buttons[name].set_text(text)
+    def say(self, kind: str, name: str, text: str) -> None:
+        """Let a button or a label show a text."""
+        widget = self.find(kind, name)
+        if widget is not None and widget.text != text:
+            widget.set_text(text)
 
-    def say(self, name: str, text: str) -> None:
-        """Let a field show a text, unless somebody types into it."""
-        entry = self.entries.get(name)
+    def fill(self, name: str, text: str) -> None:
+        """Let a field show a text, unless it is being typed into."""
+        entry = self.find("entry", name)
         if entry is not None and not entry.is_focused and entry.get_text() != text:
             entry.set_text(text)
 
     def slide(self, name: str, value: float) -> None:
-        """Put a slider where it belongs, unless somebody moves it."""
-        slider = self.sliders.get(name)
-        if slider is None or slider.has_moved_recently:
+        """Put a slider where it belongs, unless somebody holds it."""
+        slider = self.find("slider", name)
+        if slider is None or slider.sliding_button.held:
             return
-        if abs(float(slider.get_current_value()) - value) > 1e-3:
-            slider.set_current_value(value)
+        if abs(float(slider.get_current_value()) - value) > 1e-6:
+            slider.set_current_value(value, warn=False)
 
     def tick(self, name: str, on: bool) -> None:
         """Tick a check box, or not."""
-        check = self.checks.get(name)
+        check = self.find("check", name)
         if check is not None and check.is_checked != on:
-            check.set_state(on)
+            check.is_checked = on
+            # not `set_state`: what that posts is as if somebody had clicked
+            check._update_visual_state()
+
+    def _all(self, kind: str) -> Iterator[Any]:
+        for section in self._sections.values():
+            yield from getattr(section, kind)
 
     @property
-    def typing(self) -> bool:
-        """Whether keys go into a field."""
-        return any(entry.is_focused for entry in self._typed)
-
-    def stop_typing(self) -> None:
-        """Take the keys away from all fields."""
-        if self.typing:
-            self.manager.set_focus_set(None)
+    def typed_into(self) -> UITextEntryLine | None:
+        """The field that keys go into."""
+        return next((entry for entry in self._all("entries") if entry.is_focused), None)
 
     @property
-    def unfolded(self) -> bool:
-        """Whether a menu is open, which may hang over other things."""
-        return any(menu.current_state is menu.menu_states["expanded"] for menu in self._chosen)
+    def held(self) -> bool:
+        """Whether somebody holds a slider or the scroll bar."""
+        page = self._sections.get("page")
+        bar = page.scrolled.vert_scroll_bar if page is not None and page.scrolled is not None else None
+        bars = [] if bar is None else [bar]
+        return any(each.sliding_button.held for each in (*self._all("sliders"), *bars))
+
+    @property
+    def open_menu(self) -> UIDropDownMenu | None:
+        """The menu that is open, which may hang over other things."""
+        menus = self._all("menus")
+        return next((menu for menu in menus if menu.current_state is menu.menu_states["expanded"]), None)
+
+    def let_go(self) -> None:
+        """Take the keys away from all fields, and close the menu that is open."""
+        self.manager.set_focus_set(None)
+        menu = self.open_menu
+        if menu is not None and menu.current_state is not None:
+            menu.current_state.should_transition = True
+
+    def ended(self) -> bool:
+        """Return whether, since this was asked last, somebody has left a field or let go of a slider."""
+        held, field = self.held, self.typed_into
+        left = self._was_typing is not None and field is not self._was_typing
+        ended = left or (self._was_held and not held)
+        if left and field is None:
+            pygame.key.set_repeat(*KEY_REPEAT)  # fields change it, and leave none behind
+        self._was_held, self._was_typing = held, field
+        return ended
 
     # events
 
     def take(self, event: pygame.event.Event) -> bool:
         """Give an event to the widgets; return whether one of them took it."""
+        focused = None
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1 and self.open_menu is None:
+            focused = self.typed_into
+            self._jump(event.pos)
         taken = bool(self.manager.process_events(event))
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            self._select(focused)
+            self._toggle(event.pos)
         element = getattr(event, "ui_element", None)
-        if event.type == pygame_gui.UI_BUTTON_PRESSED and element in self._pressed:
-            self._pressed[element]()
-        elif event.type == pygame_gui.UI_DROP_DOWN_MENU_CHANGED and element in self._chosen:
-            self._chosen[element](event.text)
-        elif event.type == pygame_gui.UI_TEXT_ENTRY_FINISHED and element in self._typed:
-            call = self._typed[element]
-            self.manager.set_focus_set(None)
-            call(event.text)
-        elif event.type == pygame_gui.UI_HORIZONTAL_SLIDER_MOVED and element in self._slid:
-            self._slid[element](float(event.value))
-        elif event.type == pygame_gui.UI_CHECK_BOX_CHECKED and element in self._switched:
-            self._switched[element](True)
-        elif event.type == pygame_gui.UI_CHECK_BOX_UNCHECKED and element in self._switched:
-            self._switched[element](False)
+        if element is not None:
+            self._told(event.type, element, event)
         return taken
+
+    def _told(self, kind: int, element: Any, event: pygame.event.Event) -> None:
+        for section in self._sections.values():
+            call = section.calls.get((kind, element))
+            if call is None:
+                continue
+            if kind == pygame_gui.UI_TEXT_ENTRY_FINISHED:
+                self.manager.set_focus_set(None)
+            call(getattr(event, "text", getattr(event, "value", None)))
+            return
+
+    def _jump(self, pixel: tuple[int, int]) -> None:
+        """Bring the knob of a slider to where it was pressed, so that it is held from there."""
+        for slider in self._all("sliders"):
+            knob = slider.sliding_button
+            if not slider.hover_point(*pixel) or knob.hover_point(*pixel):
+                continue
+            part = (pixel[0] - slider.rect.left - knob.rect.width / 2) / max(slider.scrollable_width, 1)
+            low, high = slider.value_range
+            value = low + min(max(part, 0.0), 1.0) * (high - low)
+            slider.set_current_value(value, warn=False)
+            event = pygame.event.Event(pygame_gui.UI_HORIZONTAL_SLIDER_MOVED, value=value, ui_element=slider)
+            self._told(event.type, slider, event)
+            return
+
+    def _select(self, before: Any) -> None:
+        """Select what is in a field that has just been clicked, so that typing replaces it."""
+        for entry in self._all("entries"):
+            if entry.is_focused and entry is not before:
+                entry.selection_in_progress = False
+                entry.edit_position = len(entry.get_text())
+                entry.select_range = [0, len(entry.get_text())]
+
+    def _toggle(self, pixel: tuple[int, int]) -> None:
+        """Let the words beside a check box do as the box does."""
+        for section in self._sections.values():
+            for name, check in section.named.items():
+                if name.startswith("check:") and check.text_label.hover_point(*pixel):
+                    check._toggle_state()
+                    return

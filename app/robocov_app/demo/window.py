@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import warnings
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,8 @@ import numpy as np
 import pygame
 
 from robocov.atomic import written
-from robocov.errors import RobocovError
-from robocov_app.demo.actions import all_actions
+from robocov.errors import InputError, RobocovError
+from robocov_app.demo.actions import REPEATING, all_actions
 from robocov_app.demo.arena import Arena
 from robocov_app.demo.chart import Chart
 from robocov_app.demo.desk import free_name, plain
@@ -31,7 +32,7 @@ from robocov_app.view.picture import standard_layers
 from robocov_app.view.theme import theme_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from robocov_app.demo.desk import Desk
 
@@ -96,6 +97,9 @@ class Window:
         self._steps_rate = 0.0
         self._serial = -1
         self._unseen = 0.0
+        self._cursor = -1
+        self._down: set[int] = set()
+        self._opened_by = ""
         self._arrange()
 
     # frames
@@ -105,11 +109,12 @@ class Window:
         clock = pygame.time.Clock()
         before = perf_counter()
         try:
-            while not self.closed:
-                now = perf_counter()
-                self.frame(now - before)
-                before = now
-                clock.tick(FPS)
+            with undisturbed():
+                while not self.closed:
+                    now = perf_counter()
+                    self.frame(now - before)
+                    before = now
+                    clock.tick(FPS)
         finally:
             self.close()
 
@@ -140,6 +145,7 @@ class Window:
         self._ask_costs()
         self._arrange()
         self._update_panel(seconds)
+        self._show_cursor()
 
     def _pass_time(self, seconds: float) -> None:
         desk, session = self.desk, self.desk.session
@@ -210,6 +216,28 @@ class Window:
         if before is None or outer != before[0]:
             self.panel.arrange(layout, theme)
 
+    def _show_cursor(self) -> None:
+        """Let the cursor tell what a press would do."""
+        desk, at = self.desk, self.pointer.at
+        pane = self.arena.pane_at(at) if desk.cursor is not None else None
+        number = None if pane is None else self.arena.robot_at(at, pane)
+        takes_robots = desk.tool.name in ("hand", "eraser", "failure")
+        over = pane is not None and number is not None and takes_robots
+        self.arena.hovered = (pane, number) if over and pane is not None and number is not None else (-1, -1)
+        shape = pygame.SYSTEM_CURSOR_ARROW
+        if over:
+            shape = pygame.SYSTEM_CURSOR_HAND
+        elif pane is not None and desk.tool is not desk.hand:
+            shape = pygame.SYSTEM_CURSOR_CROSSHAIR
+        elif inside(self.layout.track, at) or inside(self.layout.chart, at):
+            shape = pygame.SYSTEM_CURSOR_SIZEWE
+        if shape != self._cursor and not inside(self.layout.panel, at):
+            self._cursor = shape
+            with suppress(pygame.error):  # not every display has cursors
+                pygame.mouse.set_cursor(shape)
+        elif inside(self.layout.panel, at):
+            self._cursor = -1  # the panel has set its own
+
     def _update_panel(self, seconds: float) -> None:
         """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
         self._unseen += seconds
@@ -231,11 +259,11 @@ class Window:
         if layout.panel[2] and self.tour is not None:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
-            self.panel.draw(self.screen)
+            self.panel.fill(self.screen)
             if self.panel.tab == "robot":
                 self._inspect()
                 draw_report(self.screen, self.panel.body, theme, layout.scale, self._report)
-                self.panel.draw_over(self.screen)
+            self.panel.draw(self.screen)
         if self.tour is not None and not layout.panel[2]:
             draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
         draw_message(self.screen, desk, layout, theme)
@@ -312,7 +340,10 @@ class Window:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
 
     def _fullscreen(self) -> None:
-        pygame.display.toggle_fullscreen()
+        try:
+            pygame.display.toggle_fullscreen()
+        except pygame.error as error:
+            raise InputError(f"no full screen here: {error}") from None
         self.screen = pygame.display.get_surface() or self.screen
 
     def _toggle_help(self) -> None:
@@ -359,8 +390,11 @@ class Window:
             self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.KEYDOWN:
             self._key(event)
+            self._down.add(event.key)
         elif event.type == pygame.TEXTINPUT and self.palette.open:
-            self.palette.type(event.text)
+            if event.text != self._opened_by:
+                self.palette.type(event.text)
+            self._opened_by = ""
         elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
             self.help = self.palette.open = False
         elif event.type in _OF_THE_MOUSE:
@@ -368,24 +402,32 @@ class Window:
         elif event.type == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
+            if event.type == pygame.KEYUP:
+                self._down.discard(event.key)
+            elif event.type == pygame.WINDOWFOCUSLOST:
+                self._down.clear()
             self.panel.take(event)
 
     def _key(self, event: pygame.event.Event) -> None:
         if self.palette.open:
             self._palette_key(event)
             return
+        if event.key == pygame.K_ESCAPE and (self.panel.typing or self.panel.unfolded):
+            self.panel.stop_typing()
+            return
         if self.panel.typing and event.key not in (pygame.K_F1, pygame.K_F9, pygame.K_F12):
-            if event.key == pygame.K_ESCAPE:
-                self.panel.stop_typing()
-            else:
-                self.panel.take(event)
+            self.panel.take(event)
             return
         name = self._keys.get(key_of(event))
-        if name is not None:
-            self.do(name)
+        # who holds F12 down a little too long wants one picture
+        if name is None or (event.key in self._down and name not in REPEATING):
+            return
+        self.do(name)
+        # its letter is still to come, and not meant for the palette
+        self._opened_by = event.unicode if name == "palette" else ""
 
     def _palette_key(self, event: pygame.event.Event) -> None:
-        palette = self.palette
+        palette, self._opened_by = self.palette, ""
         if event.key == pygame.K_ESCAPE:
             palette.open = False
         elif event.key == pygame.K_BACKSPACE:
@@ -398,6 +440,20 @@ class Window:
                 self.desk.attempt(lambda: self.desk.command(palette.text))
             elif palette.found:
                 self.do(palette.found[palette.chosen].name)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Keep the garbage collector away from all that is there now, modules most of all.
+
+    It would look at it again every half minute, which holds a frame up by 25 ms.
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def key_of(event: pygame.event.Event) -> str:

@@ -7,8 +7,6 @@ for the one before. The process ends when its standard input does, which it does
 from __future__ import annotations
 
 import os
-import signal
-import sys
 import threading
 import time
 from typing import TYPE_CHECKING, BinaryIO
@@ -17,6 +15,7 @@ from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
+from robocov_app.live.own_process import own_streams
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
@@ -122,12 +121,8 @@ def path_of(cost: CoverageCost, question: Question) -> Array | None:
 
 
 def main() -> None:
-    """Talk to the parent; what anything prints goes to stderr, not among the messages."""
-    # Ctrl-C is for the parent, which closes the pipe
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    target = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    Process(sys.stdin.buffer, target).run()
+    """Talk to the parent, which after Ctrl-C closes the pipe."""
+    Process(*own_streams()).run()
 
 
 if __name__ == "__main__":

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import queue
-import subprocess
 import sys
 import threading
 from dataclasses import replace
@@ -26,6 +24,7 @@ from robocov_app.live.messages import (
     receive,
     send,
 )
+from robocov_app.live.own_process import started
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -162,17 +161,7 @@ class _Talk:
     """One process, with a thread that writes to it and one that reads."""
 
     def __init__(self) -> None:
-        # it is to import what this one does
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-            environment.setdefault(name, "1")
-        self._process = subprocess.Popen(
-            # -P: what lies in the working folder is not meant
-            [sys.executable, "-P", "-m", "robocov_app.live.cost_process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=environment,
-        )
+        self._process = started("robocov_app.live.cost_process")
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         _widen(self._process.stdout)

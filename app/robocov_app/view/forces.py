@@ -21,7 +21,7 @@ _HEADS = {
     "attraction": "full",
     "repulsion_robots": "open",
     "repulsion_obstacle": "dot",
-    "viscosity": "open",
+    "viscosity": "bar",
 }
 _WORDS = {
     "attraction": "attraction",
@@ -43,7 +43,24 @@ def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width:
     ):
         if length >= 3.0:
             start = center + vector * (radius / length)
-            canvas.arrow(start.tolist(), (start + vector).tolist(), colour, width, head)
+            _arrow(canvas, start, start + vector, colour, width, head)
+
+
+def _arrow(canvas: Canvas, start: Array, end: Array, colour: Colour, width: float, head: str) -> None:
+    """Draw an arrow as `Canvas.arrow`, or with ``bar`` for a head: what slows down pulls nowhere."""
+    if head != "bar":
+        canvas.arrow(start.tolist(), end.tolist(), colour, width, head)
+        return
+    if np.any(end < -500.0) or np.any(end > np.array(canvas.surface.get_size()) + 500.0):
+        return
+    along = end - start
+    half = (1.1 * width + 1.7 * canvas.scale) / np.hypot(*along) * np.array([-along[1], along[0]])
+    bar = [(end - half).tolist(), (end + half).tolist()]
+    sketch = sprites.Sketch.around([start.tolist(), *bar], 2 * width)
+    if sketch is not None:
+        sketch.path([start.tolist(), end.tolist()], colour, width)
+        sketch.path(bar, colour, width)
+        sketch.onto(canvas.surface)
 
 
 class ForceTerm(Layer):
@@ -88,7 +105,7 @@ class ForceTerm(Layer):
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             half = 9 * canvas.scale
-            canvas.arrow((x - half, y), (x + half, y), *self._style(canvas))
+            _arrow(canvas, np.array([x - half, y]), np.array([x + half, y]), *self._style(canvas))
 
         return [LegendEntry(self.title.lower(), glyph)] if self._vectors(scene) is not None else []
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pygame
 import shapely
@@ -9,7 +11,7 @@ import shapely
 from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.canvas import Canvas
-from robocov_app.view.clipping import bounded, clipped_polygon, clipped_segment
+from robocov_app.view.clipping import FAR, bounded, clipped_polygon, clipped_segment
 from robocov_app.view.layers import Layer, LegendEntry, drawn_radii
 from robocov_app.view.scene import Scene
 from robocov_app.view.theme import Colour, mix
@@ -97,11 +99,14 @@ class RayScan(Layer):
         begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
         shown = length > begin + _FINE
         first = place + along[shown] * (begin[shown] / length[shown])[:, None]
-        colour = _premultiplied(canvas.theme.final, 0.34)
+        colour = _premultiplied(canvas.theme.final, 0.3)
         width = max(1, round(0.5 * canvas.scale * _FINE))
-        for x1, y1, x2, y2 in np.hstack([first, ends[shown]]).tolist():
-            line = clipped_segment(x1, y1, x2, y2)
-            if line is not None:
+        lines = np.hstack([first, ends[shown]])
+        near = bool(np.abs(lines).max(initial=0.0) <= FAR)
+        for x1, y1, x2, y2 in lines.tolist():
+            if near:
+                pygame.draw.line(large, colour, (x1, y1), (x2, y2), width)
+            elif (line := clipped_segment(x1, y1, x2, y2)) is not None:
                 pygame.draw.line(large, colour, *line, width)
 
     @staticmethod
@@ -114,7 +119,7 @@ class RayScan(Layer):
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             colour, size = canvas.theme.final, 8 * canvas.scale
             angle = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-            ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.7 * size * np.sin(angle)])
+            ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.15 * size * np.sin(angle)])
             for end in ends.tolist():
                 canvas.line((x - size, y), end, mix(canvas.theme.background, colour, 0.55))
             _dots(canvas, ends, _HIT * canvas.scale, colour)
@@ -270,7 +275,7 @@ class CursorPath(Layer):
             )
             placed = box.clamp(view)
             hidden = 4 * (placed != box)
-            hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in zip(path, path[1:], strict=False))
+            hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in pairwise(path))
             for (robot_x, robot_y), radius in zip(centers, radii, strict=True):
                 gap_x = max(placed.left - robot_x, 0.0, robot_x - placed.right)
                 gap_y = max(placed.top - robot_y, 0.0, robot_y - placed.bottom)

@@ -59,7 +59,7 @@ class Failed(Layer):
         ring = min(1.2 * scale, 0.25 * radius)
         canvas.stamp(lambda shift: sprites.disc(radius, fill, edge, ring, edge, "", shift), (x, y))
         # beyond the edge: crossed out, not a sign on a button
-        arm, width = round(2 * 1.35 * radius) / 2, min(2.0 * scale, 0.4 * radius)
+        arm, width = round(2 * 1.1 * radius) / 2, min(1.7 * scale, 0.35 * radius)
         canvas.stamp(
             lambda shift: sprites.cross(arm, theme.ink, theme.background, width, True, shift), (x, y)
         )

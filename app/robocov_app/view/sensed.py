@@ -49,6 +49,14 @@ class Sensed:
         count = int(np.searchsorted(self._times[: self._count], time + 1e-6, side="right"))
         return self._points[:count], self._robots[:count]
 
+    def copy(self) -> Sensed:
+        """Return a set of its own with the same points."""
+        twin = Sensed()
+        twin._points, twin._times = self._points.copy(), self._times.copy()
+        twin._robots = self._robots.copy()
+        twin._known, twin._count = set(self._known), self._count
+        return twin
+
     def cut(self, time: float) -> None:
         """Forget what was sensed after a time."""
         count = len(self.until(time)[0])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.clipping import bounded
 from robocov_app.view.layers import Layer, LegendEntry
@@ -20,13 +22,18 @@ PIECE = 2.0
 SECTION = 16.0
 """Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
 
+FADE_STEPS = 24
+"""Shades of a trajectory that fades; its page is drawn anew as often while it fades."""
 
-FADE_STEPS = 12
-"""Shades of a trajectory that fades."""
+FADE_PIECE = 4.0
+"""Pixels at scale 1 that the fastest robot goes between the corners of trajectories that fade."""
+
+_FADE_FINE = 2
+"""They are drawn so many times larger, and shrunk."""
 
 
 class Trajectories(Layer):
-    """Where the robots went.
+    """Where the robots went; nothing where a row has nan.
 
     Parameters
     ----------
@@ -47,7 +54,8 @@ class Trajectories(Layer):
         self._drawn = 0
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
-        self._fading: tuple[object, pygame.Surface] | None = None
+        self._ended: list[tuple[int, list[list[float]]]] = []
+        self._colours: tuple[object, list[Colour]] | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         trail = scene.trail
@@ -55,74 +63,102 @@ class Trajectories(Layer):
             return
         colours = self._of_robots(canvas)
         width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
-        if self.fade is not None and scene.trail_time is not None:
-            self._faded(canvas, trail, scene.trail_time, colours, canvas.width(width / canvas.scale))
-            return
-        page, continues = self._page_for(canvas, trail)
+        page, continues = self._page_for(canvas, trail, scene.trail_time, colours, width)
         self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
         self._finish_sections(page, colours, width, together=not continues)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
+        whole = canvas.width(width / canvas.scale)
         for path, end, colour in zip(self._open, ends, colours, strict=True):
             if path[-1][0] != path[-1][0]:  # nan: not there yet
                 continue
             # mostly below the robot's disc, where seams do not show
-            canvas.outline(np.array([*path, end]), colour, canvas.width(width / canvas.scale), closed=False)
+            if whole == 1:
+                pygame.draw.aalines(canvas.surface, colour, False, [*path, end])
+            else:
+                canvas.outline(np.array([*path, end]), colour, whole, closed=False)
 
     def _lengthen(self, rows: Array) -> None:
         """Add the corners that lie far enough from the last of each path."""
         last = np.array([path[-1] for path in self._open])
+        gaps = bool(np.isnan(last).any() or np.isnan(rows).any())
         for row in rows:
+            if gaps:
+                self._come_and_go(row, last)
             delta = row - last
             far = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= PIECE * PIECE
-            joins = np.isnan(last[:, 0]) & ~np.isnan(row[:, 0])
-            if joins.any():
-                for robot in np.nonzero(joins)[0].tolist():
-                    self._open[robot] = [row[robot].tolist()]
-                last[joins] = row[joins]
             if far.any():
                 for robot in np.nonzero(far)[0].tolist():
                     self._open[robot].append(row[robot].tolist())
                 last[far] = row[far]
+
+    def _come_and_go(self, row: Array, last: Array) -> None:
+        """Begin the paths of robots that were not there before, and end those of robots that go."""
+        changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
+        for robot in np.nonzero(changed)[0].tolist():
+            self._ended.append((robot, self._open[robot]))
+            self._open[robot] = [row[robot].tolist()]
+        last[changed] = row[changed]
 
     def _finish_sections(
         self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
     ) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
         whole = self._sketch_of_all(page) if together else None
-        for robot, path in enumerate(self._open):
-            if len(path) < 2 or (whole is None and PIECE * (len(path) - 1) < SECTION):
+        for robot, path in [*self._ended, *enumerate(self._open)]:
+            open_one = path is self._open[robot]
+            short = whole is None and open_one and PIECE * (len(path) - 1) < SECTION
+            if len(path) < 2 or short:
                 continue
             sketch = whole if whole is not None else Sketch.around(path, width)
             if sketch is not None:
                 sketch.path(path, colours[robot], width)
                 if sketch is not whole:
                     sketch.onto(page)
-            self._open[robot] = path[-1:]
+            if open_one:
+                self._open[robot] = path[-1:]
+        self._ended.clear()
         if whole is not None:
             whole.onto(page)
 
     def _sketch_of_all(self, page: pygame.Surface) -> Sketch | None:
         """Return a sketch that holds all of the paths that can be seen, None when nothing moved."""
-        moved = [np.array(path) for path in self._open if len(path) > 1]
-        if not moved:
-            return None
-        points = np.concatenate(moved)
-        low, high = np.floor(points.min(axis=0)) - 5, np.ceil(points.max(axis=0)) + 5
-        box = pygame.Rect(*low.astype(int).tolist(), *(high - low).astype(int).tolist()).clip(page.get_clip())
-        return Sketch(box) if box.width and box.height else None
+        paths = [*self._open, *(path for _, path in self._ended)]
+        moved = [np.array(path) for path in paths if len(path) > 1]
+        box = _box_of(np.concatenate(moved), 5.0, page) if moved else None
+        return Sketch(box) if box is not None else None
 
-    def _page_for(self, canvas: Canvas, trail: Array) -> tuple[pygame.Surface, bool]:
+    def _page_for(
+        self, canvas: Canvas, trail: Array, time: Array | None, colours: list[Colour], width: float
+    ) -> tuple[pygame.Surface, bool]:
         """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
         size = canvas.surface.get_size()
-        key = (canvas.camera, canvas.theme.name, canvas.scale, size, self.colours, trail.shape[1])
+        fading = time if self.fade else None
+        step = None
+        if self.fade and time is not None:
+            step = self.fade, int(np.floor(time[-1] / self.fade * FADE_STEPS))
+        key = (
+            canvas.camera,
+            canvas.theme.name,
+            canvas.scale,
+            size,
+            tuple(canvas.surface.get_clip()),
+            tuple(colours),
+            trail.shape[1],
+            step,
+        )
         continues = key == self._key and self._drawn > 0 and self._found(trail)
         if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
+            self._page.set_clip(canvas.surface.get_clip())
             self._key, self._drawn = key, 0
-            self._open = [[point] for point in bounded(canvas.camera.to_pixels(trail[0])).tolist()]
-        self._page.set_clip(canvas.surface.get_clip())
+            self._ended.clear()
+            if fading is not None:
+                self._fade_onto(self._page, canvas, trail, fading, colours, width)
+                self._drawn, continues = len(trail), True
+            row = trail[self._drawn - 1 if self._drawn else 0]
+            self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
         return self._page, continues
 
     def _found(self, trail: Array) -> bool:
@@ -134,27 +170,6 @@ class Trajectories(Layer):
             self._drawn = int(rows[-1]) + 1
         return len(rows) > 0
 
-    def _faded(self, canvas: Canvas, trail: Array, time: Array, colours: list[Colour], width: int) -> None:
-        """Draw the last seconds; what is a little older than now stays on a page for a moment."""
-        fade = self.fade or 0.0
-        refreshed = int(np.floor(time[-1] / (fade / FADE_STEPS)))
-        size = canvas.surface.get_size()
-        key = (canvas.camera, canvas.theme.name, canvas.scale, size, trail.shape[1], refreshed, len(colours))
-        if self._fading is None or self._fading[0] != key:
-            page = pygame.Surface(size, pygame.SRCALPHA, 32)
-            page.set_clip(canvas.surface.get_clip())
-            begin = int(np.searchsorted(time, time[-1] - fade))
-            self._fade_onto(page, canvas, trail[begin:], time[begin:], colours, width)
-            self._fading = (key, page)
-            self._drawn = len(trail)
-        canvas.surface.blit(self._fading[1], (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        fresh = bounded(canvas.camera.to_pixels(trail[min(self._drawn, len(trail)) - 1 :: 2]))
-        ends = bounded(canvas.camera.to_pixels(trail[-1:]))
-        paths = np.concatenate([fresh, ends])
-        for robot, colour in enumerate(colours):
-            if np.isfinite(paths[:, robot]).all():
-                canvas.outline(paths[:, robot], colour, width, closed=False)
-
     def _fade_onto(
         self,
         page: pygame.Surface,
@@ -162,20 +177,40 @@ class Trajectories(Layer):
         trail: Array,
         time: Array,
         colours: list[Colour],
-        width: int,
+        width: float,
     ) -> None:
-        rows = np.unique(np.linspace(0, len(trail) - 1, 4 * FADE_STEPS + 1).astype(int))
-        points = bounded(canvas.camera.to_pixels(trail[rows]))
-        age = np.clip((time[-1] - time[rows]) / max(self.fade or 0.0, 1e-9), 0.0, 1.0)
-        for first in range(0, len(rows) - 1, 4):
-            last = min(first + 4, len(rows) - 1)
-            part = 1.0 - age[first : last + 1].mean()
-            for robot, colour in enumerate(colours):
-                path = points[first : last + 1, robot]
-                if not np.isfinite(path).all() or np.ptp(path, axis=0).max() < 0.5:
-                    continue
-                shade = mix(canvas.theme.background, colour, 0.1 + 0.9 * part)
-                pygame.draw.lines(page, shade, False, path.tolist(), width)
+        """Draw the last seconds, ever more transparent into the past."""
+        fade = self.fade or 0.0
+        begin = int(np.searchsorted(time, time[-1] - fade))
+        points = bounded(canvas.camera.to_pixels(trail[begin:]))
+        box = _box_of(points, 5.0 + width, page)
+        if box is None:
+            return
+        shade = np.ceil((time[-1] - time[begin:]) / max(fade, 1e-9) * FADE_STEPS).astype(int)
+        rows = _corners(points, shade, FADE_PIECE * canvas.scale)
+        points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
+        shade = shade[rows]
+        large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
+        wide = max(1, round(width * _FADE_FINE))
+        pens = np.full((len(colours), 2), np.nan)
+        edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
+        # the older ones first: where paths cross, the newer ones are on top
+        for first, last in pairwise(edges):
+            # slowly at first: what is half forgotten can still be followed
+            part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
+            paths = points[first : last + 1]
+            moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
+            gone = np.isnan(paths).any(axis=(0, 2)).tolist()
+            pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
+            for robot in np.flatnonzero(moves).tolist():
+                colour = _see_through(colours[robot], part)
+                if pen[robot][0] == pen[robot][0]:  # not nan
+                    lines[robot][0] = pen[robot]
+                for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
+                    _stroke(large, run, colour, wide)
+            pens[moves] = paths[-1, moves]
+        picture = pygame.transform.smoothscale(large, box.size)
+        page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _of_robots(self, canvas: Canvas) -> list[Colour]:
         theme, n = canvas.theme, len(canvas.hues)
@@ -183,7 +218,10 @@ class Trajectories(Layer):
             return [theme.trajectory] * n
         if n > ONE_HUE_EACH:
             return [mix(theme.trajectory, theme.background, 0.25)] * n
-        return [theme.trail(hue) for hue in canvas.hues.tolist()]
+        key = theme.name, tuple(canvas.hues.tolist())
+        if self._colours is None or self._colours[0] != key:
+            self._colours = key, [theme.trail(hue) for hue in canvas.hues.tolist()]
+        return self._colours[1]
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -196,6 +234,58 @@ class Trajectories(Layer):
                 sketch.onto(canvas.surface)
 
         return [LegendEntry("trajectory", glyph, self.colours)] if scene.trail is not None else []
+
+
+def _box_of(points: Array, margin: float, page: pygame.Surface) -> pygame.Rect | None:
+    """Return what of the surroundings of (..., 2) px points can be seen on a page; None for nothing."""
+    flat = points.reshape(-1, 2)
+    flat = flat[np.isfinite(flat[:, 0])]
+    if not len(flat):
+        return None
+    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
+    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(page.get_clip())
+    return box if box.width and box.height else None
+
+
+def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
+    """Return the rows of (k, n, 2) px that are needed to draw all paths: few where all robots are slow."""
+    gone = np.isnan(points[..., 0])
+    steps = np.hypot(*np.moveaxis(np.diff(points, axis=0), -1, 0))
+    way = np.floor(np.cumsum(np.where(np.isnan(steps), 0.0, steps).max(axis=1)) / piece)
+    needed = np.zeros(len(points), dtype=bool)
+    needed[0] = needed[-1] = True
+    needed[1:] |= np.diff(way, prepend=0.0) > 0
+    needed[1:] |= np.diff(shade) != 0
+    changes = (gone[1:] != gone[:-1]).any(axis=1)
+    needed[1:] |= changes
+    needed[:-1] |= changes
+    return np.flatnonzero(needed)
+
+
+def _runs(path: Array) -> list[list[list[float]]]:
+    """Return the parts of a (k, 2) path without nan."""
+    there = np.isfinite(path[:, 0])
+    if there.all():
+        return [path.tolist()]
+    pieces = np.split(path, np.flatnonzero(np.diff(there)) + 1)
+    return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]
+
+
+def _stroke(
+    surface: pygame.Surface, path: list[list[float]], colour: tuple[int, int, int, int], width: int
+) -> None:
+    if len(path) < 2:
+        return
+    pygame.draw.lines(surface, colour, False, path, width)
+    if width > 2.5 * _FADE_FINE:  # lines have straight ends: fill the corners' notches
+        for point in path:
+            pygame.draw.circle(surface, colour, point, width / 2)
+
+
+def _see_through(colour: Colour, part: float) -> tuple[int, int, int, int]:
+    """Return a premultiplied colour."""
+    red, green, blue = (round(c * part) for c in colour)
+    return red, green, blue, round(255 * part)
 
 
 def _same(row: Array, other: Array) -> bool:

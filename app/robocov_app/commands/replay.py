@@ -1,0 +1,189 @@
+"""``robocov replay``: saved runs again, in the window or as frames and films."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from robocov.errors import InputError, ParameterError
+from robocov_app.options import RunOptions, parsed_size
+
+if TYPE_CHECKING:
+    from robocov_app.interruption import Interruption
+    from robocov_app.run import Run
+    from robocov_app.saved import Saved
+
+INTERRUPTED = 130
+
+_NO_DISPLAY = (
+    "no display: the window needs one (over ssh, try ssh -X); --video --out DIR makes a film without"
+)
+
+
+@dataclass
+class Arguments:
+    """A saved run or comparison again: in the window, or headlessly as frames and a film.
+
+    In the window the run is the past: go back and forth in it, go on from any moment of it with other
+    gains, another controller or a wall in the way.
+
+    Example: robocov replay rooms-rapf --video --film-speed 1 --show distances --out rooms-film
+    """
+
+    run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
+    """The folder of a run or a comparison."""
+    frames: bool = False
+    """Save every film frame as a PNG, and open no window."""
+    video: bool = False
+    """Save a film (H.264, MP4), and open no window."""
+    out: Path | None = None
+    """Folder for frames and film."""
+    overwrite: bool = False
+    """Replace an earlier result in that folder."""
+    fps: int = 30
+    """Film frames per second."""
+    film_speed: float = 4.0
+    """Simulated seconds per second of film."""
+    theme: Literal["light", "dark"] | None = None
+    """Colours; by default light in films, and in the window as the last time."""
+    colours: Literal["paper", "robots"] = "paper"
+    """Trajectories in films in the paper's red, or a colour for each robot."""
+    show: tuple[str, ...] = ()
+    """Layers to show besides the usual ones: distances, geodesic-cells, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers not to show, as in --hide cells centroids."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size in pixels of the film or the window."""
+    json: bool = False
+    """Print one JSON object and nothing else; with --frames or --video."""
+
+    def __post_init__(self) -> None:
+        self.film()
+        if self.headless and self.out is None:
+            raise ParameterError("--out: a folder for frames and film was wanted")
+        if not self.headless:
+            for name, given in (("--out", self.out is not None), ("--json", self.json)):
+                if given:
+                    raise ParameterError(f"{name}: --frames or --video was wanted beside it")
+            self.window_size()
+
+    @property
+    def headless(self) -> bool:
+        """Whether no window is wanted."""
+        return self.frames or self.video
+
+    def film(self) -> RunOptions:
+        """Return what `robocov run` would be told for such a film."""
+        return RunOptions(
+            frames=self.frames,
+            video=self.video,
+            fps=self.fps,
+            film_speed=self.film_speed,
+            theme=self.theme or "light",
+            colours=self.colours,
+            show=self.show,
+            hide=self.hide,
+            size=self.size,
+            json=self.json,
+        )
+
+    def window_size(self) -> tuple[int, int] | None:
+        """Return the size of the window that was asked for (width, height), None when none was."""
+        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
+
+
+def command(options: Arguments) -> int:
+    """Open the window, or make frames and a film."""
+    from robocov_app.run import check_layers
+    from robocov_app.saved import load_saved
+
+    check_layers(options.film())
+    saved = load_saved(options.run)
+    return filmed(options, saved) if options.headless else watched(options, saved)
+
+
+def watched(options: Arguments, saved: list[Saved]) -> int:
+    """Show saved runs in the window."""
+    from robocov.mapfile import bundled_maps
+    from robocov_app.demo.opening import NO_DISPLAY, Opening
+    from robocov_app.demo.replayed import LostLaw, replayed_session
+    from robocov_app.view.picture import checked_layers
+
+    try:
+        session = replayed_session(saved)
+    except InputError as error:
+        where = str(options.run)
+        raise InputError(str(error) if where in str(error) else f"{where}: {error}") from error
+    name = session.environment.name
+    laws = [law.name for law in session.scenario.laws if not isinstance(law, LostLaw)]
+    opening = Opening(
+        session,
+        name if name in bundled_maps() else "",
+        Path(),
+        theme=options.theme,
+        size=options.window_size(),
+        also=checked_layers("--show", options.show),
+        without=checked_layers("--hide", options.hide),
+        laws=tuple(laws),
+    )
+    try:
+        with opening.window() as window:
+            window.run()
+    except InputError as error:
+        if str(error) == NO_DISPLAY:  # what helps there does not help here
+            raise InputError(_NO_DISPLAY) from error
+        raise
+    return 0
+
+
+def filmed(options: Arguments, saved: list[Saved]) -> int:
+    """Make frames and a film of saved runs."""
+    from robocov_app.interruption import Interruption
+    from robocov_app.output import cleared, listed, results, write_json
+
+    assert options.out is not None
+    _spare(options.out, options.run, saved)
+    with results(options.out, overwrite=options.overwrite) as out, Interruption() as stop:
+        content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
+        write_json(cleared(out) / "replay.json", content)
+        _save_moving(options.film(), saved, out, stop)
+    if options.json:
+        print(json.dumps({"out": str(out), "interrupted": stop.requested}))
+    else:
+        done = "stopped; what was done is in" if stop.requested else "saved in"
+        print(f"{done} {out}/: {listed(out)}")
+    return INTERRUPTED if stop.requested else 0
+
+
+def _spare(out: Path, source: Path, saved: list[Saved]) -> None:
+    """Make sure that no saved run is replaced by its own film."""
+    for folder in (source, *(each.folder for each in saved)):
+        if folder.resolve().is_relative_to(out.resolve()):
+            raise InputError(f"--out: {out}: another folder than that of the run was wanted")
+
+
+def _save_moving(options: RunOptions, saved: list[Saved], out: Path, stop: Interruption) -> None:
+    from robocov_app.compare import save_panes_moving
+    from robocov_app.run import save_run_moving, shown_in_films
+    from robocov_app.saved import roster_of
+
+    runs = [_run_of(each) for each in saved]
+    if len(runs) == 1:
+        save_run_moving(runs[0], None, out, options, stop)
+        return
+    # robots may have failed at other places in each run: distances are to one map, that without them
+    bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
+    save_panes_moving(runs, shown_in_films(bare, None, options), out, options, stop)
+
+
+def _run_of(saved: Saved) -> Run:
+    import numpy as np
+
+    from robocov.metrics import CostHistory
+    from robocov_app.run import Run
+
+    return Run(saved.record, saved.history or CostHistory(*np.empty((4, 0))), {})

@@ -1,0 +1,286 @@
+"""Saved runs in the window again: as the past of a session that can be looked at and gone on from."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from robocov.controllers import CONTROLLERS, Individually
+from robocov.errors import InputError, ParameterError, RobocovError
+from robocov.observation import Decision
+from robocov.robots import UNITS
+from robocov_app.demo.curves import Event
+from robocov_app.demo.history import MOST_BYTES, Circumstances, History, Moment, State
+from robocov_app.demo.lane import SENSED_EVERY, Lane, resumed
+from robocov_app.demo.scenario import MOST_PANES, Law, Limits, Scenario
+from robocov_app.demo.session import Session
+from robocov_app.saved import roster_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robocov.arrays import Array
+    from robocov.controllers.base import Controller
+    from robocov.controllers.gains import Gain
+    from robocov.observation import Observations
+    from robocov.record import Record
+    from robocov.region import Region
+    from robocov.robots import Team
+    from robocov_app.saved import Saved
+
+MOST_OF_RECORDS = 400_000_000
+"""Bytes that the moments of records may take, beside their arrays; of longer ones old moments are thinned."""
+
+_OF_A_MOMENT = 1500
+"""About how many bytes a moment of one pane takes, beside those arrays."""
+
+
+@dataclass(frozen=True)
+class LostLaw(Law):
+    """A controller that is not there any more, or does not take its gains: its runs can be looked at.
+
+    Attributes
+    ----------
+    title : str
+        What people called it.
+    reason : str
+        Why it cannot be had.
+    """
+
+    title: str = ""
+    reason: str = ""
+
+    @property
+    def label(self) -> str:
+        """The controller as people called it."""
+        return self.title
+
+    @property
+    def known(self) -> dict[str, Gain]:
+        """Nothing is known of its gains."""
+        return {}
+
+    def made(self) -> Controller:
+        """Say that there is no such controller.
+
+        Raises
+        ------
+        ParameterError
+            Always.
+        """
+        raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
+
+
+@dataclass(frozen=True)
+class _StandIn(LostLaw):
+    """What holds the place of a lost controller at the end of its run, until somebody wants to go on."""
+
+    def made(self) -> Controller:
+        return _Nobody(self)
+
+
+@dataclass(frozen=True)
+class _Nobody:
+    name: ClassVar[str] = "nobody"
+    label: ClassVar[str] = "nobody"
+    summary: ClassVar[str] = "stands for a controller that is not there any more"
+    law: LostLaw
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Say that there is no such controller."""
+        LostLaw.made(self.law)
+        raise AssertionError
+
+
+def replayed_session(saved: Sequence[Saved]) -> Session:
+    """Return a session whose past is a saved run, or the runs of a comparison side by side.
+
+    Its beginning is looked at, and it plays.
+
+    Raises
+    ------
+    InputError
+        When the runs do not go together, or are none that the window can show.
+    """
+    records = [each.record for each in saved]
+    _check(saved)
+    rosters = [roster_of(record) for record in records]
+    first, dt = records[0], control_dt(records[0])
+    limits, environment = Limits.of(first.team), rosters[0].environment
+    laws = [law_of(record) for record in records]
+    casts = [
+        Circumstances(environment, law, limits, roster.numbers, roster.failed)
+        for law, roster in zip(laws, rosters, strict=True)
+    ]
+    given = resumed(State(_standing(casts[0]), first.positions[0], first.velocities[0], None), dt, 0.0)
+    session = Session(
+        Scenario(
+            environment,
+            tuple(_standing(cast).law for cast in casts),
+            len(first.team),
+            first.start if first.start in environment.starts else None,
+            first.seed or 0,
+            limits,
+            dt,
+            given.positions,
+            given.velocities if first.velocities[0].any() else None,
+        )
+    )
+    session.scenario = replace(session.scenario, laws=tuple(laws))
+    history = _history_of(records, casts, dt)
+    for lane, each, cast in zip(session.lanes, saved, casts, strict=True):
+        _put(lane, each, cast, history)
+    session.recall(session.lanes, history)
+    session.events.extend(_events_of(first))
+    return session
+
+
+def control_dt(record: Record) -> float:
+    """Return the control period, s; moments of a record may be farther apart than that."""
+    dt = record.session.get("control_dt_s")
+    if isinstance(dt, float) and dt > 0.0 and abs(record.dt / dt - round(record.dt / dt)) < 1e-6:
+        return dt
+    return record.dt
+
+
+def law_of(record: Record) -> Law:
+    """Return the controller of a record, also where it is not there any more."""
+    law = Law(record.controller, dict(record.gains))
+    try:
+        law.made()
+        gains = {name: value for name, value in law.gains.items() if value != law.known[name].default}
+        return replace(law, gains=gains)
+    except RobocovError as error:
+        return LostLaw(record.controller, dict(record.gains), record.label, str(error))
+
+
+def _check(saved: Sequence[Saved]) -> None:
+    """Make sure that the window can show the runs, all of them in step."""
+    if not 1 <= len(saved) <= MOST_PANES:
+        raise InputError(
+            f"{saved[0].folder.parent}: {len(saved)} runs, but the window has room for {MOST_PANES}; "
+            f"--frames and --video show all"
+        )
+    first = saved[0].record
+    for each in saved:
+        record, where = each.record, each.folder
+        for name in UNITS:
+            if len(np.unique(getattr(record.team, name))) > 1:
+                raise InputError(
+                    f"{where / 'run.json'}: robots of different {name}: the window has none such"
+                )
+        even = np.arange(len(record)) * record.dt
+        if not np.allclose(record.time - record.time[0], even, rtol=1e-6, atol=1e-3 * record.dt):
+            raise InputError(f"{where / 'record.npz'}: time: moments {record.dt:g} s apart were wanted")
+        for what, mine, others in (
+            ("dt_s", record.dt, first.dt),
+            ("moments", len(record), len(first)),
+            ("team", record.team.to_dict(), first.team.to_dict()),
+            ("robots", roster_of(record).numbers, roster_of(first).numbers),
+        ):
+            if mine != others:
+                raise InputError(
+                    f"{where}: {what}: {mine}, but {others} as in {saved[0].folder} was wanted; "
+                    f"--frames and --video show both"
+                )
+
+
+def _standing(circumstances: Circumstances) -> Circumstances:
+    """Return the circumstances with somebody in the place of a controller that is not there any more."""
+    law = circumstances.law
+    if not isinstance(law, LostLaw):
+        return circumstances
+    return replace(circumstances, law=_StandIn(law.name, law.gains, law.title, law.reason))
+
+
+def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], dt: float) -> History:
+    """Return the past that records tell of; its arrays are theirs."""
+    first = records[0]
+    stride = round(first.dt / dt)
+    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
+    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
+    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
+    for k in range(len(first)):
+        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}))
+    return history
+
+
+def _states_of(record: Record, cast: Circumstances) -> list[State]:
+    positions, velocities, forces, goals = (
+        _fixed(array) for array in (record.positions, record.velocities, record.forces, record.goals)
+    )
+    nowhere = [bool(np.isnan(rows).all()) for rows in goals]
+    return [
+        State(
+            cast,
+            positions[k],
+            velocities[k],
+            memory,
+            Decision(forces[k], None if nowhere[k] else goals[k]),
+        )
+        for k, memory in enumerate(_memories_of(record, cast.law))
+    ]
+
+
+def _memories_of(record: Record, law: Law) -> list[Any]:
+    """Return what the controller remembered at each moment.
+
+    A record does not tell, but the controller can be asked again. Where it does not decide as it did, it is
+    not what it was: from there on it is to begin anew.
+    """
+    nothing: list[Any] = [None] * len(record)
+    if isinstance(law, LostLaw):
+        return nothing
+    controller = law.made()
+    if type(controller) in CONTROLLERS.values() or isinstance(controller, Individually):
+        return nothing
+    found: list[Any] = []
+    try:
+        memory = controller.begin(record.environment.region, record.team)
+        for k in range(len(record)):
+            found.append(deepcopy(memory))
+            decision = controller.decide(record.snapshot(k).seen, memory)
+            if not np.allclose(decision.forces, record.forces[k], rtol=1e-9, atol=1e-9):
+                break
+            memory = decision.memory
+    except (Exception, SystemExit):  # a user's controller may do anything
+        pass
+    return found + nothing[len(found) :]
+
+
+def _put(lane: Lane, saved: Saved, cast: Circumstances, history: History) -> None:
+    """Let a lane be at the end of a run."""
+    record, last = saved.record, history.last
+    state = last.states[lane.number]
+    standing = state._replace(circumstances=_standing(cast))
+    lane.simulation = resumed(standing, history.dt, last.step * history.dt)
+    lane.circumstances, lane.starts = cast, record.positions[0]
+    for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
+        lane.sensed.add(k * record.dt, cast.numbers, record.obstacle_points[k])
+    if saved.history is not None:
+        for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
+            lane.curve.add(float(time), float(value))
+
+
+def _events_of(record: Record) -> list[Event]:
+    """Return when robots were dragged."""
+    found = []
+    for touched in record.session.get("touched", ()):
+        try:
+            robots = ", ".join(str(int(number)) for number in touched["robots"])
+            found.append(Event(float(touched["to_s"]), "hand", f"robot {robots} was dragged"))
+        except (KeyError, TypeError, ValueError):  # whoever wrote that, it was not us
+            return []
+    return found
+
+
+def _fixed(array: Array) -> Array:
+    view = array.view()
+    view.setflags(write=False)
+    return view

@@ -1,0 +1,161 @@
+"""Saved runs and comparisons, read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from robocov.environment import CircleObstacle
+from robocov.errors import InputError, shown
+from robocov.metrics import CostHistory
+from robocov.record import Record
+
+if TYPE_CHECKING:
+    from robocov.environment import Environment
+
+_COLUMNS = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
+
+
+class Saved(NamedTuple):
+    """A run that was saved.
+
+    Attributes
+    ----------
+    folder : Path
+    record : Record
+    history : CostHistory or None
+        What is in ``cost.csv``, if it is there.
+    """
+
+    folder: Path
+    record: Record
+    history: CostHistory | None
+
+
+class Roster(NamedTuple):
+    """Who is who in a record.
+
+    Attributes
+    ----------
+    environment : Environment
+        The map without robots that failed.
+    numbers : (n,) int
+        What people called the robots, row by row.
+    failed : dict of number to (x, y) m
+    """
+
+    environment: Environment
+    numbers: tuple[int, ...]
+    failed: dict[int, tuple[float, float]]
+
+
+def load_saved(path: Path) -> list[Saved]:
+    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it.
+
+    Raises
+    ------
+    InputError
+        When there is none, or something of it cannot be read; the message names the file.
+    """
+    folder = path.parent if path.name in ("run.json", "comparison.json") and path.is_file() else path
+    if (folder / "comparison.json").is_file():
+        saved = [_load_run(part) for part in _parts(folder)]
+        maps = [roster_of(each.record).environment for each in saved]
+        for each, found in zip(saved, maps, strict=True):
+            if (found.boundary, found.obstacles) != (maps[0].boundary, maps[0].obstacles):
+                raise InputError(f"{each.folder / 'run.json'}: another map than in {saved[0].folder}")
+        return saved
+    if not (folder / "run.json").is_file():
+        raise InputError(
+            f"{folder}: not the folder of a run or a comparison (there is no run.json and no comparison.json)"
+        )
+    return [_load_run(folder)]
+
+
+def roster_of(record: Record) -> Roster:
+    """Return who is who in a record of a session in the window; in others, robots are numbered from 1."""
+    environment, session = record.environment, record.session
+    plain = Roster(environment, tuple(range(1, len(record.team) + 1)), {})
+    try:
+        numbers = tuple(int(number) for number in session["robots"])
+        failed = {int(number): (float(x), float(y)) for number, (x, y) in session["failed"].items()}
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return plain
+    wrecks = {wreck_name(number): number for number in failed}
+    standing = tuple(
+        shape
+        for shape in environment.obstacles
+        if not (isinstance(shape, CircleObstacle) and shape.name in wrecks)
+    )
+    known = {*numbers, *failed}
+    if (
+        len(numbers) != len(record.team)
+        or len(known) != len(numbers) + len(failed)
+        or len(environment.obstacles) - len(standing) != len(failed)
+    ):
+        return plain
+    return Roster(replace(environment, obstacles=standing), numbers, failed)
+
+
+def wreck_name(number: int) -> str:
+    """Return what the obstacle is called that a robot has become by failing."""
+    return f"failed robot {number}"
+
+
+def _parts(folder: Path) -> list[Path]:
+    """Return the folders of a comparison's runs; of one that was killed, those that are there."""
+    path = folder / "comparison.json"
+    try:
+        content: Any = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    names = content.get("folders") if isinstance(content, dict) else None
+    if not isinstance(content, dict) or content.get("format") != "robocov-comparison":
+        raise InputError(f"{path}: not the file of a comparison")
+    if not isinstance(names, list) or not all(
+        isinstance(name, str) and name and Path(name).name == name for name in names
+    ):
+        raise InputError(f"{path}: folders: {shown(names)}, but names of folders were wanted")
+    parts = [folder / name for name in names]
+    if not content.get("runs"):
+        parts = [part for part in parts if (part / "run.json").is_file()]
+    if not parts:
+        raise InputError(f"{path}: there is no run in it")
+    return parts
+
+
+def _load_run(folder: Path) -> Saved:
+    record = Record.load(folder)
+    path = folder / "record.npz"
+    if not len(record) or not len(record.team):
+        raise InputError(f"{path}: it is empty")
+    for name in ("time", "positions", "velocities", "forces"):
+        if not np.isfinite(getattr(record, name)).all():
+            raise InputError(f"{path}: {name}: not all of it are finite numbers")
+    if record.time.ndim != 1 or (np.diff(record.time) <= 0).any():
+        raise InputError(f"{path}: time: ascending numbers were wanted")
+    return Saved(folder, record, _load_history(folder / "cost.csv"))
+
+
+def _load_history(path: Path) -> CostHistory | None:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    if not lines or lines[0].split(",") != list(_COLUMNS):
+        raise InputError(f"{path}: line 1: the header {','.join(_COLUMNS)} was wanted")
+    rows = np.empty((len(lines) - 1, len(_COLUMNS)))
+    for k, line in enumerate(lines[1:]):
+        try:
+            rows[k] = [float(cell) for cell in line.split(",")]
+        except ValueError:
+            raise InputError(
+                f"{path}: line {k + 2}: {shown(line)}, but {len(_COLUMNS)} numbers were wanted"
+            ) from None
+    return CostHistory(*rows.T)

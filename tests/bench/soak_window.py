@@ -1,0 +1,80 @@
+"""How much memory an hour of the window takes: ``python tests/bench/soak_window.py [minutes] [robots]``.
+
+Frames follow each other as fast as they can, each as if a sixtieth of a second had passed; now and then
+something is touched, as people do. Prints the resident memory every few minutes of that time.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from robocov.errors import RobocovError
+from robocov.mapfile import load_map
+from robocov_app.demo.costs import DirectCosts
+from robocov_app.demo.desk import Desk
+from robocov_app.demo.opening import display
+from robocov_app.demo.scenario import Law, Scenario
+from robocov_app.demo.session import Session
+from robocov_app.demo.window import FPS, Window
+from robocov_app.view.picture import standard_layers
+
+WARM = 10
+"""Minutes until all that is kept is there."""
+
+
+def resident() -> float:
+    """Return the memory in use, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def main(minutes: int, robots: int) -> None:
+    """Use the window for so long, and tell how its memory grows."""
+    rng = np.random.default_rng(0)
+    session = Session(Scenario(load_map("rooms"), (Law("rapf"),), robots, "uniform"))
+    layers = {layer.name for layer in standard_layers() if layer.default}
+    with tempfile.TemporaryDirectory() as folder, display(headless=True):
+        # the cost beside it takes no memory here; one a frame would take all of the time
+        desk = Desk(session, DirectCosts(16), layers, Path(folder), "rooms")
+        window = Window(desk, (1280, 720), 1.0)
+        warm = resident()
+        for minute in range(1, minutes + 1):
+            for _ in range(60 * FPS):
+                if rng.random() < 1 / (20 * FPS):
+                    touch(desk, rng)
+                window.frame(1.0 / FPS)
+            if minute == WARM:
+                warm = resident()
+            if minute % 5 == 0:
+                past = f"{len(session.history)} moments, {session.history.thinned} thinned"
+                print(f"{minute:3d} min  {resident():7.1f} MB  {past}", flush=True)
+        print(f"grown by {resident() - warm:.1f} MB since minute {WARM}")
+
+
+def touch(desk: Desk, rng: np.random.Generator) -> None:
+    """Do something that people do, and which leaves the run as long as it is."""
+    numbers = desk.session.numbers
+    number = int(rng.choice(numbers))
+    try:
+        match int(rng.integers(5)):
+            case 0:
+                desk.session.grab(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
+            case 1:
+                desk.session.release()
+            case 2 if len(numbers) > 3:
+                desk.session.fail_robot(number)
+            case 3:
+                for failed in list(desk.session.lanes[0].circumstances.failed):
+                    desk.session.revive_robot(failed)
+            case _:
+                desk.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
+    except RobocovError as error:
+        print(f"refused: {error}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 60, int(sys.argv[2]) if len(sys.argv) > 2 else 6)

@@ -1,0 +1,218 @@
+"""A window without a display, and hands for it: what a test presses, drags and types."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygame
+from touched_run import HALL, RAPF, begun
+
+from robocov.environment import Environment
+from robocov_app.demo.costs import DirectCosts
+from robocov_app.demo.desk import Desk
+from robocov_app.demo.film import pixels
+from robocov_app.demo.opening import display
+from robocov_app.demo.scenario import Law
+from robocov_app.demo.window import Window
+from robocov_app.view.picture import standard_layers
+
+SIZE = (900, 600)
+FRAME = 1 / 50
+
+KEYS = {
+    **{
+        name: getattr(pygame, f"K_{name.upper()}")
+        for name in "space return escape tab delete home end".split()
+    },
+    **{name: getattr(pygame, f"K_{name.upper()}") for name in "left right up down backspace".split()},
+    **{f"f{k}": getattr(pygame, f"K_F{k}") for k in range(1, 13)},
+    "page up": pygame.K_PAGEUP,
+    "page down": pygame.K_PAGEDOWN,
+    "enter": pygame.K_KP_ENTER,
+}
+MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT, "alt": pygame.KMOD_LALT}
+
+
+@contextmanager
+def opened(
+    folder: Path,
+    *laws: Law,
+    environment: Environment = HALL,
+    map_name: str = "hall",
+    robots: int = 3,
+    size: tuple[int, int] = SIZE,
+    scale: float = 1.0,
+    shown: set[str] | None = None,
+    lattice: int = 16,
+    **changes: Any,
+) -> Iterator[Driver]:
+    """Open a window without a display, paused at its beginning."""
+    with display(headless=True):
+        session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
+        usual = {layer.name for layer in standard_layers() if layer.default}
+        desk = Desk(session, DirectCosts(lattice), usual if shown is None else shown, folder, map_name)
+        driver = Driver(Window(desk, size, scale, patient=True))
+        driver.settle()
+        driver.settle()  # now it knows how high the legend is
+        yield driver
+        driver.window.close()
+
+
+class Driver:
+    """Does to a window what people do; each deed takes a frame or some."""
+
+    def __init__(self, window: Window) -> None:
+        self.window = window
+        self.desk, self.session = window.desk, window.desk.session
+        self.at = (5, 5)
+
+    def frames(self, count: int = 1, seconds: float = FRAME) -> None:
+        for _ in range(count):
+            self.window.frame(seconds)
+
+    def settle(self) -> None:
+        """Let what was posted arrive, and what that posted."""
+        for _ in range(3):
+            self.window.advance(0.0)
+        self.window.frame(0.0)
+
+    def post(self, kind: int, **what: Any) -> None:
+        pygame.event.post(pygame.event.Event(kind, **what))
+
+    # mouse
+
+    def move(self, x: float, y: float, *, held: int = 0, settled: bool = True) -> None:
+        at = round(x), round(y)
+        rel = at[0] - self.at[0], at[1] - self.at[1]
+        buttons = tuple(int(held == k) for k in (1, 2, 3))
+        pygame.mouse.set_pos(at)
+        pygame.event.clear(pygame.MOUSEMOTION)  # what moving the cursor itself has posted
+        self.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=buttons)
+        self.at = at
+        if settled:
+            self.settle()
+
+    def press(self, x: float, y: float, button: int = 1) -> None:
+        self.move(x, y)
+        self.post(pygame.MOUSEBUTTONDOWN, pos=self.at, button=button)
+        self.settle()
+
+    def release(self, button: int = 1) -> None:
+        self.post(pygame.MOUSEBUTTONUP, pos=self.at, button=button)
+        self.settle()
+
+    def click(self, x: float, y: float, button: int = 1) -> None:
+        self.press(x, y, button)
+        self.release(button)
+
+    def drag(self, *path: tuple[float, float], button: int = 1) -> None:
+        """Press at the first of some pixels, and let go at the last."""
+        self.press(*path[0], button)
+        for x, y in path[1:]:
+            self.move(x, y, held=button)
+        self.release(button)
+
+    def wheel(self, x: float, y: float, amount: int) -> None:
+        self.move(x, y)
+        self.post(pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False)
+        self.settle()
+
+    # places in the arena
+
+    def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
+        return self.window.arena.to_pixel(point, pane)
+
+    def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
+        """Return the pixel where a robot is."""
+        lane = self.session.lanes[pane]
+        row = lane.numbers.index(number)
+        x, y = self.session.positions(lane)[row].tolist()
+        return self.pixel((x, y), pane)
+
+    def click_at(self, point: tuple[float, float], pane: int = 0, button: int = 1) -> None:
+        self.click(*self.pixel(point, pane), button)
+
+    def drag_at(self, *points: tuple[float, float], pane: int = 0) -> None:
+        self.drag(*(self.pixel(point, pane) for point in points))
+
+    # keys
+
+    def key(self, name: str, times: int = 1) -> None:
+        """Press a key as the list of actions calls it: ``ctrl+shift+z``."""
+        plus = name == "+" or name.endswith("++")
+        *held, last = [*name[:-1].split("+"), "+"] if plus else name.split("+")
+        mod = sum(MODIFIERS[each] for each in held if each)
+        code = KEYS.get(last) or pygame.key.key_code(last)
+        text = last if len(last) == 1 and "ctrl" not in held else ""
+        for _ in range(times):
+            self.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
+            if text:
+                self.post(pygame.TEXTINPUT, text=text)
+            self.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
+            self.settle()
+
+    def type(self, text: str) -> None:
+        for letter in text:
+            code = ord(letter) if letter.isascii() else 0
+            self.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
+            self.post(pygame.TEXTINPUT, text=letter)
+            self.post(pygame.KEYUP, key=code, mod=0, unicode=letter, scancode=0)
+        self.settle()
+
+    # the panel
+
+    def widget(self, kind: str, name: str) -> Any:
+        widgets = self.window.panel.widgets
+        assert widgets is not None, "the panel is hidden"
+        found = widgets.find(kind, name)
+        assert found is not None, f"no {kind} {name}"
+        return found
+
+    def push(self, name: str) -> None:
+        """Press a button of the panel."""
+        self.click(*self.widget("button", name).rect.center)
+
+    def turn(self, tab: str) -> None:
+        self.push(f"tab:{tab}")
+
+    def tick(self, name: str) -> None:
+        self.click(*self.widget("check", name).rect.center)
+
+    def choose(self, menu: str, option: str) -> None:
+        """Open a menu of the panel and choose from it, scrolling as far as is needed."""
+        widget = self.widget("menu", menu)
+        self.click(*widget.rect.center)
+        options = widget.current_state.options_selection_list
+        for _ in range(30):
+            for item in options.item_list:
+                button = item["button_element"]
+                inside = button is not None and options.rect.contains(button.rect)
+                if inside and item["text"].strip() == option:
+                    self.click(*button.rect.center)
+                    return
+            self.wheel(*options.rect.center, -1)
+            self.frames(2, 0.05)
+        raise AssertionError(f"no {option} in {[item['text'] for item in options.item_list]}")
+
+    def write(self, field: str, text: str) -> None:
+        """Click into a field, and type."""
+        self.click(*self.widget("entry", field).rect.center)
+        self.type(text)
+
+    def slide(self, name: str, part: float) -> None:
+        """Drag a slider's knob to a part of its width."""
+        slider = self.widget("slider", name)
+        knob = slider.sliding_button.rect
+        x = slider.rect.left + 1 + knob.width / 2 + part * slider.scrollable_width
+        self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
+
+    def picture(self) -> Any:
+        """Return the pixels of the window."""
+        return pixels(self.window.screen).astype(int)
+
+    def same(self, other: Any) -> bool:
+        return bool(np.array_equal(self.picture(), other))

@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import answer, complaint
+from kept_run import records_of
+from PIL import Image
+from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
+
+from robocov_app.cli import main
+from robocov_app.compare import begin_comparison
+from robocov_app.demo.session import Session
+from robocov_app.demo.window import Window
+from robocov_app.output import write_csv
+
+EMPTY = replace(HALL, obstacles=())
+SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")
+
+
+def write_history(folder: Path) -> None:
+    rows = [(0.1 * k, 3.0 - 0.1 * k, 40.0 - k, 0.0) for k in range(11)]
+    write_csv(folder / "cost.csv", "time_s,mean_distance_m,cost_m3,uncovered_area_m2", rows)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run and a comparison, in which a robot failed."""
+    folder = tmp_path_factory.mktemp("made")
+    (record,) = records_of(stepped(begun(), 60))
+    record.save(folder / "run" if (folder / "run").mkdir() is None else folder)
+    write_history(folder / "run")
+    session = stepped(begun(RPF, LLOYD), 30)
+    session.fail_robot(1)
+    names = ["rpf", "lloyd"]
+    (folder / "both").mkdir()
+    begin_comparison(folder / "both", names)
+    for name, each in zip(names, records_of(stepped(session, 60)), strict=True):
+        (folder / "both" / name).mkdir()
+        each.save(folder / "both" / name)
+    write_history(folder / "both" / "lloyd")
+    return folder
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made / "run", tmp_path / "run"))
+
+
+@pytest.fixture
+def both(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made / "both", tmp_path / "both"))
+
+
+def pictures(folder: Path) -> list[np.ndarray]:
+    return [np.asarray(Image.open(path)) for path in sorted((folder / "frames").iterdir())]
+
+
+# frames and films
+
+
+def test_frames_of_a_run_are_those_of_run(made: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "film"
+    assert main(["replay", str(made / "run"), "--frames", "--video", *SMALL, "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    assert said.out == f"saved in {out}/: frames, replay.json, run.mp4\n"
+    assert "film: 21 of 21" in said.err
+    frames = pictures(out)
+    assert len(frames) == 11 + 10
+    assert frames[0].shape == (320, 480, 3)
+    assert (frames[0] != frames[10]).any()
+    assert (frames[10] == frames[20]).all()
+    assert (out / "run.mp4").stat().st_size > 1000
+
+
+def test_a_comparison_is_shown_side_by_side_with_distances(made: Path, tmp_path: Path, capsys) -> None:
+    """On one map, although a robot failed at another place in each run."""
+    out = tmp_path / "film"
+    words = ("--frames", *SMALL, "--show", "distances", "--fps", "5", "--theme", "dark")
+    said = answer(capsys, "replay", str(made / "both"), *words, "--out", str(out))
+    assert said == {"out": str(out), "interrupted": False}
+    frames = pictures(out)
+    assert len(frames) == 6 + 5
+    left, right = np.array_split(frames[5].astype(int), 2, axis=1)
+    assert (left != right).mean() > 0.05
+
+
+def test_the_json_file_does_as_well_as_its_folder(made: Path, tmp_path: Path, capsys) -> None:
+    for name, source in (("one", "run/run.json"), ("two", "both/comparison.json")):
+        words = ("--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / name))
+        answer(capsys, "replay", str(made / source), *words)
+        assert len(pictures(tmp_path / name)) == 3
+
+
+def test_an_earlier_film_is_replaced_only_where_that_is_wanted(made: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "film"
+    words = ("replay", str(made / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
+    answer(capsys, *words)
+    (out / "notes.txt").write_text("mine")
+    assert "is not empty" in complaint(capsys, *words)
+    answer(capsys, *words, "--overwrite", "--film-speed", "4")
+    assert len(pictures(out)) == 2 + 2
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) -> None:
+    for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
+        words = ("--frames", *SMALL, "--overwrite", "--out", str(out))
+        assert complaint(capsys, "replay", str(source), *words).endswith(
+            "another folder than that of the run was wanted"
+        )
+    assert (run / "record.npz").exists()
+    assert (both / "lloyd" / "record.npz").exists()
+
+
+def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsys) -> None:
+    (short,) = records_of(stepped(begun(RPF), 30))
+    (whole,) = records_of(stepped(begun(LLOYD), 60))
+    short.save(both / "rpf")
+    whole.save(both / "lloyd")
+    answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
+    assert len(pictures(tmp_path / "film")) == 3 + 2
+    assert complaint(capsys, "replay", str(both)) == (
+        f"{both}/lloyd: moments: 61, but 31 as in {both}/rpf was wanted; --frames and --video show both"
+    )
+
+
+def test_of_a_comparison_that_was_killed_there_is_what_there_is(both: Path, tmp_path: Path, capsys) -> None:
+    shutil.rmtree(both / "lloyd")
+    answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "film"))
+    assert len(pictures(tmp_path / "film")) == 3
+
+
+# the window
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
+    """Windows on a display that nobody sees, closed after some frames; the sessions in them."""
+    sessions: list[Session] = []
+
+    def run(window: Window) -> None:
+        for _ in range(10):
+            window.frame(1 / 30)
+        sessions.append(window.desk.session)
+        window.close()
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setenv("ROBOCOV_SETTINGS", "")
+    monkeypatch.setattr(Window, "run", run)
+    return sessions
+
+
+def test_the_window_shows_a_run(run: Path, shown: list[Session]) -> None:
+    assert main(["replay", str(run), "--size", "900x600", "--theme", "dark", "--hide", "cells"]) == 0
+    (session,) = shown
+    assert 0.0 < session.time < session.end == 1.0
+    assert len(session.lanes[0].curve) == 11
+
+
+def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None:
+    assert main(["replay", str(both), "--size", "900x600"]) == 0
+    (session,) = shown
+    assert [lane.law.name for lane in session.lanes] == ["rpf", "lloyd"]
+    assert session.numbers == (2, 3)
+    assert len(session.lanes[1].curve) == 11
+
+
+@pytest.mark.skipif("sys.platform != 'linux'", reason="elsewhere there is always one")
+def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, capsys) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    assert complaint(capsys, "replay", str(run)) == (
+        "no display: the window needs one (over ssh, try ssh -X); --video --out DIR makes a film without"
+    )
+
+
+# what is wrong
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--frames", "--out: a folder for frames and film was wanted"),
+        ("--out film", "--out: --frames or --video was wanted beside it"),
+        ("--json", "--json: --frames or --video was wanted beside it"),
+        ("--size 480x320", "--size: 480, but a number from 900 to 7680 pixels wide was wanted"),
+        ("--frames --out film --fps 0", "--fps: 0, but a number from 1 to 240 was wanted"),
+        ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(run: Path, capsys, words: str, message: str) -> None:
+    assert complaint(capsys, "replay", str(run), *words.split()).startswith(message)
+
+
+def edited(path: Path, **changes) -> None:
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+
+def arrays(folder: Path, **changes) -> None:
+    with np.load(folder / "record.npz") as found:
+        content = {**found, **changes}
+    np.savez(folder / "record.npz", **content)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (shutil.rmtree, "{run}: not the folder of a run or a comparison (there is no run.json and no comp"),
+        (lambda run: (run / "run.json").write_text("{"), "{run}: the run cannot be read: JSONDecodeError"),
+        (
+            lambda run: (run / "record.npz").unlink(),
+            "{run}: not the folder of a run (there is no record.npz)",
+        ),
+        (lambda run: edited(run / "run.json", session=[1]), "{run}: the run cannot be read: TypeError"),
+        (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: ascending numbers were wanted"),
+        (
+            lambda run: arrays(run, velocities=np.full((61, 3, 2), np.nan)),
+            "{run}/record.npz: velocities: not all of it are finite numbers",
+        ),
+        (
+            lambda run: arrays(
+                run,
+                time=np.zeros(0),
+                **{
+                    name: np.zeros((0, 3, 2))
+                    for name in "positions velocities forces goals obstacle_points".split()
+                },
+            ),
+            "{run}/record.npz: it is empty",
+        ),
+        (
+            lambda run: (run / "cost.csv").write_text("t,J\n"),
+            "{run}/cost.csv: line 1: the header time_s,mean_distance_m,cost_m3,uncovered_area_m2 was wanted",
+        ),
+        (
+            lambda run: (run / "cost.csv").write_text(
+                "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n0,1,2,3\n1,2,3\n"
+            ),
+            "{run}/cost.csv: line 3: '1,2,3', but 4 numbers were wanted",
+        ),
+        (lambda run: (run / "cost.csv").write_bytes(b"\xff\xfe"), "{run}/cost.csv: cannot be read"),
+        (lambda run: edited(run / "run.json", dt_s=0.1), "{run}/record.npz: time: moments 0.1 s apart"),
+        (
+            lambda run: arrays(run, positions=np.full((61, 3, 2), 99.0)),
+            "{run}: starts",
+        ),
+    ],
+)
+def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: str) -> None:
+    spoil(run)
+    assert complaint(capsys, "replay", str(run)).startswith(message.format(run=run))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda both: (both / "comparison.json").write_text("["), "{both}/comparison.json: cannot be read"),
+        (lambda both: (both / "comparison.json").write_text("[]"), "{both}/comparison.json: not the file"),
+        (
+            lambda both: edited(both / "comparison.json", folders=["../run"]),
+            "{both}/comparison.json: folders: ['../run'], but names of folders were wanted",
+        ),
+        (
+            lambda both: edited(both / "comparison.json", folders=["gone"]),
+            "{both}/comparison.json: there is no run in it",
+        ),
+        (
+            lambda both: edited(both / "comparison.json", folders=["gone"], runs=[{}]),
+            "{both}/gone: not the folder of a run (there is no run.json)",
+        ),
+        (
+            lambda both: records_of(stepped(begun(RAPF, environment=EMPTY), 60))[0].save(both / "lloyd"),
+            "{both}/lloyd/run.json: another map than in {both}/rpf",
+        ),
+    ],
+)
+def test_a_spoilt_comparison_is_refused_in_one_line(both: Path, capsys, spoil, message: str) -> None:
+    spoil(both)
+    assert complaint(capsys, "replay", str(both)).startswith(message.format(both=both))

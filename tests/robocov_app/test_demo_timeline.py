@@ -1,0 +1,489 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, stepped, too_deep
+
+from robocov.environment import CircleObstacle
+from robocov.errors import ParameterError, StartError
+from robocov.simulation import Simulation
+from robocov_app.demo import history as history_module
+from robocov_app.demo import timeline as module
+from robocov_app.demo.curves import Event
+from robocov_app.demo.scenario import Law, Limits, Scenario
+from robocov_app.demo.session import Session
+
+MINE = """
+from dataclasses import dataclass
+import numpy as np
+from robocov.observation import Decision
+
+@dataclass(frozen=True)
+class Failing:
+    at: float = 0.2
+
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        if seen.time > self.at:
+            raise ValueError("enough")
+        return Decision(np.zeros_like(seen.positions))
+"""
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory) -> Law:
+    file = tmp_path_factory.mktemp("own") / "mine.py"
+    file.write_text(MINE)
+    return Law(f"{file}:Failing")
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Let the past be thinned soon."""
+    monkeypatch.setattr(history_module, "_FEWEST", 20)
+    monkeypatch.setattr(module, "History", lambda dt: history_module.History(dt, 60_000))
+
+
+def positions_of(session) -> list[np.ndarray]:
+    return [session.positions(lane).copy() for lane in session.lanes]
+
+
+def with_curves(session, steps) -> None:
+    """Make steps, with a cost at each, as the window notes it."""
+    for _ in range(steps):
+        for lane in session.lanes:
+            lane.curve.add(session.time, 3.0 - session.time)
+        session.step()
+
+
+# time
+
+
+def test_it_goes_as_the_simulation_does():
+    session = begun(RPF, robots=4, seed=2)
+    simulation = Simulation(HALL, RPF.made(), HALL.start().sample(4, seed=2))
+    stepped(session, 50)
+    for _ in range(50):
+        simulation.step()
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), simulation.positions)
+    assert session.time == session.end == pytest.approx(simulation.time)
+    assert session.numbers == (1, 2, 3, 4)
+    assert session.environment is HALL
+    assert session.live
+
+
+def test_lanes_go_in_step():
+    session = begun(RAPF, RPF, LLOYD)
+    for k in range(100):
+        session.step()
+        assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+        assert session.end == pytest.approx((k + 1) / 60)
+        assert session.lanes[0].time == pytest.approx(session.end, abs=1e-9)
+    # each in its own way from the same starts
+    first = [session.history[0].states[lane.number].positions for lane in session.lanes]
+    np.testing.assert_array_equal(first[0], first[2])
+    assert np.abs(positions_of(session)[0] - positions_of(session)[2]).max() > 0.1
+
+
+def test_time_passes_while_it_plays():
+    session = begun()
+    assert session.advance(0.1) == 0
+    session.playing = True
+    assert session.advance(0.1) == 6
+    session.clock.speed = 4.0
+    assert session.advance(0.05) == 12
+    assert session.end == pytest.approx(0.3)
+    session.step()
+    assert not session.playing
+
+
+def test_a_longer_control_period():
+    session = begun(dt=0.1)
+    session.playing = True
+    session.advance(0.1)
+    session.advance(0.1)
+    assert session.end == pytest.approx(0.2)
+    session.restart(dt=0.05)
+    session.advance(0.1)
+    assert session.history.steps == [0, 1, 2]
+
+
+def test_a_controller_that_fails_stops_all_lanes_at_the_same_time(failing):
+    session = begun(RAPF, failing, LLOYD)
+    session.playing = True
+    with pytest.raises(ParameterError, match="enough"):
+        for _ in range(10):
+            session.advance(0.1)
+    assert not session.playing
+    assert session.end == pytest.approx(13 / 60)
+    assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+    before = all_told(session)
+    with pytest.raises(ParameterError, match="enough"):
+        session.step()
+    assert all_told(session) == before
+    # what it decided can be shown nonetheless, and the past looked at
+    assert session.snapshot(session.lanes[1]).decision.forces.tolist() == np.zeros((3, 2)).tolist()
+    session.look_at(0.1)
+    session.snapshot(session.lanes[1])
+    # another one goes on
+    session.look_at(9.0)
+    session.set_law(session.lanes[1], RPF)
+    session.step()
+    assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+
+
+def test_it_stops_when_all_have_settled():
+    session = begun(LLOYD, robots=2)
+    session.playing, session.stop_when_settled, session.clock.speed = True, True, 16.0
+    for _ in range(60):
+        session.advance(0.1)
+    assert not session.playing
+    assert session.settled
+    now = positions_of(session)[0]
+    k = session.history.at(session.end - 4.0)
+    assert np.abs(now - session.history[k].states[0].positions).max() < 0.05
+    # whoever touches it unsettles it
+    session.place(1, (3.5, 3.5))
+    assert not session.settled
+
+
+def test_who_is_held_has_not_settled():
+    session = begun(LLOYD, robots=2)
+    session.playing = True
+    session.grab(1, (1.0, 3.0))
+    session.clock.speed = 16.0
+    for _ in range(20):
+        session.advance(0.1)
+    assert not session.settled
+
+
+# the past
+
+
+def test_the_past_is_as_it_was():
+    session = begun(RAPF, LLOYD)
+    was = [positions_of(session)]
+    for _ in range(40):
+        session.step()
+        was.append(positions_of(session))
+    for k in (3, 0, 39, 17):
+        session.look_at(k / 60)
+        assert not session.live
+        assert session.time == pytest.approx(k / 60)
+        assert session.end == pytest.approx(40 / 60)
+        for lane, places in zip(session.lanes, was[k], strict=True):
+            np.testing.assert_array_equal(session.positions(lane), places)
+            assert session.snapshot(lane).time == pytest.approx(k / 60)
+            assert session.trail(lane)[1][-1] <= session.time + 1e-9
+            np.testing.assert_array_equal(session.trail(lane)[0][0], was[0][lane.number])
+    session.look_at(40 / 60)
+    assert session.live
+    session.look_at(99.0)
+    assert session.live
+
+
+def test_looking_moment_by_moment():
+    session = stepped(begun(), 10)
+    session.look_by(-3)
+    assert session.time == pytest.approx(7 / 60)
+    session.look_by(1)
+    session.look_by(1)
+    assert session.time == pytest.approx(9 / 60)
+    session.look_by(1)
+    assert session.live
+    session.look_by(5)
+    assert session.live
+    session.look_by(-99)
+    assert session.time == 0.0
+
+
+def test_the_past_plays_and_ends_in_the_present():
+    session = stepped(begun(), 30)
+    session.look_at(0.2)
+    session.playing = True
+    session.advance(0.1)
+    assert session.time == pytest.approx(0.3)
+    assert session.end == pytest.approx(0.5)
+    session.advance(0.1)
+    session.advance(0.1)
+    # the last moment is the present, from which it goes on
+    assert session.live
+    assert session.end == pytest.approx(0.5)
+    session.advance(0.1)
+    assert session.end == pytest.approx(0.6)
+    session.look_at(0.2)
+    session.step()
+    assert (session.time, session.playing) == (pytest.approx(0.2 + 1 / 60), False)
+
+
+def test_a_thinned_past_plays_at_the_same_speed(short):
+    session = stepped(begun(robots=1), 600)
+    assert session.history.thinned > 0
+    assert session.history.steps[1] > 4
+    session.look_at(0.0)
+    session.playing = True
+    for k in range(1, 31):
+        session.advance(0.1)
+        assert session.time == pytest.approx(0.1 * k, abs=session.history.coarsest() / 60 + 1e-9)
+    # a single step shows the next moment, however far
+    session.look_at(0.0)
+    session.step()
+    assert session.time == session.history.time(1)
+
+
+def test_where_a_robot_was_lately():
+    session = stepped(begun(), 300)
+    lane = session.lanes[0]
+    places = session.recent(lane, 2)
+    assert 20 <= len(places) <= 62
+    np.testing.assert_array_equal(places[0], session.history[60].states[0].positions[1])
+    assert np.abs(places[-1] - session.positions(lane)[1]).max() < 0.5
+    session.look_at(1.0)
+    np.testing.assert_array_equal(session.recent(lane, 2)[0], session.history[0].states[0].positions[1])
+    assert session.recent(lane, 99).shape == (0, 2)
+
+
+def test_trails_of_the_past_are_of_who_worked_then():
+    session = stepped(begun(), 30)
+    session.fail_robot(2)
+    stepped(session, 30)
+    lane = session.lanes[0]
+    assert session.trail(lane)[0].shape[1] == 2
+    session.look_at(0.25)
+    positions, times = session.trail(lane)
+    assert positions.shape[1] == 3
+    assert times[-1] <= 0.25 + 1e-9
+    assert np.isfinite(positions).all()
+    # looked at again, it is not looked for again
+    assert session.trail(lane)[0] is positions or np.shares_memory(session.trail(lane)[0], positions)
+    session.look_at(0.5)
+    assert session.trail(lane)[0].shape[1] == 2
+
+
+# branches
+
+
+@pytest.mark.parametrize("laws", [(RAPF,), (RPF, LLOYD)])
+def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
+    session = stepped(begun(*laws, robots=4), 100)
+    end = positions_of(session)
+    session.look_at(0.5)
+    assert session.branch()
+    assert session.live
+    assert session.end == pytest.approx(0.5)
+    assert session.history.steps[-1] == 30
+    stepped(session, 70)
+    for now, before in zip(positions_of(session), end, strict=True):
+        # bit for bit
+        np.testing.assert_array_equal(now, before)
+
+
+def test_so_it_does_from_a_thinned_past_after_touches(short):
+    session = stepped(begun(RAPF, LLOYD, robots=4), 100)
+    session.edit(
+        replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn"
+    )
+    session.fail_robot(3)
+    stepped(session, 400)
+    end = positions_of(session)
+    assert session.history.thinned > 0
+    session.look_at(2.5)
+    assert session.branch()
+    while session.end < 500 / 60 - 1e-9:
+        session.step()
+    for now, before in zip(positions_of(session), end, strict=True):
+        np.testing.assert_allclose(now, before, rtol=0.0, atol=1e-9)
+
+
+def test_a_branch_leaves_a_ghost():
+    session = begun(RAPF, LLOYD)
+    with_curves(session, 60)
+    serial = session.serial
+    session.look_at(0.5)
+    assert session.branch()
+    assert session.serial == serial + 1
+    assert [ghost.law for ghost in session.ghosts] == ["rapf", "lloyd"]
+    assert [ghost.words for ghost in session.ghosts] == ["RAPF", "LA"]
+    for ghost in session.ghosts:
+        assert ghost.time[0] == pytest.approx(0.5)
+        assert ghost.time[-1] == pytest.approx(59 / 60)
+    for lane in session.lanes:
+        assert lane.curve.last_time == pytest.approx(0.5)
+        assert lane.time == pytest.approx(0.5)
+        assert lane.trail.time[-1] == pytest.approx(0.5)
+    assert session.summary() == {0: pytest.approx(2.5), 1: pytest.approx(2.5)}
+
+
+def test_ghosts_are_few():
+    session = begun()
+    for _ in range(module.MOST_GHOSTS + 3):
+        with_curves(session, 12)
+        session.look_at(0.1)
+        session.branch()
+    assert len(session.ghosts) == module.MOST_GHOSTS
+
+
+def test_the_present_is_no_branch():
+    session = stepped(begun(), 10)
+    before = all_told(session)
+    assert not session.branch()
+    session.look_at(99.0)
+    assert not session.branch()
+    assert all_told(session) == before
+
+
+def test_a_branch_takes_back_what_was_chosen_later():
+    session = stepped(begun(RAPF, RPF), 20)
+    session.set_law(session.lanes[0], LLOYD)
+    session.set_limits(Limits(max_speed=0.5))
+    session.edit(replace(HALL, obstacles=()), "emptied")
+    session.add_robot((1.0, 3.0))
+    stepped(session, 20)
+    session.look_at(10 / 60)
+    assert session.environment is HALL
+    assert session.numbers == (1, 2, 3)
+    session.branch()
+    assert [lane.law for lane in session.lanes] == [RAPF, RPF]
+    assert session.scenario.laws == (RAPF, RPF)
+    assert session.scenario.limits == Limits()
+    assert session.scenario.environment is HALL
+    assert session.lanes[0].starts.shape == (3, 2)
+    assert list(session.events) == []
+    assert not session.undo.can_undo
+    stepped(session, 5)
+
+
+def test_events_up_to_the_branch_stay():
+    session = stepped(begun(), 10)
+    session.fail_robot(2)
+    stepped(session, 10)
+    session.fail_robot(3)
+    stepped(session, 10)
+    session.look_at(10 / 60)
+    session.branch()
+    assert [event.text for event in session.events] == ["robot 2 failed"]
+    assert session.numbers == (1, 3)
+
+
+def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
+    session = begun(RAPF, RPF)
+    with_curves(session, 40)
+    session.look_at(0.3)
+    before = all_told(session)
+
+    def no_room(state, dt, time):
+        if state.circumstances.law == RPF:
+            raise StartError("no room")
+        return real(state, dt, time)
+
+    real = module.resumed
+    monkeypatch.setattr(module, "resumed", no_room)
+    for touch in (
+        session.branch,
+        lambda: session.set_law(session.lanes[0], LLOYD),
+        lambda: session.fail_robot(1),
+    ):
+        with pytest.raises(StartError, match="no room"):
+            touch()
+        assert all_told(session) == before
+
+
+# events
+
+
+def test_events_are_few(monkeypatch):
+    session = begun()
+    for k in range(module.MOST_EVENTS + 5):
+        session.events.append(Event(0.0, "law", str(k)))
+    assert len(session.events) == module.MOST_EVENTS
+
+
+def test_a_slider_that_is_dragged_is_one_event():
+    session = stepped(begun(RAPF, RPF), 3)
+    for k in range(1, 20):
+        session.set_law(session.lanes[0], RAPF.with_gain("k_rep", k / 10))
+        session.step()
+    for k in range(1, 20):
+        session.set_law(session.lanes[0], session.lanes[0].law.with_gain("k_att", k / 10))
+        session.step()
+    for k in range(1, 20):
+        session.set_limits(Limits(max_speed=k / 10))
+        session.step()
+    assert [event.text for event in session.events] == [
+        "RAPF: k_rep = 1.9",
+        "RAPF: k_att = 1.9",
+        "limits changed",
+    ]
+    # later it is another one
+    stepped(session, 70)
+    session.set_limits(Limits(max_speed=3.0))
+    session.set_law(session.lanes[0], LLOYD)
+    session.set_law(session.lanes[1], LLOYD)
+    assert [event.text for event in session.events][3:] == ["limits changed", "LA takes over"]
+
+
+# the hand
+
+
+def test_a_hand_pulls_a_robot_and_it_flies_on():
+    session = stepped(begun(LLOYD, RPF, robots=2), 5)
+    session.playing = True
+    session.grab(1, (5.3, 3.3))
+    assert session.hand == (1, (5.3, 3.3))
+    for _ in range(12):
+        session.advance(0.1)
+        assert too_deep(session) < 2e-3
+    for lane in session.lanes:
+        assert np.hypot(*(lane.simulation.positions[0] - (5.3, 3.3))) < 0.3
+    session.grab(1, (1.0, 3.3))
+    session.advance(0.1)
+    speeds = [float(np.hypot(*lane.simulation.velocities[0])) for lane in session.lanes]
+    assert min(speeds) > 1.5
+    session.release()
+    assert session.hand is None
+    assert session.events[-1].text == "robot 1 was dragged"
+    session.advance(0.1)
+    # it brakes from more than it can do by itself
+    for lane, speed in zip(session.lanes, speeds, strict=True):
+        assert 1.0 < np.hypot(*lane.simulation.velocities[0]) < speed
+    session.release()
+    assert len(session.events) == 1
+
+
+def test_a_robot_that_is_thrown_at_a_wall_stays_inside():
+    session = begun(RAPF, robots=1, limits=Limits(radius=0.3, mass=3.0))
+    session.playing = True
+    for target in ((6.5, 4.5), (-0.5, -0.5), (6.5, -0.5), (-0.5, 4.5), (4.2, 1.2), (2.5, 9.0)):
+        session.grab(1, target)
+        for _ in range(10):
+            session.advance(0.1)
+            assert too_deep(session) < 2e-3
+
+
+def test_who_looks_back_lets_go():
+    session = stepped(begun(), 10)
+    session.playing = True
+    session.grab(1, (3.0, 3.0))
+    session.look_at(0.1)
+    assert session.hand is None
+    assert session.events[-1].kind == "hand"
+
+
+# begin
+
+
+def test_a_session_needs_room():
+    with pytest.raises(StartError):
+        Session(Scenario(HALL, robots=400))
+    with pytest.raises(ParameterError):
+        Session(Scenario(HALL, (Law("nobody"),)))
+
+
+def test_starts_that_are_given_are_begun_with():
+    given = np.array([[1.0, 1.0], [5.0, 3.0]])
+    session = begun(robots=2, given=given)
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), given)

@@ -1,0 +1,71 @@
+"""A hall and sessions in it, for the tests of the interactive window's model."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from robocov.environment import CircleObstacle, Environment, WallObstacle
+from robocov.starts import DiscStart, UniformStart
+from robocov_app.demo.lane import with_failed
+from robocov_app.demo.scenario import Law, Scenario
+from robocov_app.demo.session import Session
+
+HALL = Environment(
+    "hall",
+    ((0, 0), (6, 0), (6, 4), (0, 4)),
+    (CircleObstacle((4.2, 1.2), 0.5, "pillar"), WallObstacle(((2.5, 4), (2.5, 2.4)), 0.1)),
+    {"corner": DiscStart((1.2, 1.2), 0.8), "far": DiscStart((5.2, 3.2), 0.5), "spread": UniformStart()},
+)
+RAPF, RPF, LLOYD = Law("rapf"), Law("rpf"), Law("lloyd")
+
+
+def begun(*laws: Law, robots: int = 3, environment: Environment = HALL, **changes) -> Session:
+    """Return a session that is paused at its beginning."""
+    session = Session(Scenario(environment, laws or (RAPF,), robots, **changes))
+    session.playing = False
+    # as many steps as are due, whatever they take
+    session.clock.budget = float("inf")
+    return session
+
+
+def stepped(session: Session, steps: int) -> Session:
+    """Let a session make so many steps."""
+    for _ in range(steps):
+        session.step()
+    return session
+
+
+def robots_of(session: Session) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the numbers of the robots that work, and of those that failed."""
+    there = session.circumstances(session.lanes[0])
+    return there.numbers, tuple(sorted(there.failed))
+
+
+def all_told(session: Session) -> list[object]:
+    """Return whatever can be told of a session, so that it can be compared."""
+    told: list[object] = [session.scenario, session.hand, session.settled, session.playing, session.serial]
+    told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
+    told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
+    told += [session.undo.can_undo, session.undo.can_redo]
+    for lane in session.lanes:
+        arrays = (
+            *(lane.simulation.positions, lane.simulation.velocities, lane.starts),
+            *(lane.trail.positions, lane.trail.time, lane.curve.time, lane.curve.value),
+            *lane.sensed.until(np.inf),
+        )
+        told += [lane.number, lane.circumstances, lane.time, [array.tolist() for array in arrays]]
+    return [str(part) for part in told]
+
+
+def too_deep(session: Session) -> float:
+    """Return by how many metres some robot is too near to a wall or an obstacle, inf inside of one."""
+    deepest = -np.inf
+    for lane in session.lanes:
+        free = with_failed(lane.circumstances).free
+        places = shapely.points(lane.simulation.positions)
+        if not shapely.contains_properly(free, places).all():
+            return np.inf
+        rim = shapely.distance(free.boundary, places) - lane.simulation.team.radius
+        deepest = max(deepest, float(-rim.min()))
+    return deepest
