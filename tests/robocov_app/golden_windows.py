@@ -1,4 +1,4 @@
-"""Pictures of the window that its tests compare with: ``python tests/robocov_app/golden_windows.py`` draws them."""
+"""Pictures that the window is compared with: ``python tests/robocov_app/golden_windows.py`` draws them anew."""
 
 from __future__ import annotations
 

@@ -89,6 +89,16 @@ def test_another_seed_gives_other_starts_and_another_start_too() -> None:
     assert desk.session.scenario.start_name == "corner"
 
 
+def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
+    desk = desk_of(start="far")
+    desk.tools["circle"].press(desk.session, (5.2, 3.2), 0.1, None)
+    desk.attempt(lambda: desk.tools["circle"].release(desk.session, (5.2, 3.75)))
+    assert desk.message.endswith("it covers the start far") and "far" not in desk.starts()
+    assert desk.session.scenario.start_name == "far"
+    desk.do("start")
+    assert not desk.trouble and desk.session.scenario.start_name == "corner"
+
+
 def test_more_and_fewer_robots() -> None:
     desk = desk_of(robots=2)
     desk.do("more")

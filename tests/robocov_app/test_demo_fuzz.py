@@ -275,7 +275,7 @@ def usual(driver: Driver) -> None:
         driver.session.remove_pane(driver.session.lanes[-1])
     desk.attempt(lambda: desk.open_map("square"))
     desk.command("robots 2")
-    for name in ("radius 0.1", "max_speed 1", "controller rapf"):
+    for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
         desk.command(name)
     driver.settle()
     driver.settle()

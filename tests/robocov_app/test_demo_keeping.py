@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import io
 import json
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,17 +11,16 @@ from kept_run import COUNTING, record_of, records_of, repeated, said_by, same_ar
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov.environment import CircleObstacle
-from robocov.errors import OutputError, ParameterError
 from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov.starts import PointsStart
 from robocov_app.cli import main
-from robocov_app.demo import history, keep_process, keeping
+from robocov_app.demo import history
 from robocov_app.demo.editing import with_obstacle
 from robocov_app.demo.history import History
 from robocov_app.demo.keep_process import kept
 from robocov_app.demo.keeping import Keeper, since_words, tell, untouched_since, wanted_of
-from robocov_app.demo.kept import Kept, NotKept
+from robocov_app.demo.kept import Kept
 from robocov_app.demo.scenario import Law
 from robocov_app.saved import load_saved, roster_of
 
@@ -331,113 +329,6 @@ def test_what_cannot_be_sent_is_done_without(tmp_path: Path) -> None:
     record = record_of(session)
     assert len(record) == 11
     assert record.session == {"repeatable": False}
-
-
-# folders and troubles
-
-
-def test_folders_have_names_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Keeper, "_work", lambda self: None)
-    keeper = Keeper()
-    one, two = begun(), begun(RAPF, RPF)
-    (tmp_path / "hall-rapf-1").write_text("in the way")
-    names = ["", "hall", "a/b/My map!.json", ".."]
-    said = [keeper.save(one, tmp_path / "new", name) for name in names]
-    said += [keeper.save(two, tmp_path, "hall"), keeper.save(one, tmp_path, "hall")]
-    folders = [words.removeprefix(f"saving the run: {tmp_path}/") for words in said]
-    assert folders == [
-        *("new/hall-rapf-1/", "new/hall-rapf-2/", "new/My-map-rapf-1/", "new/map-rapf-1/"),
-        *("hall-comparison-1/", "hall-rapf-2/"),
-    ]
-
-
-def test_a_folder_that_cannot_be_made_is_said_at_once(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="file/hall-rapf-1: cannot be made"):
-        Keeper().save(begun(), tmp_path / "file", "hall")
-
-
-def test_a_controller_that_is_gone_is_said_at_once(tmp_path: Path, counting: Law) -> None:
-    session = stepped(begun(counting), 5)
-    (tmp_path / "mine.py").unlink()
-    with pytest.raises(ParameterError, match="there is no file"):
-        Keeper().save(session, tmp_path / "runs")
-    assert not (tmp_path / "runs").exists()
-
-
-def test_a_process_that_ends_too_early_is_said(tmp_path: Path, monkeypatch, capfd) -> None:
-    started = keeping.started
-    monkeypatch.setattr(keeping, "started", lambda module: started("robocov_app.nothing"))
-    keeper = Keeper()
-    keeper.save(stepped(begun(), 5), tmp_path)
-    words, trouble = said_by(keeper)
-    assert words == f"run not saved: {tmp_path}/hall-rapf-1/: the process that saves it has ended"
-    assert trouble
-    assert list(tmp_path.iterdir()) == [], "no empty folder is left"
-    keeper.finish()
-
-
-def test_no_process_at_all_is_said_too(tmp_path: Path, monkeypatch) -> None:
-    def fails(module):
-        raise OSError(12, "Cannot allocate memory")
-
-    monkeypatch.setattr(keeping, "started", fails)
-    keeper = Keeper()
-    keeper.save(begun(), tmp_path)
-    assert said_by(keeper).words.endswith("Cannot allocate memory")
-    keeper.finish()
-
-
-def test_finishing_waits_for_what_is_being_saved(tmp_path: Path, monkeypatch, capfd) -> None:
-    gate = threading.Event()
-
-    def slowly(self, wanted):
-        gate.wait(10.0)
-        return Kept(("remark",))
-
-    monkeypatch.setattr(Keeper, "_saved", slowly)
-    keeper = Keeper()
-    for _ in range(2):
-        keeper.save(begun(), tmp_path)
-    assert keeper.poll() == []
-    threading.Timer(0.7, gate.set).start()
-    keeper.finish()
-    assert [said.words.rpartition("; ")[2] for said in keeper.poll()] == ["remark", "remark"]
-    assert capfd.readouterr().err == "saving runs; Ctrl-C gives up\n"
-    keeper.finish()
-    keeper.save(begun(), tmp_path)
-    keeper.finish()
-    assert len(keeper.poll()) == 1
-
-
-def test_half_a_message_writes_nothing(tmp_path: Path) -> None:
-    stream = io.BytesIO()
-    tell(stream, wanted_of(stepped(begun(), 5), tmp_path / "run"))
-    whole = stream.getvalue()
-    for length in (0, 20, len(whole) - 5):
-        (tmp_path / "run").mkdir()
-        assert kept(io.BytesIO(whole[:length])) is None
-        if length > 20:
-            assert not (tmp_path / "run").exists()
-        else:
-            (tmp_path / "run").rmdir()
-
-
-def test_what_goes_wrong_in_the_process_is_one_line(tmp_path: Path, monkeypatch, capfd) -> None:
-    def fault(*_):
-        raise ZeroDivisionError("a fault of ours")
-
-    session, folder = stepped(begun(), 5), tmp_path / "run"
-    stream = io.BytesIO()
-    tell(stream, wanted_of(session, folder, 16))
-    stream.seek(0)
-    assert kept(stream) == NotKept(f"{folder}/record.npz: cannot be written: No such file or directory")
-    monkeypatch.setattr(keep_process, "_save_run", fault)
-    folder.mkdir()
-    stream.seek(0)
-    assert kept(stream) == NotKept("ZeroDivisionError: a fault of ours")
-    assert "Traceback" in capfd.readouterr().err
-    assert not folder.exists()
 
 
 def test_a_comparison_whose_robots_failed_at_different_places_is_whole(tmp_path: Path) -> None:

@@ -123,12 +123,10 @@ def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: Law) -> None:
     whole = stepped(begun(law, robots=8, start="spread"), 2 * STEPS)
     session = replayed(recorded(law, robots=8, start="spread"))
     session.playing = True
-    for _ in range(2 * STEPS + 1):
+    for _ in range(2 * STEPS):
         session.advance(1 / 60)
-    session.playing = False
     assert session.live
-    while session.end < whole.end - 1e-9:
-        session.step()
+    assert session.end == whole.end
     for mine, theirs in zip(state_of(session), state_of(whole), strict=True):
         np.testing.assert_array_equal(mine, theirs)
     assert same_arrays(record_of(session), record_of(whole))
@@ -182,7 +180,8 @@ def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
     for one in (before, session):
         one.revive_robot(2)
         stepped(one, 20)
-    assert session.numbers == (1, 3, 4, 2)
+    assert sorted(session.numbers) == [1, 2, 3, 4]
+    assert session.numbers == before.numbers
     np.testing.assert_array_equal(state_of(session)[0], state_of(before)[0])
 
 
@@ -277,7 +276,7 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
         (lambda record: recorded(robots=3), r"saved/1: team: "),
         (
             lambda record: replace(record, time=record.time**2),
-            "saved/1/record.npz: time: moments 0.0167 s apart",
+            "saved/1/record.npz: time: moments 0.0166667 s apart",
         ),
         (
             lambda record: replace(record, team=replace(record.team, radius=np.array([0.1, 0.1, 0.1, 0.2]))),

@@ -284,9 +284,7 @@ def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
 
 def test_so_it_does_from_a_thinned_past_after_touches(short):
     session = stepped(begun(RAPF, LLOYD, robots=4), 100)
-    session.edit(
-        replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn"
-    )
+    session.edit(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn")
     session.fail_robot(3)
     stepped(session, 400)
     end = positions_of(session)

@@ -122,3 +122,15 @@ def test_robots_that_came_later_were_nowhere_before():
     earlier = trail_of(session.history, 0, 5)
     assert np.isfinite(earlier.positions).all()
     np.testing.assert_array_equal(starts_of(session.history, 0, 5), session.history[0].states[0].positions)
+
+
+@pytest.mark.parametrize("steps", range(1, 7))
+def test_who_came_in_between_two_rows_is_in_the_last_one(steps):
+    session = stepped(begun(robots=1), 3)
+    session.add_robot((3.5, 3.0))
+    stepped(session, steps)
+    for last in range(3, 3 + steps + 1):
+        told = trail_of(session.history, 0, last)
+        np.testing.assert_array_equal(told.positions[-1], session.history[last].states[0].positions)
+        assert told.time[-1] == pytest.approx(last * STEP)
+        assert told.positions[np.isfinite(told.positions[:, 1, 0]), 1][0].tolist() == [3.5, 3.0]

@@ -298,6 +298,16 @@ def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
     assert driver.session.scenario.start_name == "inside"
 
 
+def test_a_start_that_an_obstacle_covers_stays_in_the_menu_until_another_is_chosen(driver: Driver) -> None:
+    driver.choose("start", "far")
+    driver.key("c")
+    driver.drag_at((5.2, 3.2), (5.2, 3.5), (5.2, 3.75))
+    assert "far" not in driver.session.environment.starts and driver.session.scenario.start_name == "far"
+    driver.push("seed")
+    driver.choose("start", "spread")
+    assert driver.session.scenario.start_name == "spread"
+
+
 def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(driver: Driver) -> None:
     driver.click(*driver.widget("menu", "map").rect.center)
     assert driver.window.panel.unfolded

@@ -49,13 +49,16 @@ def all_told(session: Session) -> list[object]:
     told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
     told += [session.undo.can_undo, session.undo.can_redo]
     for lane in session.lanes:
-        arrays = (
-            *(lane.simulation.positions, lane.simulation.velocities, lane.starts),
-            *(lane.trail.positions, lane.trail.time, lane.curve.time, lane.curve.value),
-            *lane.sensed.until(np.inf),
-        )
-        told += [lane.number, lane.circumstances, lane.time, [array.tolist() for array in arrays]]
-    return [str(part) for part in told]
+        told += [lane.number, lane.circumstances, lane.time]
+        told += [
+            array.tobytes()
+            for array in (
+                *(lane.simulation.positions, lane.simulation.velocities, lane.starts),
+                *(lane.trail.positions, lane.trail.time, lane.curve.time, lane.curve.value),
+                *lane.sensed.until(np.inf),
+            )
+        ]
+    return told
 
 
 def too_deep(session: Session) -> float:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.layout import Layout
+    from robocov_app.demo.session import Session
     from robocov_app.view.theme import Colour, Theme
 
 LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20
@@ -226,10 +227,7 @@ class Chart:
         """Write each pane's value at the right, with the gap to the best; none over another."""
         session, theme, scale = self.desk.session, self.theme, self.layout.scale
         _, right, _ = self._span
-        # costs come in one after the other: they are compared at a time for which all are known
-        time = min([session.time, *(lane.curve.last_time for lane in session.lanes if len(lane.curve))])
-        values = {lane.number: lane.curve.at(time) for lane in session.lanes}
-        known = {number: value for number, value in values.items() if np.isfinite(value)}
+        time, known = compared(session)
         if not known:
             return
         best = min(known.values())
@@ -252,7 +250,7 @@ class Chart:
     def _track(self, canvas: Canvas) -> None:
         """Draw the time line."""
         theme, scale, session = self.theme, self.layout.scale, self.desk.session
-        left, right, end = self._span
+        left, right, _ = self._span
         top = self.layout.chart[3]
         middle = top + 0.5 * self.layout.track[3]
         canvas.surface.fill(theme.panel, pygame.Rect(0, top, *self.layout.track[2:]))
@@ -325,22 +323,27 @@ class Chart:
         return curve_colour(self.desk, self.theme, lane)
 
 
+def compared(session: Session) -> tuple[float, dict[int, float]]:
+    """Return the costs of the panes, m by number, and the newest time not after now for which all are known.
+
+    They come in one after the other; a pane without any yet is left out.
+    """
+    lanes = [lane for lane in session.lanes if len(lane.curve)]
+    time = min([session.time, *(lane.curve.last_time for lane in lanes)])
+    values = {lane.number: lane.curve.at(time) for lane in lanes}
+    return time, {number: value for number, value in values.items() if np.isfinite(value)}
+
+
 def curve_colour(desk: Desk, theme: Theme, lane: Lane) -> Colour:
-    """Return the colour of a pane's curve: its controller's; a second of the same kind is another."""
-    before = 0
+    """Return the colour of a pane's curve: its controller's, another one where that is taken."""
+    taken: list[Colour] = []
     for other in desk.session.lanes:
+        own = theme.controllers.get(other.law.name)
+        free = [colour for colour in theme.others if colour not in taken]
+        taken.append(own if own is not None and own not in taken else free[0])
         if other is lane:
             break
-        before += other.law.name == lane.law.name or (
-            other.law.name not in theme.controllers and lane.law.name not in theme.controllers
-        )
-    if lane.law.name in theme.controllers:
-        return (
-            theme.controllers[lane.law.name]
-            if before == 0
-            else theme.others[(before - 1) % len(theme.others)]
-        )
-    return theme.others[before % len(theme.others)]
+    return taken[-1]
 
 
 def spread(wanted: Array, gap: float, limit: float) -> list[float]:

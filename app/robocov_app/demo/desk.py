@@ -244,7 +244,9 @@ class Desk:
         """Begin anew at the next start of the map."""
         names = self.starts()
         now = self.session.scenario.start_name
-        self.restart(start=names[(names.index(now) + 1) % len(names)])
+        # an obstacle may have covered the start since
+        k = names.index(now) if now in names else -1
+        self.restart(start=names[(k + 1) % len(names)])
 
     def starts(self) -> list[str]:
         """Return the names of the map's starts."""

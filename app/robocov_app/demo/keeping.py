@@ -126,11 +126,21 @@ class Keeper:
                 sys.stderr.write("saving runs; Ctrl-C gives up\n")
                 self._thread.join()
         except BaseException:
-            self._ended = True
-            if self._process is not None:
-                self._process.kill()
+            self._give_up()
             raise
         self._thread = None
+
+    def _give_up(self) -> None:
+        """Leave what is not saved yet; no empty folder stays."""
+        self._ended = True
+        with suppress(queue.Empty):
+            while True:
+                wanted = self._wanted.get_nowait()
+                if wanted is not None:
+                    _remove_empty(wanted.job.folder)
+        self._wanted.put(None)
+        if self._process is not None:
+            self._process.kill()
 
     def _work(self) -> None:
         while (wanted := self._wanted.get()) is not None and not self._ended:
@@ -138,18 +148,21 @@ class Keeper:
                 answer = self._saved(wanted)
             except OSError as error:
                 answer = NotKept(error.strerror or str(error))
+            except Exception as error:  # whatever it is, it is told
+                answer = NotKept(f"{type(error).__name__}: {error}")
             if isinstance(answer, Kept):
                 remarks = "".join(f"; {remark}" for remark in answer.remarks)
                 words = f"run saved: {wanted.name} (record, cost, pictures){wanted.since}{remarks}"
                 self._said.put(Said(words, trouble=False))
             else:
-                with suppress(OSError):
-                    Path(wanted.job.folder).rmdir()  # fails, as it should, where there is something in it
+                _remove_empty(wanted.job.folder)
                 self._said.put(Said(f"run not saved: {wanted.name}: {answer.message}", trouble=True))
 
     def _saved(self, wanted: Wanted) -> Kept | NotKept:
         with started("robocov_app.demo.keep_process") as process:
             self._process = process
+            if self._ended:
+                process.kill()
             assert process.stdin is not None
             assert process.stdout is not None
             # where the process has ended, it says nothing either
@@ -254,3 +267,8 @@ def _made(folder: Path, stem: str) -> Path:
             raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
         else:
             return target
+
+
+def _remove_empty(folder: str) -> None:
+    with suppress(OSError):
+        Path(folder).rmdir()  # fails, as it should, where there is something in it

@@ -173,7 +173,9 @@ class Scenario:
 
     @property
     def start_name(self) -> str:
-        """The name of the start."""
+        """The name of the start, also of one that an obstacle has covered since."""
+        if self.start is not None and self.start not in self.environment.starts:
+            return self.start
         return self.environment.start(self.start).name
 
     def positions(self) -> Array:

@@ -46,10 +46,11 @@ class Hand(Base):
     _from: Point = (0.0, 0.0)
     _at: Point = (0.0, 0.0)
     _taken: Obstacle | None = None
+    _drags: bool = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         """Take hold of what is under the cursor; a robot before an obstacle."""
-        self._from = self._at = point
+        self._from, self._at, self._drags = point, point, False
         self.robot, self.obstacle = number, None
         if number is not None:
             self.selected = number
@@ -68,8 +69,8 @@ class Hand(Base):
         """Drag."""
         self._at = point
         # a click is no pull
-        far = np.hypot(point[0] - self._from[0], point[1] - self._from[1]) > 0.02
-        if self.robot is None or not (far or session.hand is not None):
+        self._drags = self._drags or bool(np.hypot(*self._by()) > 0.02)
+        if self.robot is None or not self._drags:
             return
         # meanwhile it may have been taken out
         if self.robot in {*session.numbers, *session.circumstances(session.lanes[0]).failed}:

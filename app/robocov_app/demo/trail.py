@@ -98,15 +98,17 @@ def trail_of(history: History, pane: int, last: int) -> Trail:
     latest = -np.inf
     for k in range(last + 1):
         time, state = history.time(k), history[k].states[pane]
-        if time - latest < 1.0 / RATE - 1e-6:
+        touched = state.circumstances is not before
+        # who came in since is in the last row, too
+        if time - latest < 1.0 / RATE - 1e-6 and not touched and k < last:
             continue
-        if state.circumstances is not before:
+        if touched:
             before = state.circumstances
             rows = [row for row, number in enumerate(numbers) if number in before.numbers]
             their_rows = [before.numbers.index(numbers[row]) for row in rows]
         places = np.full((len(numbers), 2), np.nan)
         places[rows] = state.positions[their_rows]
-        trail.add(time, places)
+        trail.add(time, places, always=True)
         latest = time
     return trail
 

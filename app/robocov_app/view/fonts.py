@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pygame
 
+from robocov_app.view.surface_cache import kept
 from robocov_app.view.theme import Colour
 
 
@@ -31,7 +32,7 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
     return pygame.font.Font(font_path(bold), size)
 
 
-@lru_cache(maxsize=4096)
+@kept(8_000_000)
 def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
     """Return `text` as a transparent picture; kept, since rendering costs far more than blitting.
 

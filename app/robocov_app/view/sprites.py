@@ -7,16 +7,19 @@ robots glide in films instead of hopping. All is premultiplied: blit with ``BLEN
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TypeAlias
 
 import pygame
 
 from robocov_app.view.fonts import label
+from robocov_app.view.surface_cache import kept
 from robocov_app.view.theme import Colour, readable_on
 
 FINE = 4
 """Each sprite is drawn so many times larger; also the number of shifts within a pixel."""
+
+LARGE = 60.0
+"""Radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes."""
 
 STROKE_FINE = 3
 """The same for strokes, which may span the whole picture."""
@@ -75,15 +78,15 @@ class Sketch:
         surface.blit(picture, self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _blank(radius: float) -> tuple[pygame.Surface, int]:
+def _blank(radius: float, fine: int = FINE) -> tuple[pygame.Surface, int]:
     """Return a large transparent square for a sprite of `radius` pixels and its half side in pixels."""
     half = int(radius) + 2
-    return pygame.Surface((2 * half * FINE, 2 * half * FINE), pygame.SRCALPHA, 32), half
+    return pygame.Surface((2 * half * fine, 2 * half * fine), pygame.SRCALPHA, 32), half
 
 
-def _shrunk(large: pygame.Surface) -> pygame.Surface:
+def _shrunk(large: pygame.Surface, fine: int = FINE) -> pygame.Surface:
     width, height = large.get_size()
-    return pygame.transform.smoothscale(large, (width // FINE, height // FINE))
+    return pygame.transform.smoothscale(large, (width // fine, height // fine))
 
 
 def number_size(inside: float, text: str) -> float:
@@ -91,7 +94,6 @@ def number_size(inside: float, text: str) -> float:
     return inside * (1.5, 1.22, 0.92, 0.72)[min(len(text), 4) - 1]
 
 
-@lru_cache(maxsize=8192)
 def disc(
     radius: float,
     fill: Colour,
@@ -112,33 +114,56 @@ def disc(
     text : str
         Drawn in the middle when it is not empty.
     shift : pair of int
-        Quarters of a pixel to the right and down.
+        Quarters of a pixel to the right and down; what is `LARGE` keeps to whole pixels.
     """
-    large, half = _blank(radius + 1)
-    center = (half * FINE + shift[0], half * FINE + shift[1])
-    pygame.draw.circle(large, edge, center, (radius + 0.6) * FINE)
-    pygame.draw.circle(large, ring, center, radius * FINE)
-    pygame.draw.circle(large, fill, center, (radius - ring_width) * FINE)
+    return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
+
+
+@kept(24_000_000)
+def _disc(
+    radius: float,
+    fill: Colour,
+    ring: Colour,
+    ring_width: float,
+    edge: Colour,
+    text: str,
+    shift: tuple[int, int],
+) -> pygame.Surface:
+    fine = _fineness(radius)
+    large, half = _blank(radius + 1, fine)
+    center = (half * fine + shift[0], half * fine + shift[1])
+    pygame.draw.circle(large, edge, center, (radius + 0.6) * fine)
+    pygame.draw.circle(large, ring, center, radius * fine)
+    pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
     if text:
         size = number_size(radius - ring_width, text)
-        number = label(text, round(size * FINE), readable_on(fill), True)
+        number = label(text, round(size * fine), readable_on(fill), True)
         # the ink of digits, without the room for ascenders and descenders, goes to the middle
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
-    return _shrunk(large)
+    return _shrunk(large, fine)
 
 
-@lru_cache(maxsize=1024)
 def ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
     """Return a circle's line, its middle at `radius` pixels."""
-    large, half = _blank(radius + width / 2)
-    center = (half * FINE + shift[0], half * FINE + shift[1])
-    pygame.draw.circle(large, colour, center, (radius + width / 2) * FINE)
-    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * FINE)
-    return _shrunk(large)
+    return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
 
 
-@lru_cache(maxsize=1024)
+@kept(6_000_000)
+def _ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
+    fine = _fineness(radius)
+    large, half = _blank(radius + width / 2, fine)
+    center = (half * fine + shift[0], half * fine + shift[1])
+    pygame.draw.circle(large, colour, center, (radius + width / 2) * fine)
+    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fine)
+    return _shrunk(large, fine)
+
+
+def _fineness(radius: float) -> int:
+    return FINE if radius <= LARGE else FINE // 2
+
+
+@kept(4_000_000)
 def dot(radius: float, colour: Colour, shift: tuple[int, int]) -> pygame.Surface:
     """Return a filled circle."""
     large, half = _blank(radius)
@@ -147,7 +172,7 @@ def dot(radius: float, colour: Colour, shift: tuple[int, int]) -> pygame.Surface
     return _shrunk(large)
 
 
-@lru_cache(maxsize=1024)
+@kept(4_000_000)
 def cross(
     arm: float, colour: Colour, halo: Colour, width: float, diagonal: bool, shift: tuple[int, int]
 ) -> pygame.Surface:

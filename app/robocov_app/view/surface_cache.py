@@ -1,0 +1,72 @@
+"""Pictures that are kept as long as there is room: so many bytes, not so many pictures."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec
+
+import pygame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Arguments = ParamSpec("Arguments")
+
+
+def kept(
+    most_bytes: int,
+) -> Callable[[Callable[Arguments, pygame.Surface]], Callable[Arguments, pygame.Surface]]:
+    """Let a function draw each picture once, and forget those that were not asked for for longest.
+
+    A count of pictures would not do: at a high magnification a single disc takes megabytes.
+
+    Parameters
+    ----------
+    most_bytes : int
+        All pictures together; a single larger one is handed out but not kept.
+
+    Examples
+    --------
+    >>> @kept(1000)
+    ... def page(side):
+    ...     return pygame.Surface((side, side), 0, 32)
+    >>> page(9) is page(9), page(99) is page(99)
+    (True, False)
+    """
+
+    def decorate(draw: Callable[Arguments, pygame.Surface]) -> Callable[Arguments, pygame.Surface]:
+        pictures: OrderedDict[object, pygame.Surface] = OrderedDict()
+        taken = 0
+
+        @wraps(draw)
+        def drawn(*args: Arguments.args, **kwargs: Arguments.kwargs) -> pygame.Surface:
+            nonlocal taken
+            key = (args, tuple(kwargs.items())) if kwargs else args
+            picture = pictures.get(key)
+            if picture is not None:
+                pictures.move_to_end(key)
+                return picture
+            picture = draw(*args, **kwargs)
+            size = _bytes(picture)
+            if size <= most_bytes:
+                pictures[key] = picture
+                taken += size
+                while taken > most_bytes:
+                    taken -= _bytes(pictures.popitem(last=False)[1])
+            return picture
+
+        def cache_clear() -> None:
+            nonlocal taken
+            pictures.clear()
+            taken = 0
+
+        drawn.cache_clear = cache_clear  # type: ignore[attr-defined]
+        drawn.pictures = pictures  # type: ignore[attr-defined]
+        return drawn
+
+    return decorate
+
+
+def _bytes(picture: pygame.Surface) -> int:
+    return picture.get_pitch() * picture.get_height()
