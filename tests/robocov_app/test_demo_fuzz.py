@@ -269,8 +269,9 @@ def usual(driver: Driver) -> None:
         driver.release(button)
     pygame.display.set_mode((900, 600), pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
+    driver.post(pygame.WINDOWFOCUSLOST)  # so that no key is held any more
     driver.key("escape", 6)
-    desk.panel, window.scale = True, 1.0
+    desk.panel, window.scale, desk.shown = True, 1.0, {"robots", "obstacles", "boundary"}
     while len(driver.session.lanes) > 1:
         driver.session.remove_pane(driver.session.lanes[-1])
     desk.attempt(lambda: desk.open_map("square"))

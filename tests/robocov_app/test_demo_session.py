@@ -517,7 +517,7 @@ class Anything(RuleBasedStateMachine):
 
 
 def test_whatever_users_do_all_stays_in_order():
-    run_state_machine_as_test(Anything, settings=settings(max_examples=30, stateful_step_count=30))
+    run_state_machine_as_test(Anything, settings=settings(max_examples=25, stateful_step_count=25))
 
 
 undoable = st.tuples(
@@ -546,7 +546,7 @@ def touched(session, kind, point, k) -> None:
 
 
 @given(st.lists(undoable, max_size=15))
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
     session = begun(RAPF, LLOYD)
     for touch in touches:

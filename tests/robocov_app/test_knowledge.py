@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
-from drawn_run import ROOMS, SQUARE, explained, run_of, scene_of
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
 from robocov.environment import Environment, PolygonObstacle
@@ -154,13 +154,16 @@ class TestSensedObstacles:
             assert distance(frame, painter.camera.to_pixels(np.array(point)), colour) == 0
 
     def test_the_boundary_stays_as_it_is(self):
-        plain, painter = drawn(knowing(), "obstacles", "boundary")
-        frame, _ = drawn(knowing(np.empty((0, 2)), ()), "obstacles", "boundary", "sensed")
-        corners = ROOMS.region.vertices
+        scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
+        plain, painter = drawn(scene, "obstacles", "boundary")
+        frame, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "boundary", "sensed")
+        corners = HALL.region.vertices
         for part in np.linspace(0.01, 0.99, 60):
             for pixel in painter.camera.to_pixels(corners + part * (np.roll(corners, -1, axis=0) - corners)):
                 x, y = np.rint(pixel).astype(int)
                 assert np.abs(frame[y, x] - plain[y, x]).max() < 50
+        pale, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "sensed")
+        assert (pale != frame).any()
 
     def test_where_obstacles_are_not_shown_only_points_are(self):
         pixels, painter = changed(knowing(), "sensed")
@@ -325,6 +328,15 @@ class TestCursorPath:
         free = (frame == 255).all(axis=2)
         assert (both[disc & free] == alone[disc & free]).all()
         assert tags(both, painter, "0.60 m").tolist() == tags(frame, painter, "0.60 m").tolist()
+
+    @pytest.mark.parametrize("side", [(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    def test_the_tag_hides_no_other_robot(self, side):
+        positions = 4.0 + np.array([[0.4 * side[0], 0.35 * side[1]], [0.0, -2.0]])
+        scene = pathed((4.0, 4.0), (4.0, 2.0), positions=positions)
+        frame, painter = drawn(scene, "path")
+        assert len(tags(frame, painter, "2.00 m")) == 1
+        x, y = np.rint(painter.camera.to_pixels(positions[0])).astype(int)
+        assert (frame[y - 4 : y + 5, x - 4 : x + 5] == 255).all()
 
     @pytest.mark.parametrize("path", [None, np.empty((0, 2)), np.array([[1.0, 1.0]])])
     def test_without_a_way_there_is_nothing(self, path):

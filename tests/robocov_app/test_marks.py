@@ -155,10 +155,11 @@ class TestSelection:
         assert (around(frame, painter, TWO[1], 15) != around(alone, painter, TWO[1], 15)).any()
 
     def test_fits_a_large_robot(self):
-        scene = replace(explained(TWO), selected=0, team=Team.homogeneous(2, radius=1.0))
+        team = Team.homogeneous(2)
+        scene = replace(explained(TWO), selected=1, team=replace(team, radius=np.array([0.1, 1.0])))
         pixels, painter = changed(scene, "selection")
-        away = np.hypot(*(pixels - painter.camera.to_pixels(TWO[0])).T)
-        assert away.min() > painter.camera.zoom
+        away = np.hypot(*(pixels - painter.camera.to_pixels(TWO[1])).T)
+        assert painter.camera.zoom < away.min() < away.max() < 1.15 * painter.camera.zoom
 
     def test_where_nobody_is_asked_about_there_is_nothing(self):
         assert len(changed(explained(TWO), "selection")[0]) == 0

@@ -108,7 +108,7 @@ def command(options: Arguments) -> int:
 
 def watched(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
-    from robocov.mapfile import bundled_maps
+    from robocov.mapfile import bundled_maps, load_map
     from robocov_app.demo.opening import NO_DISPLAY, Opening
     from robocov_app.demo.replayed import LostLaw, replayed_session
     from robocov_app.view.picture import checked_layers
@@ -118,11 +118,12 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
     except InputError as error:
         where = str(options.run)
         raise InputError(str(error) if where in str(error) else f"{where}: {error}") from error
-    name = session.environment.name
+    same = (key for key in bundled_maps() if load_map(key) == session.environment)
+    name = next(same, session.environment.name)
     laws = [law.name for law in session.scenario.laws if not isinstance(law, LostLaw)]
     opening = Opening(
         session,
-        name if name in bundled_maps() else "",
+        name,
         Path(),
         theme=options.theme,
         size=options.window_size(),

@@ -31,8 +31,8 @@ def main() -> None:
     """Save one run, and say how it went."""
     source, target = own_streams()
     answer = kept(source)
-    if answer is not None:
-        with suppress(OSError):  # nobody may be there any more
+    with suppress(OSError), target:  # nobody may be there any more
+        if answer is not None:
             send(target, answer)
 
 

@@ -15,7 +15,7 @@ from robocov_app.demo.desk import Desk
 from robocov_app.demo.settings import Settings, load_settings, save_settings, settings_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from robocov_app.demo.costs import Costs
     from robocov_app.demo.session import Session
@@ -120,41 +120,53 @@ class Opening:
         InputError
             When there is no display.
         """
-        with display(headless=self.headless):
-            from robocov_app.demo.window import Window
-            from robocov_app.view.picture import standard_layers
+        keeper = None
+        try:
+            with display(headless=self.headless):
+                file = None if self.headless else settings_file()
+                settings, trouble = load_settings(file)
+                window = self._opened(settings)
+                window.desk.say(trouble)
+                keeper = window.keeper
+                try:
+                    yield window
+                    save_settings(settings_of(window, settings, self.scale), file)
+                finally:
+                    window.desk.costs.close()
+        finally:
+            # the window is gone; what is still being saved is waited for
+            if keeper is not None:
+                keeper.finish()
+                for words, bad in keeper.poll():
+                    if bad:
+                        sys.stderr.write(f"robocov: {words}\n")
 
-            file = None if self.headless else settings_file()
-            settings, trouble = load_settings(file)
-            layers = standard_layers()
-            shown = {layer.name for layer in layers if layer.default}
-            if settings.shown is not None:
-                shown = {layer.name for layer in layers} & set(settings.shown)
-            shown = (shown | self.also) - self.without
-            costs: Costs = DirectCosts(self.lattice) if self.headless else WorkerCosts(self.lattice)
-            try:
-                desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
-                desk.theme = self.theme or settings.theme
-                desk.fade = settings.fade
-                desk.say(trouble)
-                if self.headless:
-                    self.session.clock.budget = float("inf")
-                size = self.size or (settings.width, settings.height)
-                scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
-                if self.size is None and not self.headless:
-                    size = fitting(size)
-                window = Window(desk, size, scale, patient=self.headless)
-                window.panel.show_tab(settings.tab)
-                yield window
-                save_settings(settings_of(window, settings, self.scale), file)
-            finally:
-                costs.close()
+    def _opened(self, settings: Settings) -> Window:
+        from robocov_app.demo.window import Window
+        from robocov_app.view.picture import standard_layers
 
-    def frames(self, window: Window, count: int, each: Callable[[Window], None]) -> None:
-        """Draw `count` frames without a display, and hand each on."""
-        for _ in range(count):
-            window.frame(1.0 / HEADLESS_FPS)
-            each(window)
+        layers = standard_layers()
+        shown = {layer.name for layer in layers if layer.default}
+        if settings.shown is not None:
+            shown = {layer.name for layer in layers} & set(settings.shown)
+        shown = (shown | self.also) - self.without
+        size = self.size or (settings.width, settings.height)
+        scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+        if self.size is None and not self.headless:
+            size = fitting(size)
+        if self.headless:
+            self.session.clock.budget = float("inf")
+        costs: Costs = DirectCosts(self.lattice) if self.headless else WorkerCosts(self.lattice)
+        try:
+            desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
+            desk.theme = self.theme or settings.theme
+            desk.fade = settings.fade
+            window = Window(desk, size, scale, patient=self.headless)
+        except BaseException:
+            costs.close()
+            raise
+        window.panel.show_tab(settings.tab)
+        return window
 
 
 def fitting(size: tuple[int, int]) -> tuple[int, int]:

@@ -20,6 +20,7 @@ from robocov_app.demo.desk import free_name, plain
 from robocov_app.demo.film import FPS as FILM_FPS
 from robocov_app.demo.film import Film, pixels
 from robocov_app.demo.inspector import Report, explain
+from robocov_app.demo.keeping import Keeper
 from robocov_app.demo.lane import with_failed
 from robocov_app.demo.layout import SMALLEST, inside, laid_out
 from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_report, draw_tour
@@ -74,6 +75,7 @@ class Window:
         self.help = False
         self.tour: Tour | None = None
         self.film: Film | None = None
+        self.keeper = Keeper()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         self.screen = pygame.display.set_mode(size, pygame.RESIZABLE)
         pygame.display.set_caption("robocov")
@@ -150,6 +152,8 @@ class Window:
     def _pass_time(self, seconds: float) -> None:
         desk, session = self.desk, self.desk.session
         desk.pass_time(seconds)
+        for words, trouble in self.keeper.poll():
+            desk.say(words, trouble=trouble)
         if self.tour is not None:
             self.tour.advance(seconds)
             if self.tour.done:
@@ -356,9 +360,7 @@ class Window:
         self.tour = Tour(self.desk, self.arena.fit)
 
     def _save_run(self) -> str:
-        from robocov_app.demo.keeping import save_run
-
-        return save_run(self.desk)
+        return self.keeper.save(self.desk.session, self.desk.folder, self.desk.map_name)
 
     def screenshot(self) -> str:
         """Save what is in the window as a PNG."""

@@ -180,13 +180,14 @@ class Trajectories(Layer):
         width: float,
     ) -> None:
         """Draw the last seconds, ever more transparent into the past."""
-        fade = self.fade or 0.0
+        fade = self.fade or np.inf
         begin = int(np.searchsorted(time, time[-1] - fade))
         points = bounded(canvas.camera.to_pixels(trail[begin:]))
         box = _box_of(points, 5.0 + width, page)
         if box is None:
             return
-        shade = np.ceil((time[-1] - time[begin:]) / max(fade, 1e-9) * FADE_STEPS).astype(int)
+        shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
+        shade = np.minimum(shade, FADE_STEPS).astype(int)  # rounding may say one more
         rows = _corners(points, shade, FADE_PIECE * canvas.scale)
         points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
         shade = shade[rows]
