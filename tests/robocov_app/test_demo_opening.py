@@ -17,7 +17,6 @@ from touched_run import begun
 
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
-from robocov_app.demo import opening
 from robocov_app.demo.opening import NO_DISPLAY, Opening, display, fitting, screen_scale
 from robocov_app.demo.settings import FOLDER
 
@@ -40,13 +39,13 @@ def test_without_a_display_it_says_so_in_one_line(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="X11")
-def test_a_display_that_does_not_answer_is_none() -> None:
+def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
     kept = {
         key: value for key, value in os.environ.items() if key not in ("WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
     }
     done = subprocess.run(
         [*COMMAND, "demo", "square"],
-        env={**kept, "DISPLAY": ":987654", FOLDER: ""},
+        env={**kept, "DISPLAY": ":987654", FOLDER: "", "XDG_RUNTIME_DIR": str(tmp_path)},
         capture_output=True,
         text=True,
         timeout=60,
@@ -199,14 +198,3 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
     with asked.window() as window:
         assert "scan" in window.desk.shown and "cells" not in window.desk.shown
         window.close()
-
-
-def test_frames_are_of_equal_length_whatever_they_take(tmp_path: Path) -> None:
-    session = begun()
-    session.playing = True
-    asked = Opening(session, "hall", tmp_path, headless=True, lattice=4, size=(900, 600))
-    seen: list[float] = []
-    with asked.window() as window:
-        asked.frames(window, 6, lambda each: seen.append(each.desk.session.time))
-        window.close()
-    assert np.allclose(np.diff(seen), 1 / opening.HEADLESS_FPS)

@@ -338,13 +338,15 @@ def test_the_window_shows_what_it_can(tmp_path: Path, counting: Law) -> None:
         replayed_session([saved(record)]), "", tmp_path, size=(900, 600), headless=True, lattice=16
     )
     with opening.window() as window:
-        opening.frames(window, 40, lambda each: None)
+        for _ in range(40):
+            window.frame(1 / 30)
         assert window.desk.session.live
         assert "not gone on with" in window.desk.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
             window.do("robot:next")
-            opening.frames(window, 2, lambda each: None)
+            window.frame(1 / 30)
+            window.frame(1 / 30)
 
 
 def test_a_controller_that_has_changed_does_not_change_the_past(tmp_path: Path, counting: Law) -> None:

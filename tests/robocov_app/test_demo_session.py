@@ -44,6 +44,20 @@ def test_it_begins_anew_as_it_began():
     assert not session.undo.can_undo
 
 
+def test_what_was_drawn_can_be_undone_after_a_restart_but_not_what_was_done_to_robots() -> None:
+    session = begun()
+    session.edit(with_obstacle(session.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn")
+    session.add_robot((3.4, 3.0))
+    session.restart(seed=3)
+    assert robots_of(session) == ((1, 2, 3), ())
+    assert session.undo.undo() == "circle drawn"
+    assert session.environment.obstacles == HALL.obstacles
+    assert not session.undo.can_undo
+    assert session.undo.redo() == "circle drawn"
+    session.restart(environment=HALL)
+    assert not session.undo.can_undo and not session.undo.can_redo
+
+
 def test_it_begins_anew_with_changes():
     session = begun(RAPF)
     session.restart(robots=5)

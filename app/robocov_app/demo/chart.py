@@ -115,7 +115,7 @@ class Chart:
     def draw(self, screen: pygame.Surface) -> None:
         """Draw both."""
         session = self.desk.session
-        samples = tuple((lane.number, len(lane.curve), lane.curve.last_time) for lane in session.lanes)
+        samples = [(len(lane.curve), lane.curve.last_time, lane.curve.at(np.inf)) for lane in session.lanes]
         rest = (
             *(tuple(lane.number for lane in session.lanes), len(session.events), len(session.ghosts)),
             *(self._span, self.desk.costs.state, session.live or session.time, session.serial),

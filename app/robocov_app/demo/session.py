@@ -126,6 +126,7 @@ class Session(Touches):
                     words,
                     lambda: self._put(before, f"{words}: undone"),
                     lambda: self._put(environment, words),
+                    of_map=True,
                 )
             )
         return pushed

@@ -88,6 +88,7 @@ class Timeline:
         self.serial = 0
         """Grows when what is known of times so far does not hold any more."""
         self._past = Past()
+        self.lanes: list[Lane] = []
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:
@@ -104,12 +105,15 @@ class Timeline:
             )
             for pane, law in enumerate(scenario.laws)
         ]
+        if self.lanes and scenario.environment is self.scenario.environment:
+            self.undo.keep_map()
+        else:
+            self.undo.clear()
         self.scenario, self.lanes = scenario, lanes
         self.clock.dt = scenario.dt
         self.history = History(scenario.dt)
         self.ghosts: deque[Ghost] = deque(maxlen=MOST_GHOSTS)
         self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
-        self.undo.clear()
         self._step = 0
         self.serial += 1
         self._cursor: int | None = None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from robocov.mapfile import load_map
-from robocov_app.demo.scenario import Law
+from robocov_app.demo.scenario import Law, Limits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -291,7 +291,12 @@ class Tour:
         desk.hand.selected = chapter.asks
         desk.active = 0
         desk.session.restart(
-            environment=load_map(chapter.map), laws=chapter.laws, start=chapter.start, robots=6, seed=0
+            environment=load_map(chapter.map),
+            laws=chapter.laws,
+            start=chapter.start,
+            robots=6,
+            seed=0,
+            limits=Limits(),  # what was set before might not fit, and would tell another story
         )
         desk.map_name = chapter.map
         desk.session.playing, desk.session.stop_when_settled = True, False

@@ -20,11 +20,14 @@ class Edit:
         What people call it.
     back, again : callable
         Take it back; do it again.
+    of_map : bool
+        It was done to the map, which stays when the run begins anew.
     """
 
     words: str
     back: Callable[[], object]
     again: Callable[[], object]
+    of_map: bool = False
 
 
 class Undo:
@@ -45,6 +48,11 @@ class Undo:
     def clear(self) -> None:
         """Forget all."""
         self._done, self._taken_back = [], []
+
+    def keep_map(self) -> None:
+        """Forget all but what was done to the map: the run begins anew, on the map as it is."""
+        self._done = [edit for edit in self._done if edit.of_map]
+        self._taken_back = [edit for edit in self._taken_back if edit.of_map]
 
     def add(self, edit: Edit) -> None:
         """Note what was just done; what had been taken back cannot be done again any more."""
