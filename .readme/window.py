@@ -7,6 +7,7 @@ from pathlib import Path
 from PIL import Image
 
 from robocov.mapfile import load_map
+from robocov_app.demo.film import pixels
 from robocov_app.demo.opening import HEADLESS_FPS, Opening
 from robocov_app.demo.scenario import Law, Scenario
 from robocov_app.demo.session import Session
@@ -26,7 +27,7 @@ def main() -> None:
             desk = window.desk
             for frame in range(12 * HEADLESS_FPS):
                 if frame == 6 * HEADLESS_FPS:
-                    desk.attempt(lambda: session.fail_robot(5))
+                    session.fail_robot(5)
                 window.frame(1.0 / HEADLESS_FPS)
             desk.active, desk.hand.selected = 1, 4
             window.panel.show_tab("robot")
@@ -34,8 +35,6 @@ def main() -> None:
                 window.frame(0.0)
             desk.pass_time(60.0)
             window.frame(0.0)
-            from robocov_app.demo.film import pixels
-
             picture = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
             picture.save(HERE / name, optimize=True)
 

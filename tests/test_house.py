@@ -81,7 +81,15 @@ TESTED_THROUGH = {
     **dict.fromkeys("messages cost_process".split(), "test_cost_worker"),
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
-    "trajectories": "test_layers",
+    **dict.fromkeys(
+        "arena asked film keyboard look pages panel pointer sections typed widgets".split(),
+        "test_demo_window",
+    ),
+    **dict.fromkeys("drawing tool".split(), "test_demo_tools"),
+    **dict.fromkeys("kept keep_process".split(), "test_demo_keeping"),
+    "own_process": "test_cost_worker",
+    **dict.fromkeys("replay saved".split(), "test_cli_replay"),
+    "demo": "test_demo_opening",
 }
 """Modules without a test file of their own, and the one that tests them."""
 
@@ -90,7 +98,8 @@ def test_every_module_has_its_tests() -> None:
     tests = {path.stem for path in (ROOT / "tests").rglob("test_*.py")}
     for path in SOURCES:
         if not path.stem.startswith("__"):
-            where = TESTED_THROUGH.get(path.stem, f"test_{path.stem}")
+            stem = f"demo_{path.stem}" if f"test_demo_{path.stem}" in tests else path.stem
+            where = TESTED_THROUGH.get(path.stem, f"test_{stem}")
             assert where in tests or where == "everywhere", f"{path.name} has no tests"
 
 
@@ -141,4 +150,6 @@ def test_ci_runs_the_readmes_test_command_and_nothing_else() -> None:
     command = script[-1]
     assert command in readme.splitlines()
     others = [line for line in script[:-1] if line and not line.startswith("#")]
-    assert others == ["set -eu", 'cd "$(dirname "$0")/.."']
+    assert others[:2] == ["set -eu", 'cd "$(dirname "$0")/.."']
+    # what is beside it brings a screen and hands for the tests that can do without, and may fail
+    assert all(line.endswith("|| true") for line in others[2:])

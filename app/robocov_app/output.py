@@ -134,6 +134,15 @@ def _clear(folder: Path) -> None:
             frames.rmdir()
 
 
+def free_name(folder: Path, stem: str, suffix: str) -> Path:
+    """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
+    stem = stem.rstrip("0123456789").rstrip("-") or stem
+    k = 1
+    while (folder / f"{stem}-{k}{suffix}").exists():
+        k += 1
+    return folder / f"{stem}-{k}{suffix}"
+
+
 def listed(folder: Path) -> str:
     """Return the names of what a result consists of, for people."""
     return ", ".join(sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")))

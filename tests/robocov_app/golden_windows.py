@@ -1,4 +1,4 @@
-"""Pictures that the window is compared with: ``python tests/robocov_app/golden_windows.py`` draws them anew."""
+"""Pictures to compare the window with: ``python tests/robocov_app/golden_windows.py`` draws them anew."""
 
 from __future__ import annotations
 

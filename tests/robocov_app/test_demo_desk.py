@@ -16,8 +16,10 @@ from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.demo.clock import SPEEDS
 from robocov_app.demo.costs import DirectCosts
-from robocov_app.demo.desk import COMMAND_WORDS, SAID_FOR, Desk, free_name, plain
+from robocov_app.demo.desk import SAID_FOR, Desk, plain
 from robocov_app.demo.scenario import MOST_ROBOTS, Law
+from robocov_app.demo.typed import COMMAND_WORDS
+from robocov_app.output import free_name
 
 
 def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Desk:

@@ -22,6 +22,7 @@ from robocov_app.demo.settings import FOLDER
 
 MISSING = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
 pytestmark = [
+    pytest.mark.xdist_group("x11"),
     pytest.mark.skipif(sys.platform != "linux", reason="X11"),
     pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
 ]
@@ -64,7 +65,7 @@ class Hands:
     """Presses keys and the mouse in the window of a process."""
 
     def __init__(self, process: subprocess.Popen, display: str, folder: Path) -> None:
-        self.process, self.folder = process, folder
+        self.process, self.folder, self.shots = process, folder, 0
         self.kept = {**os.environ, "DISPLAY": display}
         self.window = ""
 
@@ -107,14 +108,17 @@ class Hands:
         self.tool("mouseup", 1)
         time.sleep(0.06)
 
-    def shot(self, name: str) -> np.ndarray:
-        """Press F12, and return the picture that this saves."""
-        path = self.folder / f"{name}.png"
-        assert not path.exists()
-        self.key("F12")
-        self.until(path.exists, f"picture {path.name}")
-        with Image.open(path) as picture:
-            return np.asarray(picture.convert("RGB")).astype(int)
+    def shot(self) -> np.ndarray:
+        """Press F12, and return the picture that this saves; the first may come before anything is drawn."""
+        while True:
+            self.shots += 1
+            path = self.folder / f"robocov-{self.shots}.png"
+            self.key("F12")
+            self.until(path.exists, f"picture {path.name}")
+            with Image.open(path) as picture:
+                pixels = np.asarray(picture.convert("RGB")).astype(int)
+            if pixels.any():
+                return pixels
 
 
 @contextmanager
@@ -148,35 +152,44 @@ def said(process: subprocess.Popen) -> str:
 
 def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, tmp_path: Path) -> None:
     with shown(display, tmp_path) as hands:
-        first = hands.shot("robocov-1")
+        first = hands.shot()
         assert first.shape == (SIZE[1], SIZE[0], 3) and first.mean() > 190
 
         hands.key("t", "w")
-        dark = hands.shot("robocov-2")
+        dark = hands.shot()
         assert dark.mean() < 90
 
         hands.key("c")
         hands.drag((300, 200), (330, 200), (340, 200))
         hands.move(20, 20)
-        drawn = hands.shot("robocov-3")
+        drawn = hands.shot()
         around = np.abs(drawn - dark)[170:230, 270:330].max(axis=2)
         assert (around > 20).mean() > 0.6  # there is a pillar now
 
         hands.key("v", "space")
         time.sleep(0.4)
         hands.key("space")
-        played = hands.shot("robocov-4")
+        played = hands.shot()
         assert not np.array_equal(played, drawn)
 
-        hands.key("ctrl+k")
-        hands.tool("type", "--delay", "20", "seed 12")
+        hands.key("slash")
+        hands.tool("type", "--delay", "20", "robots 1")
         hands.key("Return")
-        hands.move(SIZE[0] - 200, 330)
+        hands.move(20, 20)
+        alone = hands.shot()
+        hands.move(SIZE[0] - 234, 74)  # the field of the number of robots
         hands.tool("click", 1)
+        hands.tool("type", "--delay", "20", "3")
+        hands.key("Return")
+        hands.move(20, 20)
+        together = hands.shot()
+        track = np.s_[SIZE[1] - 26 :]
+        assert not np.array_equal(alone[track], played[track])  # its time is 0 again
+        assert np.abs(together - alone)[:400, :600].max() > 60
         hands.key("ctrl+s")
         hands.until(lambda: (tmp_path / "square-1.json").exists(), "saved map")
-        kinds = [each["type"] for each in json.loads((tmp_path / "square-1.json").read_text())["obstacles"]]
-        assert kinds == ["circle"]
+        (pillar,) = json.loads((tmp_path / "square-1.json").read_text())["obstacles"]
+        assert pillar["kind"] == "circle" and pillar["radius"] > 0.3
 
         hands.key("ctrl+q")
         assert ended(hands.process) == 0, said(hands.process)
@@ -193,15 +206,8 @@ def test_a_signal_closes_it_cleanly_and_ends_its_film(display: str, tmp_path: Pa
         hands.process.send_signal(signal.SIGTERM)
         status = ended(hands.process)
         words = said(hands.process)
-        assert status in (0, 130, 143) and "Traceback" not in words, words
+        assert status == 0 and words == ""
     import imageio_ffmpeg
 
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "robocov-1.mp4"))[0] > 3
     assert json.loads((tmp_path / "settings/window.json").read_text())["theme"] == "dark"
-
-
-def test_the_windows_own_cross_closes_it(display: str, tmp_path: Path) -> None:
-    with shown(display, tmp_path) as hands:
-        hands.tool("windowquit", hands.window)
-        assert ended(hands.process) == 0, said(hands.process)
-    assert (tmp_path / "settings/window.json").exists()

@@ -162,7 +162,7 @@ class TestGaps:
         trail = straight(30, 2) * np.array([0.05, 1.0]) + np.array([2.0, 0.0])
         trail[14:17, 1] = np.nan
         trail[17:, 1, 1] = 5.0
-        frame = frame_of(painter_of(fade)[0], trail)
+        frame = frame_of(painter_of(fade and 20.0)[0], trail)
         assert off_the_paths(painter_of()[0], trail, frame) == 0
         assert (ink(frame) > 0).any()
 
@@ -307,6 +307,7 @@ class TestFading:
             painter, _ = painter_of(fade)
             for numbers in ((1, 2), (3, 4)):
                 frame = frame_of(painter, trail, numbers=numbers)
+                assert (frame == frame_of(painter_of(fade)[0], trail, numbers=numbers)).all()
                 for row, number in enumerate(numbers):
                     for place in painter.camera.to_pixels(trail[[30, 36], row]):
                         assert nearest(frame, place, LIGHT.trail(number - 1)) < 90

@@ -29,6 +29,19 @@ def speed_words(speed: float) -> str:
     return "max" if math.isinf(speed) else f"{speed:g}×"
 
 
+def speed_index(speed: float) -> int:
+    """Return the number of the nearest of `SPEEDS`.
+
+    >>> speed_index(1.1), speed_index(math.inf)
+    (3, 8)
+    """
+
+    def order(each: float) -> float:
+        return math.log(each) if math.isfinite(each) else 10.0
+
+    return min(range(len(SPEEDS)), key=lambda k: abs(order(SPEEDS[k]) - order(speed)))
+
+
 @dataclass
 class Clock:
     """Turns seconds that have passed into steps.

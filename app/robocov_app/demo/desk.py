@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.controllers import controller_kinds
-from robocov.errors import InputError, ParameterError, RobocovError, unknown_name
+from robocov.errors import ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
-from robocov_app.demo.clock import SPEEDS, speed_words
+from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
 from robocov_app.demo.parameters import Parameter, gain_parameters, limit_parameters, with_limit
 from robocov_app.demo.scenario import Law
 from robocov_app.demo.tools import Hand, Wall, toolbox
+from robocov_app.demo.typed import command
+from robocov_app.output import free_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -231,9 +232,8 @@ class Desk:
 
     def change_speed(self, by: int) -> None:
         """Play faster or slower."""
-        clock = self.session.clock
-        k = min(range(len(SPEEDS)), key=lambda k: abs(_order(SPEEDS[k]) - _order(clock.speed)))
-        self.set_speed(SPEEDS[min(max(k + by, 0), len(SPEEDS) - 1)])
+        k = speed_index(self.session.clock.speed) + by
+        self.set_speed(SPEEDS[min(max(k, 0), len(SPEEDS) - 1)])
 
     def set_speed(self, speed: float) -> None:
         """Play so many simulated seconds per second."""
@@ -401,62 +401,9 @@ class Desk:
             self.session.set_law(lane, Law(name))
         self.active = pane
 
-    # typed commands
-
     def command(self, text: str) -> None:
-        """Do what was typed: ``k_rep 0.5``, ``robots 12``, ``seed 3``, ``map office``, ``speed 4``, ...
-
-        Raises
-        ------
-        RobocovError
-            When that means nothing, or cannot be done.
-        """
-        word, _, rest = text.strip().replace("=", " ").partition(" ")
-        rest = rest.strip()
-        parameters = {each.name: each for each in self.parameters()}
-        parameters |= {each.name.removeprefix("team."): each for each in parameters.values()}
-        if word in parameters:
-            parameter = parameters[word]
-            self.set_parameter(parameter.name, parameter.read(rest))
-        elif word == "robots":
-            self.restart(robots=_whole(word, rest))
-        elif word == "seed":
-            self.restart(seed=_whole(word, rest))
-        elif word == "start":
-            self.restart(start=rest)
-        elif word == "map":
-            self.open_map(rest)
-        elif word == "speed":
-            self.set_speed(math.inf if rest in ("max", "inf") else _positive(word, rest))
-        elif word == "controller":
-            Law(rest).made()
-            if rest not in self.laws:
-                self.laws.append(rest)
-            self.set_law(self.active, rest)
-        elif word == "time":
-            self.look_at(_positive(word, rest))
-        elif word == "robot":
-            number = _whole(word, rest)
-            circumstances = self.session.circumstances(self.lane)
-            if number not in {*circumstances.numbers, *circumstances.failed}:
-                raise ParameterError(f"there is no robot {number}")
-            self.hand.selected = number
-        else:
-            known = [*parameters, *COMMAND_WORDS]
-            raise InputError(unknown_name("command", word, known))
-
-
-COMMAND_WORDS = ("robots", "seed", "start", "map", "speed", "controller", "time", "robot")
-"""What can be typed besides gains and limits."""
-
-
-def free_name(folder: Path, stem: str, suffix: str) -> Path:
-    """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
-    stem = stem.rstrip("0123456789").rstrip("-") or stem
-    k = 1
-    while (folder / f"{stem}-{k}{suffix}").exists():
-        k += 1
-    return folder / f"{stem}-{k}{suffix}"
+        """Do what was typed, see `typed.command`: ``k_rep 0.5``, ``robots 12``, ``map office``, ..."""
+        command(self, text)
 
 
 def plain(message: str) -> str:
@@ -466,24 +413,3 @@ def plain(message: str) -> str:
     'max_speed: 0 m/s, but a number was wanted'
     """
     return message.removeprefix("team.").removeprefix("obstacles: ")
-
-
-def _order(speed: float) -> float:
-    return math.log(speed) if math.isfinite(speed) else 10.0
-
-
-def _whole(word: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise ParameterError(f"{word}: {text!r}, but a whole number was wanted") from None
-
-
-def _positive(word: str, text: str) -> float:
-    try:
-        value = float(text.rstrip("×x"))
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value >= 0.0) or (word == "speed" and not 0.01 <= value <= 1000.0):
-        raise ParameterError(f"{word}: {text!r}, but a positive number was wanted")
-    return value

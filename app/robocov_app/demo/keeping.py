@@ -16,10 +16,10 @@ import numpy as np
 
 from robocov.errors import OutputError
 from robocov_app.compare import folder_names
-from robocov_app.demo.desk import free_name
 from robocov_app.demo.kept import Job, Kept, Moments, NotKept, Part
 from robocov_app.live.messages import receive, send
 from robocov_app.live.own_process import started
+from robocov_app.output import free_name
 
 if TYPE_CHECKING:
     from robocov_app.demo.history import Moment

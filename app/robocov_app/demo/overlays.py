@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from robocov_app.demo.actions import all_actions, key_words, matching
-from robocov_app.demo.desk import COMMAND_WORDS
+from robocov_app.demo.typed import COMMAND_WORDS
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas

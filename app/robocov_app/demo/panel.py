@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.controllers import controller_kind
 from robocov.errors import ParameterError
 from robocov_app.demo.actions import all_actions
-from robocov_app.demo.clock import SPEEDS, speed_words
+from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
 from robocov_app.demo.pages import (
     GAP,
     MARGIN,
@@ -311,7 +310,7 @@ class Panel:
         widgets.fill("robots", str(session.scenario.robots))
         widgets.fill("seed", str(session.scenario.seed))
         speed = session.clock.speed
-        widgets.slide("speed", min(range(len(SPEEDS)), key=lambda k: abs(_order(SPEEDS[k]) - _order(speed))))
+        widgets.slide("speed", speed_index(speed))
         widgets.say("label", "speed", speed_words(speed))
         for each in desk.parameters():
             widgets.slide(each.name, each.place())
@@ -344,7 +343,3 @@ def law_labels(names: Iterable[str]) -> dict[str, str]:
             label = name.rpartition(":")[2]
         found[name] = label if label not in found.values() else f"{label} ({name})"
     return found
-
-
-def _order(speed: float) -> float:
-    return math.log(speed) if math.isfinite(speed) else 10.0

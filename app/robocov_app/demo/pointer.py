@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,9 @@ WHEEL = 1.15
 
 DOUBLE = 0.35
 """Seconds between the two clicks of a double click, at most."""
+
+_TAKES_ROBOTS = ("hand", "eraser", "failure")
+"""Tools that take hold of a robot."""
 
 _SLIP = 5.0
 """Pixels that a click may move."""
@@ -44,6 +48,7 @@ class Pointer:
         self._interrupt = interrupt
         self.at = (0, 0)
         self._drag = ""
+        self._shape = -1
         self._button = 0
         self._held = 0
         self._pressed_at = (0, 0)
@@ -76,6 +81,29 @@ class Pointer:
         elif event.type == pygame.MOUSEWHEEL and self._arena.pane_at(self.at) is not None:
             amount = getattr(event, "precise_y", event.y) or event.y
             self._arena.zoom(WHEEL ** float(np.clip(amount, -5, 5)), self.at)
+
+    def show(self) -> None:
+        """Let the cursor, and a ring around the robot under it, tell what a press would do."""
+        desk, arena, layout = self._desk, self._arena, self._arena.layout
+        pane = arena.pane_at(self.at) if desk.cursor is not None else None
+        number = None
+        if pane is not None and desk.tool.name in _TAKES_ROBOTS:
+            number = arena.robot_at(self.at, pane)
+        arena.hovered = (-1, -1) if pane is None or number is None else (pane, number)
+        if inside(layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = pygame.SYSTEM_CURSOR_ARROW
+        if number is not None:
+            shape = pygame.SYSTEM_CURSOR_HAND
+        elif pane is not None and desk.tool is not desk.hand:
+            shape = pygame.SYSTEM_CURSOR_CROSSHAIR
+        elif inside(layout.track, self.at) or inside(layout.chart, self.at):
+            shape = pygame.SYSTEM_CURSOR_SIZEWE
+        if shape != self._shape:
+            self._shape = shape
+            with suppress(pygame.error):  # not every display has cursors
+                pygame.mouse.set_cursor(shape)
 
     def leave(self) -> None:
         """The cursor is not in the window any more."""

@@ -88,7 +88,7 @@ class Timeline:
         self.serial = 0
         """Grows when what is known of times so far does not hold any more."""
         self._past = Past()
-        self.lanes: list[Lane] = []
+        self.scenario, self.lanes = scenario, list[Lane]()
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:

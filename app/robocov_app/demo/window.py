@@ -13,21 +13,21 @@ import pygame
 
 from robocov.atomic import written
 from robocov.errors import InputError, RobocovError
-from robocov_app.demo.actions import REPEATING, all_actions
 from robocov_app.demo.arena import Arena
+from robocov_app.demo.asked import report_on
 from robocov_app.demo.chart import Chart
-from robocov_app.demo.desk import free_name, plain
+from robocov_app.demo.desk import plain
 from robocov_app.demo.film import FPS as FILM_FPS
 from robocov_app.demo.film import Film, pixels
-from robocov_app.demo.inspector import Report, explain
 from robocov_app.demo.keeping import Keeper
-from robocov_app.demo.lane import with_failed
+from robocov_app.demo.keyboard import Keyboard
 from robocov_app.demo.layout import SMALLEST, inside, laid_out
 from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_report, draw_tour
 from robocov_app.demo.panel import TABS, Panel
 from robocov_app.demo.pointer import Pointer
 from robocov_app.demo.status import draw_status, facts
 from robocov_app.demo.tour import Tour
+from robocov_app.output import free_name
 from robocov_app.recording import png_bytes
 from robocov_app.view.picture import standard_layers
 from robocov_app.view.theme import theme_named
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from robocov_app.demo.desk import Desk
+    from robocov_app.demo.inspector import Report
 
 FPS = 60
 """Frames per second that are aimed at."""
@@ -88,8 +89,8 @@ class Window:
         self.panel = Panel(desk, self.titles, self.do)
         self.palette = Palette(desk, self.titles)
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
+        self.keyboard = Keyboard(desk, self.panel, self.palette, self.titles, lambda name: self.do(name))
         self._patient = patient
-        self._keys = {key: action.name for action in all_actions(self.titles) for key in action.keys}
         self._own = self._what_to_do()
         self._arranged: tuple[object, ...] | None = None
         self._report: Report | None = None
@@ -99,9 +100,6 @@ class Window:
         self._steps_rate = 0.0
         self._serial = -1
         self._unseen = 0.0
-        self._cursor = -1
-        self._down: set[int] = set()
-        self._opened_by = ""
         self._arrange()
 
     # frames
@@ -147,7 +145,7 @@ class Window:
         self._ask_costs()
         self._arrange()
         self._update_panel(seconds)
-        self._show_cursor()
+        self.pointer.show()
 
     def _pass_time(self, seconds: float) -> None:
         desk, session = self.desk, self.desk.session
@@ -219,28 +217,6 @@ class Window:
         self.chart.arrange(layout, theme)
         if before is None or outer != before[0]:
             self.panel.arrange(layout, theme)
-
-    def _show_cursor(self) -> None:
-        """Let the cursor tell what a press would do."""
-        desk, at = self.desk, self.pointer.at
-        pane = self.arena.pane_at(at) if desk.cursor is not None else None
-        number = None if pane is None else self.arena.robot_at(at, pane)
-        takes_robots = desk.tool.name in ("hand", "eraser", "failure")
-        over = pane is not None and number is not None and takes_robots
-        self.arena.hovered = (pane, number) if over and pane is not None and number is not None else (-1, -1)
-        shape = pygame.SYSTEM_CURSOR_ARROW
-        if over:
-            shape = pygame.SYSTEM_CURSOR_HAND
-        elif pane is not None and desk.tool is not desk.hand:
-            shape = pygame.SYSTEM_CURSOR_CROSSHAIR
-        elif inside(self.layout.track, at) or inside(self.layout.chart, at):
-            shape = pygame.SYSTEM_CURSOR_SIZEWE
-        if shape != self._cursor and not inside(self.layout.panel, at):
-            self._cursor = shape
-            with suppress(pygame.error):  # not every display has cursors
-                pygame.mouse.set_cursor(shape)
-        elif inside(self.layout.panel, at):
-            self._cursor = -1  # the panel has set its own
 
     def _update_panel(self, seconds: float) -> None:
         """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
@@ -391,12 +367,9 @@ class Window:
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.KEYDOWN:
-            self._key(event)
-            self._down.add(event.key)
+            self.keyboard.press(event)
         elif event.type == pygame.TEXTINPUT and self.palette.open:
-            if event.text != self._opened_by:
-                self.palette.type(event.text)
-            self._opened_by = ""
+            self.keyboard.letters(event.text)
         elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
             self.help = self.palette.open = False
         elif event.type in _OF_THE_MOUSE:
@@ -405,43 +378,10 @@ class Window:
             self.pointer.leave()
         else:
             if event.type == pygame.KEYUP:
-                self._down.discard(event.key)
+                self.keyboard.release(event)
             elif event.type == pygame.WINDOWFOCUSLOST:
-                self._down.clear()
+                self.keyboard.leave()
             self.panel.take(event)
-
-    def _key(self, event: pygame.event.Event) -> None:
-        if self.palette.open:
-            self._palette_key(event)
-            return
-        if event.key == pygame.K_ESCAPE and (self.panel.typing or self.panel.unfolded):
-            self.panel.stop_typing()
-            return
-        if self.panel.typing and event.key not in (pygame.K_F1, pygame.K_F9, pygame.K_F12):
-            self.panel.take(event)
-            return
-        name = self._keys.get(key_of(event))
-        # who holds F12 down a little too long wants one picture
-        if name is None or (event.key in self._down and name not in REPEATING):
-            return
-        self.do(name)
-        # its letter is still to come, and not meant for the palette
-        self._opened_by = event.unicode if name == "palette" else ""
-
-    def _palette_key(self, event: pygame.event.Event) -> None:
-        palette, self._opened_by = self.palette, ""
-        if event.key == pygame.K_ESCAPE:
-            palette.open = False
-        elif event.key == pygame.K_BACKSPACE:
-            palette.erase()
-        elif event.key in (pygame.K_UP, pygame.K_DOWN):
-            palette.move(1 if event.key == pygame.K_DOWN else -1)
-        elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
-            palette.open = False
-            if palette.is_command():
-                self.desk.attempt(lambda: self.desk.command(palette.text))
-            elif palette.found:
-                self.do(palette.found[palette.chosen].name)
 
 
 @contextmanager
@@ -456,36 +396,3 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
-
-
-def key_of(event: pygame.event.Event) -> str:
-    """Return what a pressed key is called in the list of actions."""
-    name = pygame.key.name(event.key)
-    if name.startswith("[") and name.endswith("]") and len(name) > 2:
-        name = name[1:-1]  # of the key pad
-    parts = []
-    if event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META):
-        parts.append("ctrl")
-    if event.mod & pygame.KMOD_ALT:
-        parts.append("alt")
-    if event.mod & pygame.KMOD_SHIFT:
-        parts.append("shift")
-    return "+".join([*parts, name])
-
-
-def report_on(desk: Desk, number: int) -> Report:
-    """Return what the inspector says of a robot of the chosen pane."""
-    session, lane = desk.session, desk.lane
-    circumstances = session.circumstances(lane)
-    if number in circumstances.failed:
-        x, y = circumstances.failed[number]
-        verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
-        return Report(f"Robot {number}", verdict, ())
-    return explain(
-        session.snapshot(lane),
-        circumstances.limits.team(len(circumstances.numbers)),
-        with_failed(circumstances),
-        circumstances.numbers.index(number),
-        names=circumstances.numbers,
-        recent=session.recent(lane, number),
-    )
