@@ -60,6 +60,7 @@ def opened(
         driver.settle()  # now it knows how high the legend is
         yield driver
         driver.window.close()
+        driver.window.keeper.finish()
 
 
 class Driver:

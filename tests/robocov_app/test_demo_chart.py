@@ -105,3 +105,14 @@ def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> N
     time, known = compared(driver.session)
     assert time == last
     assert known == pytest.approx(values)
+
+
+def test_what_is_of_the_past_is_shown_at_once_also_at_one_second(driver: Driver) -> None:
+    played(driver, 100)
+    _, top, width, height = driver.window.layout.chart
+    live = pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
+    # one second exactly is as true as true is
+    driver.session.look_at(1.0)
+    assert driver.session.time == 1.0 and not driver.session.live
+    driver.frames(1)
+    assert not np.array_equal(pixels(driver.window.screen)[top : top + height, width - 150 : width], live)

@@ -92,3 +92,24 @@ def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Pa
         _, _, width, height = driver.window.layout.arena
         assert columns.max() < width and columns.min() > 0
         assert rows.max() < height
+
+
+def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        window = driver.window
+        driver.desk.hand.selected = 1
+        window.panel.show_tab("robot")
+        driver.session.playing = True
+        driver.frames(30)
+        driver.session.playing = False
+        driver.frames(15)
+        left, top, width, height = window.panel.body
+        window.pointer.at = (left + width // 2, top + height // 2)
+        seen = [pixels(window.screen)[top:, left:].copy()]
+        for notches in (-2, -100, -1, 200):
+            window.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=notches))
+            window.draw()
+            seen.append(pixels(window.screen)[top:, left:].copy())
+        assert not np.array_equal(seen[0], seen[1])
+        assert np.array_equal(seen[2], seen[3])  # it ends there
+        assert np.array_equal(seen[0], seen[4])

@@ -17,7 +17,7 @@ from touched_run import RAPF, RPF, begun
 from robocov_app.demo.actions import KEY_REPEAT
 from robocov_app.demo.opening import Opening
 from robocov_app.demo.overlays import Palette
-from robocov_app.demo.panel import TABS
+from robocov_app.demo.panel import TABS, law_labels
 from robocov_app.demo.settings import FOLDER
 from robocov_app.demo.status import cursor_words
 
@@ -289,6 +289,31 @@ def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     assert driver.window.panel.widgets.find("entry", "k_att") is None
     driver.choose("law:0", "LA")
     assert driver.session.lanes[0].law.name == "lloyd"
+
+
+def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path: Path) -> None:
+    own = "from dataclasses import dataclass\nimport numpy as np\n@dataclass(frozen=True)\nclass Mine:\n"
+    own += "    label = 'RAPF'\n    def force(self, own):\n        return np.zeros(2)\n"
+    (tmp_path / "mine.py").write_text(own)
+    (tmp_path / "also").mkdir()
+    (tmp_path / "also/mine.py").write_text(own)
+    names = [f"{tmp_path / 'mine.py'}:Mine", f"{tmp_path / 'also/mine.py'}:Mine"]
+    assert law_labels(["rapf", *names]) == {
+        "rapf": "RAPF",
+        names[0]: "RAPF (mine.py)",
+        names[1]: f"RAPF ({names[1]})",
+    }
+    with opened(tmp_path, RAPF, RPF, RPF, RPF) as driver:
+        for name in names:
+            driver.desk.attempt(lambda name=name: driver.desk.command(f"controller {name}"))
+        driver.desk.attempt(lambda: driver.desk.set_law(0, "rapf"))
+        driver.settle()
+        menu = driver.widget("menu", "law:1")
+        driver.click(*menu.rect.center)
+        items = menu.current_state.options_selection_list.item_list
+        assert len({item["text"] for item in items}) == len(items) == 5
+        driver.click(*items[4]["button_element"].rect.center)
+        assert driver.session.lanes[1].law.name == names[1]
 
 
 def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
@@ -736,6 +761,17 @@ def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -
     driver.turn("keep")
     driver.push("screenshot")
     assert (tmp_path / "robocov-2.png").exists()
+
+
+def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> None:
+    for _ in range(30):
+        driver.session.step()
+    driver.key("ctrl+e")
+    driver.window.keeper.finish()
+    driver.frames(2)
+    assert not driver.desk.trouble and "saved" in driver.desk.message
+    (record,) = tmp_path.rglob("record.npz")
+    assert record.parent != tmp_path
 
 
 def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def display() -> Iterator[str]:
     """Start a display that nobody sees, on a number that is free."""
     read, write = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp", "-noreset"],
         pass_fds=(write,),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -96,7 +96,7 @@ class Hands:
         self.tool("key", "--delay", "60", *names)
 
     def move(self, x: float, y: float) -> None:
-        self.tool("mousemove", "--sync", "--window", self.window, round(x), round(y))
+        self.tool("mousemove", "--window", self.window, round(x), round(y))
         time.sleep(0.06)
 
     def drag(self, *path: tuple[float, float]) -> None:

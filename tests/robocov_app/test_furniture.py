@@ -100,6 +100,7 @@ def test_the_legend_lists_exactly_what_is_shown():
         "force_attraction": "attraction",
         "force_repulsion_robots": "repulsion from robots",
         "force_repulsion_obstacle": "repulsion from obstacle",
+        "force_viscosity": "viscosity",
         "force_resultant": "resultant force",
     }
     for name, word in words.items():

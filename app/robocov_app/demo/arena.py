@@ -262,6 +262,14 @@ class Arena:
                 row = list(scene.numbers).index(number)
                 ends = canvas.camera.to_pixels(np.array([scene.snapshot.positions[row], target]))
                 canvas.dashes(ends[0].tolist(), ends[1].tolist(), self.theme.ink, canvas.width(1.5), dash=3.0)
+        asked = self.desk.selected
+        if asked in scene.failed:
+            center = canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist()
+            radius = max(float(scene.team.radius[0]) * canvas.camera.zoom, 9.0 * canvas.scale)
+            ring = partial(
+                sprites.ring, round(radius) + 4.0 * canvas.scale, self.theme.ink, 2.2 * canvas.scale
+            )
+            canvas.stamp(ring, center)
         if pane == self.hovered[0] and scene.snapshot is not None and scene.numbers is not None:
             self._draw_hovered(canvas, scene, self.hovered[1])
         preview = self.desk.tool.preview(self.desk.session)

@@ -118,7 +118,7 @@ class Chart:
         samples = [(len(lane.curve), lane.curve.last_time, lane.curve.at(np.inf)) for lane in session.lanes]
         rest = (
             *(tuple(lane.number for lane in session.lanes), len(session.events), len(session.ghosts)),
-            *(self._span, self.desk.costs.state, session.live or session.time, session.serial),
+            *(self._span, self.desk.costs.state, None if session.live else session.time, session.serial),
         )
         # curves grow sixty times a second, which nobody sees
         old = self.desk.now - self._drawn_at >= REFRESHED

@@ -1,4 +1,4 @@
-"""What lies over the window for a while: messages, keys, commands, captions; and the inspector's page."""
+"""What lies over the window for a while: messages, keys, commands, captions, the tour."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from robocov_app.view.theme import mix
 if TYPE_CHECKING:
     from robocov_app.demo.actions import Action
     from robocov_app.demo.desk import Desk
-    from robocov_app.demo.inspector import Report
-    from robocov_app.demo.layout import Box, Layout
+    from robocov_app.demo.layout import Layout
     from robocov_app.demo.tour import Tour
     from robocov_app.view.theme import Theme
 
-_FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
 """For strokes and words that are placed in pixels alone."""
 
 _GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
@@ -271,7 +270,7 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Tour) 
     scale = layout.scale
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))
-    canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+    canvas = Canvas(screen, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
     x, y, wide = left + 20 * scale, top + 18 * scale, width - 40 * scale
     screen.blit(label("GUIDED TOUR", round(11 * scale), theme.faint, True), (round(x), round(y)))
     y += 30 * scale
@@ -300,51 +299,3 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Tour) 
     pygame.draw.rect(screen, theme.final, bar, border_radius=bar.height)
     hint = label("← → chapters · Esc ends the tour", round(11 * scale), theme.faint)
     screen.blit(hint, (round(x), round(top + height - 32 * scale)))
-
-
-def draw_report(screen: pygame.Surface, box: Box, theme: Theme, scale: float, report: Report | None) -> None:
-    """Show what the inspector says of a robot, with the arrows of its forces."""
-    left, top, width, height = box
-    x, y = left + 12 * scale, top + 36 * scale
-    wide = width - 24 * scale
-    screen.set_clip(pygame.Rect(box))
-    canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-    if report is None:
-        for line in wrapped(
-            "Click a robot, or press Tab: it tells why it moves, and why it does not.",
-            round(12 * scale),
-            wide,
-        ):
-            canvas.text(line, (x, y + 8 * scale), colour=theme.faint)
-            y += 18 * scale
-        screen.set_clip(None)
-        return
-    canvas.text(report.title, (x, y + 8 * scale), size=14, bold=True)
-    y += 24 * scale
-    for line in wrapped(report.verdict, round(12.5 * scale), wide, True):
-        canvas.text(line, (x, y + 8 * scale), size=12.5, bold=True, colour=theme.final)
-        y += 18 * scale
-    y += 4 * scale
-    largest = max((float(np.hypot(*each.vector)) for each in report.lines if each.vector), default=1.0)
-    for each in report.lines:
-        indent = 34 * scale if each.vector is not None else 0.0
-        lines = wrapped(each.text, round(11.5 * scale), wide - indent)
-        if each.vector is not None:
-            size = float(np.hypot(*each.vector))
-            length = 13 * scale * (0.35 + 0.65 * size / max(largest, 1e-9)) if size > 1e-6 else 0.0
-            direction = np.array(each.vector) / max(size, 1e-12) * (1.0, -1.0)
-            middle = np.array([x + 14 * scale, y + 8 * scale])
-            colour = theme.forces.get(each.kind, theme.ink)
-            canvas.arrow(
-                (middle - direction * length).tolist(),
-                (middle + direction * length).tolist(),
-                colour,
-                2 * scale,
-            )
-        for line in lines:
-            canvas.text(line, (x + indent, y + 8 * scale), size=11.5)
-            y += 16.5 * scale
-        y += 3 * scale
-        if y > top + height:
-            break
-    screen.set_clip(None)

@@ -341,5 +341,7 @@ def law_labels(names: Iterable[str]) -> dict[str, str]:
             label = str(controller_kind(name).label)
         except ParameterError:  # of a saved run, and gone since
             label = name.rpartition(":")[2]
-        found[name] = label if label not in found.values() else f"{label} ({name})"
+        file = Path(name.rpartition(":")[0]).name
+        tried = (label, f"{label} ({file})", f"{label} ({name})")
+        found[name] = next(each for each in tried if each not in found.values())
     return found

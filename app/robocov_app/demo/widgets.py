@@ -205,7 +205,8 @@ class Widgets:
     ) -> None:
         """Make a menu that drops down; what there is no room for is shortened."""
         size = round(TEXT[""][0] * self.scale)
-        room = rect.width - 52 * self.scale
+        # the list leaves out the arrow, and its bar if it has one
+        room = rect.width - (54 if 24 * len(options) > LONGEST_LIST else 34) * self.scale
         whole = {_INDENT + shortened(each, size, room): each for each in (now, *options)}
         if len(whole) < len({now, *options}):
             whole = {_INDENT + each: each for each in (now, *options)}

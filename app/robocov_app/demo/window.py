@@ -22,9 +22,10 @@ from robocov_app.demo.film import Film, pixels
 from robocov_app.demo.keeping import Keeper
 from robocov_app.demo.keyboard import Keyboard
 from robocov_app.demo.layout import SMALLEST, inside, laid_out
-from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_report, draw_tour
+from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.demo.panel import TABS, Panel
 from robocov_app.demo.pointer import Pointer
+from robocov_app.demo.report_page import ReportPage
 from robocov_app.demo.status import draw_status, facts
 from robocov_app.demo.tour import Tour
 from robocov_app.output import free_name
@@ -88,6 +89,7 @@ class Window:
         self.chart = Chart(desk)
         self.panel = Panel(desk, self.titles, self.do)
         self.palette = Palette(desk, self.titles)
+        self.report_page = ReportPage()
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
         self.keyboard = Keyboard(desk, self.panel, self.palette, self.titles, lambda name: self.do(name))
         self._patient = patient
@@ -242,7 +244,7 @@ class Window:
             self.panel.fill(self.screen)
             if self.panel.tab == "robot":
                 self._inspect()
-                draw_report(self.screen, self.panel.body, theme, layout.scale, self._report)
+                self.report_page.draw(self.screen, self.panel.body, theme, layout.scale, self._report)
             self.panel.draw(self.screen)
         if self.tour is not None and not layout.panel[2]:
             draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
@@ -252,6 +254,10 @@ class Window:
         elif self.palette.open:
             self.palette.draw(self.screen, layout, theme)
         pygame.display.flip()
+
+    def _over_report(self) -> bool:
+        covered = self.tour is not None or self.panel.unfolded
+        return self.panel.tab == "robot" and inside(self.panel.body, self.pointer.at) and not covered
 
     def _inspect(self) -> None:
         """Let the inspector explain the robot that is asked, a few times a second."""
@@ -372,6 +378,8 @@ class Window:
             self.keyboard.letters(event.text)
         elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
             self.help = self.palette.open = False
+        elif event.type == pygame.MOUSEWHEEL and self._over_report():
+            self.report_page.wheel(event.y, self.scale)
         elif event.type in _OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:

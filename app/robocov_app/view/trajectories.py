@@ -199,12 +199,13 @@ class Trajectories(Layer):
         for first, last in pairwise(edges):
             # slowly at first: what is half forgotten can still be followed
             part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
+            shades = {colour: _see_through(colour, part) for colour in set(colours)}
             paths = points[first : last + 1]
             moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
             gone = np.isnan(paths).any(axis=(0, 2)).tolist()
             pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
             for robot in np.flatnonzero(moves).tolist():
-                colour = _see_through(colours[robot], part)
+                colour = shades[colours[robot]]
                 if pen[robot][0] == pen[robot][0]:  # not nan
                     lines[robot][0] = pen[robot]
                 for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
