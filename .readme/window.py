@@ -1,9 +1,12 @@
-"""Draws window.png and window-dark.png, the pictures of `robocov demo` in the README."""
+"""Draws what the README shows of `robocov demo`: window.png, window-dark.png and tour.mp4."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
+import imageio_ffmpeg
 from PIL import Image
 
 from robocov.mapfile import load_map
@@ -13,31 +16,52 @@ from robocov_app.demo.scenario import Law, Scenario
 from robocov_app.demo.session import Session
 
 HERE = Path(__file__).parent
+SIZE = (1280, 720)
 
 
-def main() -> None:
+def picture(theme: str, name: str) -> None:
     """Use the window for a while, and keep what it shows."""
-    for theme, name in (("light", "window.png"), ("dark", "window-dark.png")):
-        laws = (Law("rapf"), Law("lloyd"))
-        session = Session(Scenario(load_map("rooms"), laws, start="kitchen"))
-        session.clock.speed = 2.0
-        also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
-        opening = Opening(session, "rooms", HERE, theme=theme, size=(1280, 720), also=also, headless=True)
-        with opening.window() as window:
-            desk = window.desk
-            for frame in range(12 * HEADLESS_FPS):
-                if frame == 6 * HEADLESS_FPS:
-                    session.fail_robot(5)
-                window.frame(1.0 / HEADLESS_FPS)
-            desk.active, desk.hand.selected = 1, 4
-            window.panel.show_tab("robot")
-            for _ in range(8):
-                window.frame(0.0)
-            desk.pass_time(60.0)
+    session = Session(Scenario(load_map("rooms"), (Law("rapf"), Law("lloyd")), start="kitchen"))
+    session.clock.speed = 2.0
+    also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
+    opening = Opening(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
+    with opening.window() as window:
+        for frame in range(12 * HEADLESS_FPS):
+            if frame == 6 * HEADLESS_FPS:
+                session.fail_robot(5)
+            window.frame(1.0 / HEADLESS_FPS)
+        desk = window.desk
+        desk.active, desk.hand.selected = 1, 4
+        window.panel.show_tab("robot")
+        desk.pass_time(60.0)  # what was said is old
+        for _ in range(8):
             window.frame(0.0)
-            picture = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
-            picture.save(HERE / name, optimize=True)
+        small = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
+        small.save(HERE / name, optimize=True)
+
+
+def film(name: str) -> None:
+    """Film the tour, every second frame, as small as it can be read."""
+    command = [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+        *("-s", f"{SIZE[0]}x{SIZE[1]}", "-r", f"{HEADLESS_FPS // 2}", "-i", "-", "-c:v", "libx264"),
+        *("-preset", "veryslow", "-crf", "33", "-tune", "animation", "-pix_fmt", "yuv420p"),
+        *("-movflags", "+faststart", str(HERE / name)),
+    ]
+    session = Session(Scenario(load_map("rooms")))
+    opening = Opening(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
+    with opening.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        window.do("tour")
+        assert window.tour is not None
+        for frame in range(round(window.tour.seconds * HEADLESS_FPS)):
+            window.frame(1.0 / HEADLESS_FPS)
+            if frame % 2 == 0:
+                encoder.stdin.write(pixels(window.screen).tobytes())
 
 
 if __name__ == "__main__":
-    main()
+    picture("light", "window.png")
+    picture("dark", "window-dark.png")
+    if "--film" in sys.argv[1:]:
+        film("tour.mp4")

@@ -82,7 +82,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
     **dict.fromkeys(
-        "arena asked film keyboard look pages panel pointer sections typed widgets".split(),
+        "arena asked film keyboard look pages panel pointer report_page sections typed widgets".split(),
         "test_demo_window",
     ),
     **dict.fromkeys("drawing tool".split(), "test_demo_tools"),

@@ -14,7 +14,7 @@ from robocov_app.demo.overlays import tag
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
-from robocov_app.view.furniture import legend_rows, legend_strip
+from robocov_app.view.furniture import Status, legend_rows, legend_strip
 from robocov_app.view.layers import drawn_radii
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.scene import Scene
@@ -68,7 +68,9 @@ class Arena:
         several = len(layout.panes) > 1
         self._painters = []
         for _, _, width, height in layout.panes:
-            layers = pane_layers() if several else standard_layers()
+            layers = standard_layers()
+            if several:  # they share the time, which stands in the window's own status line
+                layers = [layer for layer in pane_layers() if not isinstance(layer, Status)]
             painter = Painter(self.desk.session.environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.within(painter.camera.view)
@@ -186,9 +188,9 @@ class Arena:
         circumstances = session.circumstances(lane)
         snapshot = session.snapshot(lane)
         trail, times = session.trail(lane)
-        team = circumstances.limits.team(len(circumstances.numbers))
-        if session.live:
-            team = lane.simulation.team
+        team = lane.simulation.team
+        if not session.live:
+            team = circumstances.limits.team(len(circumstances.numbers))
         known = desk.costs.known.get(lane.number)
         field = None
         if known is not None and painter.needs_field:
@@ -263,7 +265,7 @@ class Arena:
                 ends = canvas.camera.to_pixels(np.array([scene.snapshot.positions[row], target]))
                 canvas.dashes(ends[0].tolist(), ends[1].tolist(), self.theme.ink, canvas.width(1.5), dash=3.0)
         asked = self.desk.selected
-        if asked in scene.failed:
+        if asked is not None and asked in scene.failed:
             center = canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist()
             radius = max(float(scene.team.radius[0]) * canvas.camera.zoom, 9.0 * canvas.scale)
             ring = partial(

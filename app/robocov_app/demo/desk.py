@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.controllers import controller_kinds
-from robocov.errors import ParameterError, RobocovError
+from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
 from robocov_app.demo.parameters import Parameter, gain_parameters, limit_parameters, with_limit
@@ -253,10 +253,20 @@ class Desk:
         return list(dict.fromkeys([*self.session.environment.starts, "uniform"]))
 
     def next_map(self, by: int) -> None:
-        """Open the next map."""
+        """Open the next map that has room for the team."""
         maps = self.maps()
         now = maps.index(self.map_name) if self.map_name in maps else 0
-        self.open_map(maps[(now + by) % len(maps)])
+        passed = []
+        for k in range(1, len(maps) + 1):
+            name = maps[(now + by * k) % len(maps)]
+            try:
+                self.open_map(name)
+            except InputError:
+                passed.append(name)
+                continue
+            if passed:
+                self.say(f"no room for {self.session.scenario.robots} robots: {', '.join(passed)}")
+            return
 
     def open_map(self, name: str) -> None:
         """Begin anew on another map.
@@ -367,13 +377,7 @@ class Desk:
         self.panel = not self.panel
 
     def save_map(self) -> None:
-        """Write the map as it is now to a file that is not there yet.
-
-        Raises
-        ------
-        MapError, OutputError
-            As `save_map` of the library.
-        """
+        """Write the map as it is now to a file that is not there yet."""
         stem = Path(self.map_name).stem or "map"
         target = free_name(self.folder, stem, ".json")
         save_map(self.session.environment, target)
@@ -381,13 +385,7 @@ class Desk:
         self.say(f"map saved: {target}")
 
     def set_parameter(self, name: str, value: float | None) -> None:
-        """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value.
-
-        Raises
-        ------
-        ParameterError
-            When it is out of range.
-        """
+        """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""
         circumstances = self.session.circumstances(self.lane)
         if name.startswith("team."):
             self.session.set_limits(with_limit(circumstances.limits, name, value))

@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from robocov_app.demo.actions import all_actions, key_words, matching
-from robocov_app.demo.typed import COMMAND_WORDS
+from robocov_app.demo.typed import COMMAND_WORDS, parted
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
@@ -184,9 +184,9 @@ class Palette:
 
     def is_command(self) -> bool:
         """Whether what is typed is a command with a value, not the name of an action."""
-        words = self.text.replace("=", " ").split()
+        word, value = parted(self.text)
         names = {each.name.removeprefix("team.") for each in self._desk.parameters()} | set(COMMAND_WORDS)
-        return len(words) > 1 and words[0] in names
+        return bool(value) and word in names
 
     def draw(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> None:
         """Draw it."""

@@ -98,7 +98,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Each robot knows itself, the robots it hears and the one nearest point of an obstacle; the map is "
         "unknown to all of them. RAPF pushes it off what is near and draws it to the centroid of its "
         "Voronoi cell: that is all, and it spreads the team through the rooms.",
-        24.0,
+        22.0,
         "rooms",
         "corridor",
         (_RAPF,),
@@ -110,7 +110,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Without obstacles: the same as Lloyd",
         "In a convex region without obstacles RAPF ends where Lloyd's algorithm ends, each robot on the "
         "centroid of its cell. The two curves of the cost below lie on top of each other.",
-        20.0,
+        18.0,
         "square",
         "corner",
         (_RAPF, _LLOYD),
@@ -121,7 +121,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "With obstacles Lloyd gets stuck",
         "Now there are walls that nobody knows, and Lloyd's robots head straight for centroids that lie "
         "behind them. They stop at the wall, while part of the building stays far from every robot.",
-        24.0,
+        22.0,
         "rooms",
         "kitchen",
         (_LLOYD,),
@@ -132,7 +132,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Repulsion alone stops too early",
         "RPF only pushes robots apart and off the walls. Once the pushes balance it hovers, trembling, in a "
         "local minimum, often before it has left the room in which it began.",
-        22.0,
+        18.0,
         "rooms",
         "kitchen",
         (_RPF,),
@@ -143,7 +143,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Both together get through",
         "RAPF adds the two: the attraction pulls through the doors, the repulsion keeps robots off the "
         "walls and slides them along. From the same starts its cost falls below both of the others.",
-        28.0,
+        24.0,
         "rooms",
         "kitchen",
         (_RAPF, _RPF, _LLOYD),
@@ -153,7 +153,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Other starts",
         "From the corridor instead of the kitchen RPF ends with quite another cost. RAPF depends less on "
         "where it starts, though not so little that it would not matter.",
-        24.0,
+        22.0,
         "rooms",
         "kitchen",
         (_RAPF, _RPF),
@@ -164,7 +164,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Other gains",
         "Back to the first second, and on with ten times the repulsion: the dashed ghosts are what would "
         "have come without. RPF ends elsewhere; RAPF changes less, but change it does.",
-        24.0,
+        22.0,
         "rooms",
         "corridor",
         (_RAPF, _RPF),
@@ -175,7 +175,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "A robot fails",
         "A robot stops and is not heard any more; the others see it as an obstacle like any other. Nobody "
         "is told: their cells grow over the gap, and they move in.",
-        20.0,
+        18.0,
         "museum",
         "hall",
         (_RAPF,),
@@ -188,7 +188,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         "Inside this trap the centroid lies behind the wall, so that attraction and repulsion balance: the "
         "robot rests, far from its goal, and would rest for ever. Who knows only the nearest point of the "
         "wall cannot tell which way round it is.",
-        22.0,
+        18.0,
         "trap",
         "inside",
         (_RAPF,),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError, ParameterError, unknown_name
@@ -15,6 +16,16 @@ COMMAND_WORDS = ("robots", "seed", "start", "map", "speed", "controller", "time"
 """What can be typed besides gains and limits."""
 
 
+def parted(text: str) -> tuple[str, str]:
+    """Return the word and what follows it, after a blank or an equals sign.
+
+    >>> parted("k_rep = 0.5"), parted("map a=b.json"), parted("robots")
+    (('k_rep', '0.5'), ('map', 'a=b.json'), ('robots', ''))
+    """
+    word, *rest = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
+    return word, "".join(rest)
+
+
 def command(desk: Desk, text: str) -> None:
     """Do what was typed: a gain or a limit with its value, or one of `COMMAND_WORDS` with what it takes.
 
@@ -23,8 +34,7 @@ def command(desk: Desk, text: str) -> None:
     RobocovError
         When that means nothing, or cannot be done.
     """
-    word, _, rest = text.strip().replace("=", " ").partition(" ")
-    rest = rest.strip()
+    word, rest = parted(text)
     parameters = {each.name: each for each in desk.parameters()}
     parameters |= {each.name.removeprefix("team."): each for each in parameters.values()}
     if word in parameters:

@@ -316,9 +316,8 @@ class Widgets:
     def held(self) -> bool:
         """Whether somebody holds a slider or the scroll bar."""
         page = self._sections.get("page")
-        bar = page.scrolled.vert_scroll_bar if page is not None and page.scrolled is not None else None
-        bars = [] if bar is None else [bar]
-        return any(each.sliding_button.held for each in (*self._all("sliders"), *bars))
+        bars = [page.scrolled.vert_scroll_bar] if page is not None and page.scrolled is not None else []
+        return any(each.sliding_button.held for each in [*self._all("sliders"), *bars])
 
     @property
     def open_menu(self) -> UIDropDownMenu | None:
@@ -329,8 +328,7 @@ class Widgets:
     def let_go(self) -> None:
         """Take the keys away from all fields, and close the menu that is open."""
         self.manager.set_focus_set(None)
-        menu = self.open_menu
-        if menu is not None and menu.current_state is not None:
+        if (menu := self.open_menu) is not None and menu.current_state is not None:
             menu.current_state.should_transition = True
 
     def ended(self) -> bool:

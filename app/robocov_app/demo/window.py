@@ -103,6 +103,7 @@ class Window:
         self._serial = -1
         self._unseen = 0.0
         self._arrange()
+        self.draw()
 
     # frames
 

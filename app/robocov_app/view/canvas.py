@@ -66,6 +66,20 @@ class Canvas:
         for ring in clipped_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
+    def polygons(self, corners: Array, ends: Sequence[int], fills: Sequence[Colour]) -> None:
+        """Fill many polygons, one after the other in (k, 2) px corners, each up to one of the `ends`."""
+        begin = 0
+        if len(corners) and np.abs(corners).max() > FAR:
+            for end, fill in zip(ends, fills, strict=True):
+                self.polygon(corners[begin:end], fill)
+                begin = end
+            return
+        points, draw = np.rint(corners).tolist(), pygame.draw.polygon
+        for end, fill in zip(ends, fills, strict=True):
+            if end - begin > 2:
+                draw(self.surface, fill, points[begin:end])
+            begin = end
+
     def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
         """Draw the smooth line through the (k, 2) px points."""
         points = corners.tolist()

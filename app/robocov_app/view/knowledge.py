@@ -216,8 +216,7 @@ class SensedObstacles(Layer):
             dots = np.column_stack([x + half * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
             _dots(canvas, dots, _DOT * canvas.scale, self._colour(canvas))
 
-        whose = "the robots" if scene.selected is None else f"robot {scene.number(scene.selected)}"
-        return [LegendEntry(f"sensed by {whose}", glyph)]
+        return [LegendEntry("sensed of the obstacles", glyph)]
 
     @staticmethod
     def _colour(canvas: Canvas) -> Colour:

@@ -99,12 +99,14 @@ class Cells(Layer):
         corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
         ends = np.cumsum(sizes)
         if not self._lines_only(canvas, scene):
-            for cell, hue in zip(np.split(corners, ends[:-1]), canvas.hues.tolist(), strict=True):
-                canvas.polygon(cell, canvas.theme.cell(hue))
+            tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
+            canvas.polygons(corners, ends.tolist(), [tints[hue] for hue in canvas.hues.tolist()])
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
-        width = canvas.width(canvas.theme.line)
-        canvas.segments(_once(np.hstack([corners, corners[following]])), canvas.theme.cell_edge, width)
+        edges = np.hstack([corners, corners[following]])
+        # what lies on the rim is drawn over
+        edges = _forward(edges) if "boundary" in canvas.shown else _once(edges)
+        canvas.segments(edges, canvas.theme.cell_edge, canvas.width(canvas.theme.line))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -120,6 +122,15 @@ class Cells(Layer):
     def _lines_only(canvas: Canvas, scene: Scene) -> bool:
         """Whether colours below mean something else."""
         return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.shown)
+
+
+def _forward(edges: Array) -> Array:
+    """Return those of (m, 4) px edges that run to the right, or straight down.
+
+    Two cells run along the edge between them in opposite directions: each is returned once.
+    """
+    x1, y1, x2, y2 = np.rint(edges * 16.0).T
+    return np.asarray(edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))])
 
 
 def _once(edges: Array) -> Array:

@@ -7,6 +7,9 @@ from scipy.spatial import KDTree
 
 from robocov.arrays import Array
 
+_FEW = 120
+"""Up to so many points all pairs are looked at faster than a tree is built."""
+
 
 def nearest_distance(points: Array) -> Array:
     """Return how far each of (n, 2) points is from the nearest other: (n,), infinite for a single one.
@@ -16,6 +19,11 @@ def nearest_distance(points: Array) -> Array:
     """
     if len(points) < 2:
         return np.full(len(points), np.inf)
+    if len(points) <= _FEW:
+        delta = points[:, None] - points[None]
+        square = np.asarray(delta[..., 0] ** 2 + delta[..., 1] ** 2)
+        np.fill_diagonal(square, np.inf)
+        return np.asarray(np.sqrt(square.min(axis=1)))
     distances: Array = np.asarray(KDTree(points).query(points, k=2)[0])
     return np.asarray(distances[:, 1])
 

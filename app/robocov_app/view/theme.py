@@ -266,6 +266,10 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
         return np.arange(n, dtype=np.intp)
     if adjacency is None:
         return previous if previous is not None and len(previous) == n else np.arange(n, dtype=np.intp) % 6
+    if previous is not None and len(previous) == n:
+        pairs = previous[adjacency]
+        if (pairs[:, 0] != pairs[:, 1]).all():
+            return previous
     neighbours: list[list[int]] = [[] for _ in range(n)]
     for first, second in adjacency.tolist():
         neighbours[first].append(second)
