@@ -319,23 +319,30 @@ class TestNumbers:
 
 
 class TestCells:
-    def scene(self, reach):
+    def scene(self, reach, used):
         scene = explained(TWO, communication_range=reach)
-        used = partition(np.array([[1.0, 4.0], [3.0, 4.0]]), SQUARE.region)
         decision = replace(scene.snapshot.decision, cells=used)
         snapshot = Snapshot(scene.snapshot.seen, decision)
-        return Scene.of(SQUARE, scene.team, snapshot), used
+        return Scene.of(SQUARE, scene.team, snapshot)
 
-    def test_those_of_the_law_are_drawn_where_all_hear_all(self):
-        scene, used = self.scene(np.inf)
+    def test_those_of_the_law_are_taken_where_all_hear_all(self):
+        used = partition(TWO, SQUARE.region)
+        scene = self.scene(np.inf, used)
         assert scene.cells is used.polygons
         assert scene.centroids is used.centroid
-        frame, painter = drawn(scene, "cells")
-        assert nearest(frame, painter.camera.to_pixels(np.array([2.0, 6.0])), LIGHT.cell_edge) < 70
-        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(1)) == 0
 
-    def test_those_of_all_robots_where_the_laws_overlap(self):
-        scene, _ = self.scene(3.0)
+    @pytest.mark.parametrize("reach", [np.inf, 3.0])
+    @pytest.mark.parametrize(
+        "used",
+        [
+            partition(np.array([[1.0, 4.0], [3.0, 4.0]]), SQUARE.region),
+            partition(np.array([[1.0, 4.0]]), SQUARE.region),
+            "none",
+            None,
+        ],
+    )
+    def test_where_the_law_has_others_those_of_all_robots_are_drawn(self, reach, used):
+        scene = self.scene(reach, used)
         frame, painter = drawn(scene, "cells")
         assert nearest(frame, painter.camera.to_pixels(np.array([3.0, 5.0])), LIGHT.cell_edge) < 70
         assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(0)) == 0

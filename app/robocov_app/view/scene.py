@@ -13,7 +13,7 @@ from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.robots import Team
-from robocov.voronoi import partition
+from robocov.voronoi import VoronoiPartition, partition
 
 if TYPE_CHECKING:
     from robocov_app.view.field import Field
@@ -109,10 +109,15 @@ class Scene:
     ) -> Scene:
         """Return the scene of `snapshot` with the Voronoi cells of all its robots.
 
-        The cells that the law used are not taken where communication is limited: they overlap there.
+        The cells that the law used are taken where they are these: not where communication is limited, since
+        they overlap there, nor where a user's law says something else.
         """
         cells = snapshot.decision.cells
-        if cells is None or not np.isinf(team.communication_range).all():
+        if (
+            not isinstance(cells, VoronoiPartition)
+            or not np.isinf(team.communication_range).all()
+            or not np.array_equal(cells.generators, snapshot.positions)
+        ):
             cells = partition(snapshot.positions, environment.region)
         return cls(
             environment,
