@@ -184,9 +184,10 @@ class Chart:
                 if k % 4 < 3 or len(points) < 12:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), colour)
             if len(points):
+                wide = canvas.text_width(ghost.words, theme.small_text)
                 canvas.text(
                     ghost.words,
-                    (points[-1][0] - 4 * scale, points[-1][1] - 9 * scale),
+                    (max(points[-1][0] - 4 * scale, left + wide), points[-1][1] - 9 * scale),
                     anchor="right",
                     colour=colour,
                     size=theme.small_text,
