@@ -238,3 +238,20 @@ def test_frames_need_no_display_and_no_matplotlib():
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""  # pygame's greeting is for others
+
+
+def test_the_map_does_not_jump_when_what_the_legend_tells_of_comes_and_goes() -> None:
+    scene = scene_of(run_of(ROOMS, 6))
+    there = replace(scene, path=np.array([[1.0, 4.5], [2.0, 4.5]]), failed={9: (3.0, 4.0)})
+    painter = Painter(ROOMS, (420, 320))
+    painter.visible |= {"path", "links", "velocities"}
+    painter.frame(scene)
+    few = painter.camera
+    painter.frame(there)
+    many = painter.camera
+    assert many.view[1] > few.view[1]
+    painter.frame(scene)
+    assert painter.camera == many
+    painter.visible -= {"links"}
+    painter.frame(scene)
+    assert painter.camera.view[1] < many.view[1]

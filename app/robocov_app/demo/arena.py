@@ -58,6 +58,7 @@ class Arena:
         self._strip: pygame.Surface | None = None
         self._strip_key: object = None
         self._camera: Camera | None = None
+        self._rows: tuple[object, int] = (None, 1)
         self.hovered = -1, -1
         """Pane and number of the robot under the cursor."""
 
@@ -345,10 +346,13 @@ class Arena:
         screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))
 
     def shared_rows(self) -> int:
-        """Return how many rows the legend needs that several panes share."""
+        """Return how many rows the shared legend has needed as long as the same is shown."""
         if len(self._scenes) < 2:
             return 0
+        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.desk.shown)
         entries = self._painters[0].legend_entries(self._scenes[0])
         page = pygame.Surface((self.layout.arena[2], 1))
         canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))
-        return max(len(legend_rows(canvas, entries)), 1)
+        rows = max(len(legend_rows(canvas, entries)), 1, self._rows[1] if self._rows[0] == kept else 1)
+        self._rows = kept, rows
+        return rows

@@ -170,6 +170,7 @@ class Painter:
         self._hues = robot_hues(0)
         self._pages: dict[tuple[str, ...], tuple[object, pygame.Surface]] = {}
         self._own: pygame.Surface | None = None
+        self._room: tuple[object, int, float] = (None, 0, 0.0)
 
     def show(self, names: Iterable[str]) -> None:
         """Show these layers and no others.
@@ -239,7 +240,7 @@ class Painter:
                 rows = len(legend_rows(canvas, entries))
             elif isinstance(layer, Caption):
                 rows = 1
-        self._place_view(rows, bar_room(canvas, scene))
+        self._place_view(*self._steady(rows, bar_room(canvas, scene)))
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
         surface.fill(self.theme.background)
         for static, group in groupby(self._shown(), key=lambda layer: layer.static):
@@ -281,6 +282,18 @@ class Painter:
             self._camera = Camera.fit(bounds, inner, margin=2 * self.scale).within(view)
         elif self._camera.view != view:
             self._camera = self._camera.within(view)
+
+    def _steady(self, rows: int, beside: float) -> tuple[int, float]:
+        """Return the most room that legend and scale of colours have needed as long as the same is shown.
+
+        What they tell of comes and goes, a path with the cursor, distances with every new wall; the map is
+        not to jump each time.
+        """
+        key = self.size, self.scale, frozenset(self.visible)
+        if self._room[0] == key:
+            rows, beside = max(rows, self._room[1]), max(beside, self._room[2])
+        self._room = key, rows, beside
+        return rows, beside
 
     def _clip(self) -> pygame.Rect:
         left, top, width, height = self.camera.view
