@@ -198,6 +198,26 @@ def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, 
     assert settings["theme"] == "dark" and (settings["width"], settings["height"]) == SIZE
 
 
+def test_full_screen_and_back(display: str, tmp_path: Path) -> None:
+    with shown(display, tmp_path) as hands:
+        hands.shot()
+        for shape in ((800, 1200, 3), (SIZE[1], SIZE[0], 3)):
+            hands.key("F11")
+            time.sleep(0.5)
+            hands.find()
+            picture = hands.shot()
+            assert picture.shape == shape
+            assert picture[:, -1].mean() > 190  # the panel is at the edge again
+        hands.key("F11")
+        time.sleep(0.5)
+        hands.find()
+        hands.key("ctrl+q")
+        assert ended(hands.process) == 0, said(hands.process)
+        assert said(hands.process) == ""
+    settings = json.loads((tmp_path / "settings/window.json").read_text())
+    assert (settings["width"], settings["height"]) == SIZE
+
+
 def test_a_signal_closes_it_cleanly_and_ends_its_film(display: str, tmp_path: Path) -> None:
     with shown(display, tmp_path) as hands:
         hands.key("space", "t", "F9")

@@ -181,7 +181,7 @@ def settings_of(window: Window, before: Settings, scale: float | None) -> Settin
     """Return what is worth remembering of a window."""
     from robocov_app.demo.panel import TABS
 
-    width, height = window.screen.get_size()
+    width, height = window.windowed or window.screen.get_size()
     changes = {
         "theme": window.desk.theme,
         "fade": window.desk.fade,

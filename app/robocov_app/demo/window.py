@@ -12,7 +12,7 @@ import numpy as np
 import pygame
 
 from robocov.atomic import written
-from robocov.errors import InputError, RobocovError
+from robocov.errors import RobocovError
 from robocov_app.demo.arena import Arena
 from robocov_app.demo.asked import report_on
 from robocov_app.demo.chart import Chart
@@ -79,12 +79,9 @@ class Window:
         self.film: Film | None = None
         self.keeper = Keeper()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
-        self.screen = pygame.display.set_mode(size, pygame.RESIZABLE)
+        self.windowed: tuple[int, int] | None = None
+        self.screen = _shown(size)
         pygame.display.set_caption("robocov")
-        with suppress(AttributeError, pygame.error), warnings.catch_warnings():
-            # pygame-ce has no other way yet to give a window of the display module a least size
-            warnings.simplefilter("ignore", DeprecationWarning)
-            pygame.Window.from_display_module().minimum_size = SMALLEST
         self.arena = Arena(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
         self.panel = Panel(desk, self.titles, self.do)
@@ -327,11 +324,9 @@ class Window:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
 
     def _fullscreen(self) -> None:
-        try:
-            pygame.display.toggle_fullscreen()
-        except pygame.error as error:
-            raise InputError(f"no full screen here: {error}") from None
-        self.screen = pygame.display.get_surface() or self.screen
+        # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
+        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
+        self.screen = _shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
 
     def _toggle_help(self) -> None:
         self.help = not self.help
@@ -391,6 +386,15 @@ class Window:
             elif event.type == pygame.WINDOWFOCUSLOST:
                 self.keyboard.leave()
             self.panel.take(event)
+
+
+def _shown(size: tuple[int, int]) -> pygame.Surface:
+    screen = pygame.display.set_mode(size, pygame.RESIZABLE)
+    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
+        # pygame-ce has no other way yet to give a window of the display module a least size
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pygame.Window.from_display_module().minimum_size = SMALLEST
+    return screen
 
 
 @contextmanager
