@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import ParameterError
+from robocov_app.statistics import Interval, _weighted_medians, bootstrap, bootstrap_by, paired, spread
+
+numbers = st.floats(-1e6, 1e6, allow_nan=False)
+
+
+@given(st.lists(st.tuples(numbers, st.integers(0, 4)), min_size=1, max_size=12))
+def test_weighted_medians_are_those_of_repeated_values(rows: list[tuple[float, int]]) -> None:
+    ranked = np.array(sorted(value for value, _ in rows))
+    weights = np.array([[weight for _, weight in rows]])
+    if weights.sum() == 0:
+        return
+    repeated = np.repeat(ranked, weights[0])
+    assert _weighted_medians(ranked, weights)[0] == pytest.approx(np.median(repeated), rel=1e-12, abs=1e-300)
+
+
+def test_the_interval_of_a_mean_is_about_the_classical_one() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.normal(3.0, 2.0, 400)
+    found = bootstrap(values, "mean")
+    half = 1.96 * values.std(ddof=1) / np.sqrt(400)
+    assert found.estimate == pytest.approx(values.mean())
+    assert found.low == pytest.approx(values.mean() - half, abs=0.1 * half)
+    assert found.high == pytest.approx(values.mean() + half, abs=0.1 * half)
+
+
+@pytest.mark.parametrize("statistic", ["median", "mean"])
+def test_ninety_five_percent_of_the_intervals_hold_the_truth(statistic: str) -> None:
+    rng = np.random.default_rng(2)
+    held = 0
+    for _ in range(300):
+        found = bootstrap(rng.normal(size=60), statistic, resamples=400)  # type: ignore[arg-type]
+        held += found.low <= 0.0 <= found.high
+    assert 0.90 <= held / 300 <= 0.985
+
+
+def test_values_of_one_cluster_stay_together() -> None:
+    rng = np.random.default_rng(3)
+    levels = rng.normal(size=20)
+    clusters = np.repeat(np.arange(20), 30)
+    values = levels[clusters] + 0.01 * rng.normal(size=600)
+    alone, together = bootstrap(values, "mean"), bootstrap(values, "mean", clusters.tolist())
+    narrow, wide = alone.high - alone.low, together.high - together.low
+    # thirty runs on a map say no more than one: the interval is that of twenty values
+    assert wide / narrow == pytest.approx(np.sqrt(30), rel=0.2)
+
+
+def test_drawing_clusters_agrees_with_doing_it_by_hand() -> None:
+    rng = np.random.default_rng(4)
+    values = rng.gamma(2.0, size=50)
+    clusters = rng.integers(0, 8, 50).tolist()
+    fast = bootstrap(values, "median", clusters, resamples=500, seed=9)
+    slow = bootstrap_by(lambda rows: float(np.median(values[rows])), clusters, resamples=500, seed=9)
+    assert (fast.estimate, fast.low, fast.high) == pytest.approx(
+        (slow.estimate, slow.low, slow.high), rel=1e-12
+    )
+
+
+@given(st.lists(numbers, min_size=2, max_size=30), st.integers(0, 5))
+@settings(max_examples=50)
+def test_intervals_lie_within_the_sample_and_do_not_depend_on_chance(values: list[float], seed: int) -> None:
+    found = bootstrap(values, seed=seed, resamples=200)
+    assert min(values) <= found.low <= found.high <= max(values)
+    assert found == bootstrap(values, seed=seed, resamples=200)
+
+
+def test_pairs() -> None:
+    a, b = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([2.0, 4.0, 3.0, 8.0, 4.0])
+    found = paired(a, b)
+    assert found.pairs == 5
+    assert found.ratio.estimate == 0.5
+    assert found.difference.estimate == -1.0
+    assert found.wins.estimate == pytest.approx(0.7)  # three wins and a tie
+    back = paired(b, a)
+    assert back.wins.estimate == pytest.approx(0.3)
+    assert back.difference.low == pytest.approx(-found.difference.high)
+
+
+def test_one_cluster_has_no_interval() -> None:
+    for found in (
+        bootstrap([1.0, 2.0], clusters=["a", "a"]),
+        bootstrap_by(len, ["a", "a"]),
+        bootstrap([1.5]),
+    ):
+        assert np.isnan(found.low)
+        assert np.isnan(found.high)
+    assert str(bootstrap([1.5])) == "1.5"
+    assert str(Interval(1.0, 0.5, 2.0)) == "1 (0.5 to 2)"
+
+
+def test_spread() -> None:
+    assert spread([1.0, 3.0]) == pytest.approx(np.sqrt(2.0) / 2.0)
+    assert spread([2.0, 2.0, 2.0]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: bootstrap([]), r"values: shape \(0,\)"),
+        (lambda: bootstrap([[1.0]]), "values: shape"),
+        (lambda: bootstrap([1.0, np.nan]), r"values\[1\]: nan"),
+        (lambda: bootstrap([1.0], clusters=["a", "b"]), "clusters: 2 labels of 1 values"),
+        (lambda: paired([1.0], [1.0, 2.0]), "pairs: 1 and 2"),
+        (lambda: paired([1.0], [0.0]), "b: 0, but values above 0"),
+        (lambda: spread([1.0]), "values: 1, but at least two"),
+        (lambda: spread([-1.0, 1.0]), "their mean is 0"),
+        (lambda: bootstrap_by(len, []), "clusters: none"),
+    ],
+)
+def test_what_cannot_be_taken_is_refused(call, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        call()
