@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,8 @@ from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map, parse_map
 from robocov.simulation import Simulation
 from robocov_app.cli import COMMANDS
+from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.sweeping import sweep
 
 README = (Path(__file__).parents[1] / "README.md").read_text()
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, flags=re.DOTALL)
@@ -31,6 +34,18 @@ def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     exec(block("python", "import robocov as rc\n\nenvironment").replace("run(60.0)", "run(0.5)"), {})
     assert len(capsys.readouterr().out.split()) == 3
+
+
+def test_the_examples_of_plots_and_tables_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = Study((StudyMap("square", load_map("square")),), ("rapf",), duration=0.5)
+    sweep(study, Path("study"), workers=1, quiet=True)
+    names: dict[str, Any] = {}
+    exec(block("python", "import robocov as rc\n\nenvironment").replace("run(60.0)", "run(20.0)"), names)
+    exec(block("python", "record.to_pandas()"), names)
+    assert (tmp_path / "cost.pdf").read_bytes().startswith(b"%PDF")
+    assert len(names["frame"]) == len(names["record"]) * 6 and len(names["results"]) == 1
+    assert names["axes"].has_data() and len(names["slow"]) == 101
 
 
 @pytest.mark.parametrize("name", ["Homing", "Patient"])

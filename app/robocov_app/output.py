@@ -21,6 +21,11 @@ _OF_A_COMPARISON = (
     *("comparison.json", "comparison.csv", "comparison.mp4"),
     *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
 )
+REPORT = "report.html"
+"""A page about the results in the folder, which goes with them."""
+
+_REPORT_HEAD = b'<meta name="generator" content="robocov'
+
 _OF_A_REPLAY = ("replay.json", "run.mp4", "comparison.mp4")
 """Files that a result consists of, beside ``frames/`` and the folders of a comparison's runs."""
 
@@ -124,6 +129,8 @@ def _clear(folder: Path) -> None:
         return
     for name in files:
         (folder / name).unlink(missing_ok=True)
+    if is_report(folder / REPORT):
+        (folder / REPORT).unlink()
     for part in folder.glob(".*.part.*"):  # of a run that was killed
         part.unlink()
     frames = folder / "frames"
@@ -132,6 +139,15 @@ def _clear(folder: Path) -> None:
             picture.unlink()
         with suppress(OSError):
             frames.rmdir()
+
+
+def is_report(path: Path) -> bool:
+    """Return whether a file is a page that ``robocov report`` has written."""
+    try:
+        with path.open("rb") as file:
+            return _REPORT_HEAD in file.read(2000)
+    except OSError:
+        return False
 
 
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
@@ -157,9 +173,13 @@ def write_json(path: Path, content: Any) -> None:
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:
     """Write rows under a header; numbers keep all their digits."""
     with written(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + "\n")
-        for row in rows:
-            file.write(",".join(str(cell) for cell in row) + "\n")
+        file.write(csv_text(header, rows))
+
+
+def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
+    """Return what `write_csv` writes."""
+    lines = [header, *(",".join(str(cell) for cell in row) for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def finite(content: Any) -> Any:

@@ -94,10 +94,12 @@ class Page:
         return x / self.size[0], 1.0 - y / self.size[1]
 
     def axes(self, box: Box) -> Axes:
-        """Return axes that fill `box`."""
+        """Return axes that fill `box`; a notebook shows the page for them."""
+        from robocov_app.page_axes import PageAxes
+
         left, top, width, height = box
         x, y = self.at(left, top + height)
-        return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]))
+        return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]), axes_class=PageAxes)
 
     def panels(
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float

@@ -27,6 +27,21 @@ _START, _CENTROID = 6.2, 8.0
 """Sizes of marks where they have room, in points."""
 
 
+def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
+    """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
+    from matplotlib.ticker import MaxNLocator
+
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    axes.set_aspect("equal")
+    axes.set_xlim(low_x, high_x)
+    axes.set_ylim(low_y, high_y)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.set_facecolor(tone(theme.background))
+
+
 def draw_map(axes: Axes, environment: Environment, theme: Theme) -> None:
     """Draw the obstacles, what of the region lies outside the boundary, and the region's outline."""
     from matplotlib.patches import PathPatch, Polygon

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.errors import ParameterError
 from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle
+from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
 from robocov_app.plot_curves import draw_curves, end_label
 from robocov_app.plots import plot_cost
 from robocov_app.view.shading import levels, palette, round_limit, strength, ticks
@@ -140,6 +140,41 @@ def plot_coverage(
         bottom = max(box[1] + box[3] for box, _ in panels)
         page.footer(handles, left, right, bottom, width / (high_x - low_x), rooms.maps[0])
         return page.figure
+
+
+def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
+    """Plot the distance to the nearest robot on axes that somebody else laid out.
+
+    They get ticks in metres, and the scale of colours to the right of them.
+
+    Parameters
+    ----------
+    moment : Moment
+        Its title and facts are not written.
+    axes : matplotlib Axes
+    theme : Theme or {"light", "dark"}
+    """
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    largest = moment.field.largest
+    limit = round_limit(largest if np.isfinite(largest) else 1.0)
+    with plain_style():
+        ticks_in_metres(axes, moment.environment, theme)
+        axes.apply_aspect()
+        extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
+        # small axes may be saved large
+        fine = max(_LEAST[0] / extent.width, 1.0)
+        box = (0.0, 0.0, fine * extent.width, fine * extent.height)
+        _draw_moment(axes, moment, limit, theme, box, fine * scale)
+        axes.set_aspect("equal")
+        bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar.imshow(
+            theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit)
+        )
+        bar.set_xticks([])
+        bar.set_yticks(ticks(limit))
+        bar.yaxis.tick_right()
+        bar.yaxis.set_label_position("right")
+        bar.set_ylabel(f"{_BAR_LABEL} (m)")
 
 
 def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:

@@ -6,15 +6,16 @@ matplotlib is imported when a plot is made, never before; pyplot, which would wa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from robocov.atomic import written
-from robocov.errors import OutputError, ParameterError, shown
-from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles
+from robocov.errors import ParameterError, shown
+from robocov_app.figure_files import check_figure_path as check_figure_path
+from robocov_app.figure_files import figure_kind as figure_kind
+from robocov_app.figure_files import save_figure as save_figure
+from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style
+from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
 from robocov_app.plot_curves import Curve, draw_curves, end_label
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
@@ -55,7 +56,7 @@ def plot_environment(
     theme = _theme(theme)
     with plain_style():
         if axes is not None:
-            _ticks(axes, environment, theme)
+            ticks_in_metres(axes, environment, theme)
             draw_map(axes, environment, theme)
             return _figure_of(axes)
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
@@ -97,7 +98,7 @@ def plot_trajectories(
     theme = _theme(theme)
     with plain_style():
         if axes is not None:
-            _ticks(axes, record.environment, theme)
+            ticks_in_metres(axes, record.environment, theme)
             draw_run(axes, record, theme, colours)
             return _figure_of(axes)
         facts = [_distance(mean_distance), _time(record), _robots(record)]
@@ -259,61 +260,6 @@ def plot_cost(
         return _figure_of(axes)
 
 
-def save_figure(figure: Figure, path: Path | str) -> None:
-    """Write a figure as PNG or SVG, by the path's suffix, whole or not at all.
-
-    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, so that it looks the
-    same everywhere, and no date: the same plot gives the same bytes.
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
-    ParameterError
-        When the suffix is another.
-    """
-    import matplotlib
-
-    path = Path(path)
-    kind = figure_kind(path)
-    metadata: dict[str, str | None] = {"Date": None} if kind == "svg" else {"Software": None}
-    with (
-        written(path) as part,
-        plain_style(),
-        matplotlib.rc_context({"svg.hashsalt": "robocov", "svg.fonttype": "path", "savefig.bbox": None}),
-    ):
-        figure.savefig(part, format=kind, dpi=figure.dpi, metadata=metadata, facecolor=figure.get_facecolor())
-
-
-def check_figure_path(path: Path) -> None:
-    """Make sure, before any work is done, that a figure can be written there.
-
-    Raises
-    ------
-    OutputError
-        When there is no such folder.
-    ParameterError
-        When the suffix is neither PNG nor SVG.
-    """
-    figure_kind(path)
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
-
-
-def figure_kind(path: Path) -> str:
-    """Return ``png`` or ``svg``, by the suffix of a path.
-
-    Raises
-    ------
-    ParameterError
-        When the suffix is another.
-    """
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in ("png", "svg"):
-        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png or .svg was wanted")
-    return kind
-
-
 def _figure_of(axes: Axes) -> Figure:
     return cast("Figure", axes.get_figure(root=True))
 
@@ -325,17 +271,6 @@ def _theme(theme: Theme | str) -> Theme:
 def _check_colours(colours: str) -> None:
     if colours not in ("paper", "robots"):
         raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
-
-
-def _ticks(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    axes.set_aspect("equal")
-    axes.set_xlim(low_x, high_x)
-    axes.set_ylim(low_y, high_y)
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
-    axes.set_facecolor(tone(theme.background))
 
 
 def _map_page(

@@ -45,6 +45,9 @@ STOPPED_SAMPLES = 200
 COST_RATE = 10.0
 """Samples of the coverage cost per simulated second."""
 
+COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
+"""The header of ``cost.csv``."""
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -132,15 +135,18 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
 def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     """Write ``record.npz``, ``run.json`` and ``cost.csv``; the summary depends on the lattice."""
     run.record.save(folder, finite(run.summary), lattice=lattice)
-    history = run.history
-    rows = zip(
+    write_csv(folder / "cost.csv", COST_COLUMNS, cost_rows(run.history))
+
+
+def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
+    """Return the rows of ``cost.csv``, under `COST_COLUMNS`."""
+    return zip(
         history.time.tolist(),
         history.mean_distance.tolist(),
         history.cost.tolist(),
         history.uncovered_area.tolist(),
         strict=True,
     )
-    write_csv(folder / "cost.csv", "time_s,mean_distance_m,cost_m3,uncovered_area_m2", rows)
 
 
 def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:

@@ -11,13 +11,12 @@ import numpy as np
 
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError, shown
-from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.results import read_history
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
-
-_COLUMNS = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
+    from robocov.metrics import CostHistory
 
 
 class Saved(NamedTuple):
@@ -142,20 +141,4 @@ def _load_run(folder: Path) -> Saved:
 
 
 def _load_history(path: Path) -> CostHistory | None:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    if not lines or lines[0].split(",") != list(_COLUMNS):
-        raise InputError(f"{path}: line 1: the header {','.join(_COLUMNS)} was wanted")
-    rows = np.empty((len(lines) - 1, len(_COLUMNS)))
-    for k, line in enumerate(lines[1:]):
-        try:
-            rows[k] = [float(cell) for cell in line.split(",")]
-        except ValueError:
-            raise InputError(
-                f"{path}: line {k + 2}: {shown(line)}, but {len(_COLUMNS)} numbers were wanted"
-            ) from None
-    return CostHistory(*rows.T)
+    return read_history(path) if path.exists() else None

@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from robocov.metrics import cost_history, settled_at, summarise
     from robocov.neighbours import Neighbours
     from robocov.observation import Decision, Observations, Snapshot
+    from robocov.optimum import Optimum
     from robocov.record import Record
     from robocov.region import Region
+    from robocov.results import Results, read_results
     from robocov.robots import Team
     from robocov.sensor import RangeSensor
     from robocov.simulation import Simulation
@@ -66,6 +68,7 @@ _HOME = {
     "MapError": "errors",
     "Neighbours": "neighbours",
     "Observations": "observation",
+    "Optimum": "optimum",
     "OutputError": "errors",
     "OwnView": "controllers",
     "ParameterError": "errors",
@@ -75,6 +78,7 @@ _HOME = {
     "Rapf": "controllers",
     "Record": "record",
     "Region": "region",
+    "Results": "results",
     "RobocovError": "errors",
     "Rpf": "controllers",
     "Simulation": "simulation",
@@ -93,6 +97,7 @@ _HOME = {
     "make_controller": "controllers",
     "map_schema": "mapfile",
     "partition": "voronoi",
+    "read_results": "results",
     "save_map": "mapfile",
     "settled_at": "metrics",
     "summarise": "metrics",
@@ -115,6 +120,7 @@ __all__ = [
     "MapError",
     "Neighbours",
     "Observations",
+    "Optimum",
     "OutputError",
     "OwnView",
     "ParameterError",
@@ -124,6 +130,7 @@ __all__ = [
     "Rapf",
     "Record",
     "Region",
+    "Results",
     "RobocovError",
     "Rpf",
     "Simulation",
@@ -142,6 +149,7 @@ __all__ = [
     "make_controller",
     "map_schema",
     "partition",
+    "read_results",
     "save_map",
     "settled_at",
     "summarise",

@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.corner_views import CornerViews
-from robocov.errors import InputError, ParameterError, shown
+from robocov.drawing import drawing_backend
+from robocov.errors import InputError, ParameterError, counted, shown
 from robocov.geodesic import Geodesics
 from robocov.grouping import least
-from robocov.lattice import Lattice, Number
+from robocov.lattice import Lattice, Number, Sites
 from robocov.robot_views import RobotViews
 
 if TYPE_CHECKING:
@@ -60,6 +61,10 @@ class CoverageResult:
         The sites.
     corners : (k, 2) m
         All places where ways can bend.
+    environment : Environment or None
+        The map, and
+    sites : Sites or None
+        its lattice, for plots.
     """
 
     mean_distance: float
@@ -72,6 +77,13 @@ class CoverageResult:
     positions: Array
     points: Array
     corners: Array
+    environment: Environment | None = None
+    sites: Sites | None = None
+
+    def __repr__(self) -> str:
+        robots = counted(len(self.positions), "robot")
+        uncovered = f", {self.uncovered_area:.3f} m² uncovered" if self.uncovered_area else ""
+        return f"<CoverageResult {robots}, mean distance {self.mean_distance:.3f} m{uncovered}>"
 
     @cached_property
     def first(self) -> Array:
@@ -98,6 +110,33 @@ class CoverageResult:
         weight = self.value / (self.mean_distance * len(site)) if len(site) and self.mean_distance else 0.0
         return np.asarray(np.column_stack(pull) * -weight)
 
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the distance of every place to its nearest robot, and the borders of the geodesic cells.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw; the scale of colours stands to the right of them. None makes a page.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        theme : {"light", "dark"}
+        size : (width, height), px
+            Of the page.
+        radius : float or (n,), m
+            Of the robots.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_result(self, axes, **options)
+
 
 class CoverageCost:
     """The coverage cost (22) of one environment on a lattice of sites.
@@ -119,6 +158,7 @@ class CoverageCost:
 
     Attributes
     ----------
+    environment : Environment
     points : (m, 2) m
         The sites, row by row from the lower left.
     cells : (m,)
@@ -158,6 +198,7 @@ class CoverageCost:
                 f"lattice: {shown(lattice)}, but a whole number from 1 to {MAX_LATTICE} was wanted"
             )
         self.lattice = int(lattice)
+        self.environment = environment
         self.geodesics = Geodesics(environment, None if progress is None else partial(progress, 0.0))
         self._areas = np.array([part.area for part in environment.free.geoms])
         self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
@@ -264,6 +305,8 @@ class CoverageCost:
             positions=positions,
             points=self.points,
             corners=self.corners,
+            environment=self.environment,
+            sites=self.sites,
         )
 
     def grid(self, values: NDArray[Number]) -> NDArray[Number]:

@@ -11,7 +11,8 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov.errors import StartError, unknown_name
+from robocov.drawing import displaying_backend, drawing_backend
+from robocov.errors import StartError, counted, unknown_name
 from robocov.region import Region
 from robocov.starts import Start, StartSpec, UniformStart
 
@@ -115,6 +116,11 @@ class Environment:
     def __hash__(self) -> int:
         return hash((self.name, self.boundary, self.obstacles))
 
+    def __repr__(self) -> str:
+        width, height = np.ptp(np.asarray(self.boundary, dtype=float), axis=0).tolist()
+        obstacles = counted(len(self.obstacles), "obstacle")
+        return f"<Environment {self.name}, {width:.4g} x {height:.4g} m, {obstacles}>"
+
     @cached_property
     def region(self) -> Region:
         """The convex hull of the boundary: all that the robots know of the map."""
@@ -172,9 +178,40 @@ class Environment:
             raise StartError(f"map {self.name!r}: {unknown_name('start', name, starts)}")
         return Start(name, starts[name], self.free)
 
-    def _repr_svg_(self) -> str:
-        """Show the free space in notebooks."""
-        return str(self.free._repr_svg_())
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the map: its free space, its obstacles and the convex region that the robots know.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw. None makes a page with title, scale bar and legend.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        theme : {"light", "dark"}
+        size : (width, height), px
+            Of the page.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_environment(self, axes, **options)
+
+    def _repr_html_(self) -> str | None:
+        """Show the map in notebooks."""
+        backend = displaying_backend()
+        return None if backend is None else backend.environment_html(self)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the map where there is no HTML."""
+        backend = displaying_backend()
+        return None if backend is None else backend.environment_png(self)
 
 
 def _polygons(geometry: BaseGeometry) -> MultiPolygon:

@@ -54,6 +54,15 @@ def shown(value: object, limit: int = 60) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
+def counted(count: int, thing: str) -> str:
+    """Return how many things there are, in words.
+
+    >>> counted(1, "robot"), counted(6, "robot")
+    ('1 robot', '6 robots')
+    """
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a name that is not among `known`, with the nearest one.
 

@@ -10,6 +10,9 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
+from robocov.drawing import drawing_backend
+from robocov.errors import counted
+from robocov.moments import nearest_moments
 from robocov.neighbours import close_pairs
 from robocov.record import Record
 from robocov.sensor import RangeSensor
@@ -23,6 +26,21 @@ SETTLED_DISTANCE = 0.05
 
 TOUCHING = 1e-3
 """Gap in metres below which two bodies are in contact."""
+
+_FEW = 100
+"""Robots up to which it is faster to look at every pair than to look for the close ones."""
+
+_AT_ONCE = 1 << 18
+"""Pairs of robots that are looked at at once, over some moments."""
+
+STUCK_WINDOW = 5.0
+"""Seconds at the end over which a stuck robot gets nowhere."""
+
+STUCK_DISTANCE = 0.05
+"""Metres that a stuck robot may get in `STUCK_WINDOW`."""
+
+STUCK_AWAY = 0.5
+"""Metres that a stuck robot is away from its goal, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +59,40 @@ class CostHistory:
     mean_distance: Array
     cost: Array
     uncovered_area: Array
+
+    def __repr__(self) -> str:
+        first, last = self.mean_distance[[0, -1]].tolist()
+        moments = counted(len(self.time), "moment")
+        return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
+
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the mean distance against time.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw; the curve's name stands to the right of them. None makes a page.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        label, controller : str
+            The curve's name, and whose it is: the paper's controllers have colours of their own.
+        theme : {"light", "dark"}
+        size : (width, height), px
+            Of the page.
+        title : str
+            Of the page.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or those on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_history(self, axes, **options)
 
 
 def cost_history(
@@ -70,10 +122,7 @@ def cost_history(
 
 def sample_moments(record: Record, rate: float) -> list[int]:
     """Return the numbers of the moments nearest to multiples of 1/rate seconds, and of the last."""
-    last = len(record) - 1
-    count = int(np.floor(float(record.time[-1]) * rate + 1e-9))
-    moments = {min(round(k / rate / record.dt), last) for k in range(count + 1)}
-    return sorted(moments | {last})
+    return [int(k) for k in nearest_moments(record.time, rate)]
 
 
 def settled_at(
@@ -108,6 +157,62 @@ def path_lengths(positions: Array) -> Array:
     return np.asarray(np.sqrt((moved**2).sum(axis=-1)).sum(axis=0))
 
 
+def mean_over_run(time: Array, values: Array) -> float:
+    """Return the mean over time of what was sampled along a run, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time : (K,) s
+        Ascending.
+    values : (K,)
+
+    Examples
+    --------
+    >>> mean_over_run(np.array([0.0, 1.0, 3.0]), np.array([4.0, 2.0, 2.0]))
+    2.3333333333333335
+    """
+    duration = float(time[-1] - time[0])
+    if duration == 0.0:
+        return float(values[-1])
+    return float(np.trapezoid(values, time)) / duration
+
+
+def stuck_robots(
+    time: Array,
+    positions: Array,
+    goals: Array,
+    window: float = STUCK_WINDOW,
+    distance: float = STUCK_DISTANCE,
+    away: float = STUCK_AWAY,
+) -> int | None:
+    """Return how many robots are stuck at the end: far from their goals, and no longer on the way there.
+
+    A robot is stuck when it is more than `away` metres from its goal and its net displacement over the
+    last `window` seconds is below `distance` metres.
+
+    Parameters
+    ----------
+    time : (T,) s
+        Ascending.
+    positions : (T, n, 2) m
+    goals : (T, n, 2) m
+        nan where none.
+
+    Returns
+    -------
+    int or None
+        None where no robot has a goal, or the run is shorter than the window.
+    """
+    before = float(time[-1]) - window
+    # half a microsecond forgives the rounding of sums of steps
+    if np.isnan(goals[-1]).any(axis=1).all() or before < float(time[0]) - 5e-7:
+        return None
+    k = int(np.searchsorted(time, before + 5e-7, side="right")) - 1
+    moved = np.sqrt(((positions[-1] - positions[k]) ** 2).sum(axis=-1))
+    left = np.sqrt(((goals[-1] - positions[-1]) ** 2).sum(axis=-1))
+    return int(((moved < distance) & (left > away)).sum())
+
+
 def clearances(record: Record) -> Array:
     """Return the gap between each robot's rim and the nearest wall at each moment, (T, n) m.
 
@@ -137,16 +242,39 @@ def contacts(record: Record, clearance: Array) -> int:
         What `clearances` returns.
     """
     touching = clearance <= TOUCHING
-    began = int(touching[0].sum() + (touching[1:] & ~touching[:-1]).sum())
+    walls = int(touching[0].sum() + (touching[1:] & ~touching[:-1]).sum())
     radius = record.team.radius
+    count = _meetings if len(radius) <= _FEW else _meetings_of_many
+    return walls + count(record.positions, radius)
+
+
+def _meetings(positions: Array, radius: Array) -> int:
+    """Return how many times two of a few robots began to touch, all pairs of many moments at once."""
+    first, second = np.triu_indices(len(radius), 1)
+    reach = radius[first] + radius[second] + TOUCHING
+    began = 0
+    before = np.zeros((1, len(first)), dtype=bool)
+    step = max(1, _AT_ONCE // max(1, len(first)))
+    for k in range(0, len(positions), step):
+        x, y = np.moveaxis(positions[k : k + step], -1, 0)
+        gap = np.sqrt((x[:, first] - x[:, second]) ** 2 + (y[:, first] - y[:, second]) ** 2)
+        touching = np.concatenate([before, gap <= reach])
+        began += int((touching[1:] & ~touching[:-1]).sum())
+        before = touching[-1:]
+    return began
+
+
+def _meetings_of_many(positions: Array, radius: Array) -> int:
+    """Return the same for many robots, of which only those that are close are looked at."""
     reach = 2.0 * float(radius.max()) + TOUCHING
+    began = 0
     before: set[tuple[int, int]] = set()
-    for positions in record.positions:
-        first, second, distance = close_pairs(positions, reach)
+    for now in positions:
+        first, second, distance = close_pairs(now, reach)
         near = (first < second) & (distance <= radius[first] + radius[second] + TOUCHING)
-        now = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
-        began += len(now - before)
-        before = now
+        pairs = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
+        began += len(pairs - before)
+        before = pairs
     return began
 
 
@@ -155,10 +283,12 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     clearance = clearances(record)
     return {
         "mean_distance_m": float(history.mean_distance[-1]),
+        "mean_distance_over_run_m": mean_over_run(history.time, history.mean_distance),
         "cost_m3": float(history.cost[-1]),
         "uncovered_area_m2": float(history.uncovered_area[-1]),
         "settled_at_s": settled_at(record.time, record.positions),
         "contacts": contacts(record, clearance),
         "min_clearance_m": float(clearance.min()),
         "path_length_m": [float(x) for x in path_lengths(record.positions)],
+        "stuck_robots": stuck_robots(record.time, record.positions, record.goals),
     }

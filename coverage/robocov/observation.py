@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from robocov.arrays import Array
+from robocov.errors import counted
 from robocov.neighbours import Neighbours
 
 if TYPE_CHECKING:
@@ -78,6 +79,9 @@ class Snapshot:
 
     seen: Observations
     decision: Decision
+
+    def __repr__(self) -> str:
+        return f"<Snapshot at {self.time:.2f} s, {counted(len(self.positions), 'robot')}>"
 
     @property
     def time(self) -> float:

@@ -5,24 +5,38 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.atomic import written
 from robocov.controllers import CONTROLLERS, gain_values
+from robocov.drawing import displaying_backend, drawing_backend
 from robocov.environment import Environment
-from robocov.errors import InputError
+from robocov.errors import InputError, ParameterError, counted, shown
+from robocov.extras import extra
+from robocov.moments import nearest_moments
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.robots import Team
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from robocov.controllers.base import Controller
+
+_COLUMNS = {
+    "positions": ("x_m", "y_m"),
+    "velocities": ("vx_m_s", "vy_m_s"),
+    "forces": ("fx_N", "fy_N"),
+    "goals": ("goal_x_m", "goal_y_m"),
+    "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
+}
+"""What the columns of data frames are called; `Record.to_pandas` explains them."""
 
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 
@@ -44,6 +58,7 @@ class Record:
         Name of the start, None where positions were given.
     seed : int or None
     dt : float, s
+        The control period. Moments lie that far apart, and farther where the record was thinned.
     time : (T,) s
     positions : (T, n, 2) m
     velocities : (T, n, 2) m/s
@@ -77,6 +92,10 @@ class Record:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        robots = counted(len(self.team), "robot")
+        return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
+
     def snapshot(self, k: int) -> Snapshot:
         """Return the moment number `k` as far as it was recorded: without force terms and cells."""
         positions = self.positions[k]
@@ -90,6 +109,135 @@ class Record:
         )
         goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
         return Snapshot(seen, Decision(forces=self.forces[k], goals=goals))
+
+    def at(self, time: float) -> Snapshot:
+        """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
+
+        Raises
+        ------
+        ParameterError
+            When the time is before the first moment or after the last by more than a control period.
+        """
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first - self.dt <= time <= last + self.dt:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {first:g} to {last:g} s was wanted"
+            )
+        return self.snapshot(int(np.abs(self.time - time).argmin()))
+
+    def until(self, time: float) -> Record:
+        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then.
+
+        Raises
+        ------
+        ParameterError
+            When that is before the first moment.
+        """
+        # half a microsecond forgives the rounding of sums of steps
+        if not time >= float(self.time[0]) - 5e-7:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {float(self.time[0]):g} s was wanted"
+            )
+        return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
+
+    def thinned(self, rate: float) -> Record:
+        """Return the record at `rate` moments a second, with all else as it is.
+
+        Those moments stay that are nearest to multiples of 1/rate seconds from the first, of two as near
+        the earlier; and so does the last. None is made up: where the record is sparser than that, it stays
+        as it is.
+
+        Parameters
+        ----------
+        rate : float, Hz
+            0 leaves the first moment and the last.
+
+        Raises
+        ------
+        ParameterError
+            When the rate is negative or not finite.
+        """
+        if not 0.0 <= rate < np.inf:
+            raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+        return self._only(nearest_moments(self.time, rate))
+
+    def _only(self, moments: slice | IntArray) -> Record:
+        """Return the record of some of the moments; its arrays are copies."""
+        return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
+
+    def to_pandas(self) -> DataFrame:
+        """Return the run as a tidy data frame: one row for each moment and robot, by time, then robot.
+
+        Returns
+        -------
+        DataFrame with the columns
+
+        time_s : float
+        robot : int
+            The robot's row in the arrays; pictures number robots from 1.
+        x_m, y_m : float
+        vx_m_s, vy_m_s : float
+        fx_N, fy_N : float
+            The controller's force, before any limit.
+        goal_x_m, goal_y_m : float
+            nan where none.
+        obstacle_x_m, obstacle_y_m : float
+            The nearest obstacle point that the robot sensed, nan where none.
+
+        Raises
+        ------
+        RobocovError
+            When pandas is not installed: it comes with ``robocov[pandas]``.
+        """
+        pandas = extra("pandas", "pandas")
+        moments, robots = self.positions.shape[:2]
+        columns: dict[str, Array | IntArray] = {
+            "time_s": np.repeat(self.time, robots),
+            "robot": np.tile(np.arange(robots), moments),
+        }
+        for array, names in _COLUMNS.items():
+            columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
+        frame: DataFrame = pandas.DataFrame(columns)
+        return frame
+
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the whole run: the map, where the robots began, went and ended, and the final Voronoi cells.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw. None makes a page with title, scale bar and legend.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        theme : {"light", "dark"}
+        colours : {"paper", "robots"}
+            Green starts, red trajectories, blue final positions, or a hue for each robot.
+        size : (width, height), px
+            Of the page.
+        mean_distance : float, m
+            Of the final positions, for the page's title.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_record(self, axes, **options)
+
+    def _repr_html_(self) -> str | None:
+        """Show the run in notebooks: it can be played."""
+        backend = displaying_backend()
+        return None if backend is None else backend.record_html(self)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the run where there is no HTML."""
+        backend = displaying_backend()
+        return None if backend is None else backend.record_png(self)
 
     def to_json(
         self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None

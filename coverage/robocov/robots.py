@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.arrays import Array, frozen
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, counted, shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -119,6 +119,15 @@ class Team:
 
     def __len__(self) -> int:
         return int(self.radius.shape[0])
+
+    def __repr__(self) -> str:
+        parts = []
+        for field in fields(self):
+            values = getattr(self, field.name)
+            low, high = float(values.min()), float(values.max())
+            span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            parts.append(f"{field.name} {span} {UNITS[field.name]}")
+        return f"<Team of {counted(len(self), 'robot')}: {', '.join(parts)}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the team as plain JSON, units in the key names; None stands for "no limit".

@@ -16,7 +16,7 @@ from robocov.arrays import Array
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.base import Controller
 from robocov.environment import Environment
-from robocov.errors import ParameterError, RobocovError, StartError, shown
+from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import Record, Recorder
@@ -107,6 +107,10 @@ class Simulation:
         self._steps = 0
         self._memory = self._asked(lambda: controller.begin(environment.region, self.team))
         self._snapshot: Snapshot | None = None
+
+    def __repr__(self) -> str:
+        where = f"{self.controller.name} on {self.environment.name}"
+        return f"<Simulation {where}, {counted(len(self.team), 'robot')}, at {self.time:.2f} s>"
 
     @property
     def time(self) -> float:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -301,3 +303,11 @@ def test_sealed_rooms_without_a_corner():
     alone = cost(robots[:1])
     assert alone.uncovered_area == pytest.approx(24.0)
     assert (alone.owner == np.where(left, 0, -1)).all()
+
+
+def test_a_result_is_short_in_words(empty: Environment) -> None:
+    result = CoverageCost(empty, 16)([[5.0, 5.0]])
+    assert repr(result) == f"<CoverageResult 1 robot, mean distance {result.mean_distance:.3f} m>"
+    split = replace(empty, obstacles=(WallObstacle(((5.0, -1.0), (5.0, 11.0)), 0.1),))
+    result = CoverageCost(split, 16)([[1.0, 5.0]])
+    assert repr(result).endswith(f" m, {result.uncovered_area:.3f} m² uncovered>")

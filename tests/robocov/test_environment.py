@@ -96,3 +96,8 @@ def test_region_is_the_convex_hull_without_collinear_vertices() -> None:
         Region(np.array([[0, 0], [1, 1], [2, 2]], dtype=float))
     with pytest.raises(ValueError, match="read-only"):
         region.vertices[0, 0] = 1.0
+
+
+def test_it_is_short_in_words(cluttered: Environment, empty: Environment) -> None:
+    assert repr(cluttered) == "<Environment cluttered, 10 x 10 m, 3 obstacles>"
+    assert repr(empty) == "<Environment empty, 10 x 10 m, 0 obstacles>"

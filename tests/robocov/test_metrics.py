@@ -13,9 +13,11 @@ from robocov.metrics import (
     clearances,
     contacts,
     cost_history,
+    mean_over_run,
     path_lengths,
     sample_moments,
     settled_at,
+    stuck_robots,
     summarise,
 )
 from robocov.record import Record
@@ -88,6 +90,66 @@ def test_contacts_are_counted_when_they_begin(record: Record) -> None:
     assert contacts(made, gap) == 4 + 2
 
 
+@pytest.mark.parametrize("robots", [1, 2, 7, 130])
+def test_meetings_are_those_that_are_seen_pair_by_pair(record: Record, robots: int) -> None:
+    """Of few robots all pairs are looked at at once, of many only the close ones."""
+    rng = np.random.default_rng(robots)
+    steps, size = 40, 0.2 * (robots - 1) ** 0.5
+    walk = np.cumsum(rng.normal(0.0, 0.05, (steps, robots, 2)), axis=0) + rng.uniform(0, size, (robots, 2))
+    radius = rng.uniform(0.02, 0.1, robots)
+    team = replace(
+        record.team,
+        **{name: np.full(robots, getattr(record.team, name)[0]) for name in record.team.__slots__},
+    )
+    made = replace(record, team=replace(team, radius=radius), positions=walk, time=np.arange(steps) * 0.1)
+    met = np.zeros((robots, robots), dtype=bool)
+    expected = 0
+    for places in walk:
+        for i in range(robots):
+            for j in range(i):
+                touch = bool(np.hypot(*(places[i] - places[j])) <= radius[i] + radius[j] + 1e-3)
+                expected += touch and not met[i, j]
+                met[i, j] = touch
+    assert contacts(made, np.ones((steps, robots))) == expected
+    assert (expected > 0) is (robots > 1)
+
+
+def test_the_mean_over_a_run_is_that_over_time() -> None:
+    time = np.array([0.0, 1.0, 1.5, 4.0])
+    assert mean_over_run(time, 3.0 - 0.5 * time) == pytest.approx(2.0)
+    assert mean_over_run(time, np.full(4, 7.25)) == 7.25
+    assert mean_over_run(np.array([0.0]), np.array([3.0])) == 3.0
+
+
+def goals(position: float, steps: int) -> np.ndarray:
+    return np.tile([position, 0.0], (steps, 1, 1))
+
+
+def test_a_robot_at_rest_away_from_its_goal_is_stuck() -> None:
+    time = times(20)
+    still = track(np.minimum(time, 3.0))
+    assert stuck_robots(time, still, goals(3.6, 201)) == 1
+    assert stuck_robots(time, still, goals(3.4, 201)) == 0, "it is nearly there"
+    assert stuck_robots(time, track(0.02 * time), goals(9.0, 201)) == 0, "it creeps on"
+    assert stuck_robots(time, track(0.005 * time), goals(9.0, 201)) == 1
+    trembling = track(0.01 * np.sin(40 * time))
+    assert stuck_robots(time, trembling, goals(9.0, 201)) == 1, "net displacement counts"
+
+
+def test_robots_are_counted_and_those_without_goals_are_not_stuck() -> None:
+    time = times(6)
+    positions = np.zeros((61, 3, 2))
+    aims = np.stack([np.full((61, 2), np.nan), np.full((61, 2), 4.0), np.full((61, 2), 5.0)], axis=1)
+    assert stuck_robots(time, positions, aims) == 2
+    assert stuck_robots(time, positions, np.full_like(positions, np.nan)) is None
+
+
+def test_in_a_run_that_is_shorter_than_the_window_nobody_is_known_to_be_stuck() -> None:
+    assert stuck_robots(times(4), np.zeros((41, 1, 2)), goals(9.0, 41)) is None
+    assert stuck_robots(times(5), np.zeros((51, 1, 2)), goals(9.0, 51)) == 1
+    assert stuck_robots(np.array([0.0]), np.zeros((1, 1, 2)), goals(9.0, 1)) is None
+
+
 def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None:
     cost = CoverageCost(record.environment, lattice=24)
     history = cost_history(record, cost, rate=10.0)
@@ -102,13 +164,17 @@ def test_summary_says_what_happened(record: Record) -> None:
     summary = summarise(record, history)
     assert set(summary) == {
         "mean_distance_m",
+        "mean_distance_over_run_m",
         "cost_m3",
         "uncovered_area_m2",
         "settled_at_s",
         "contacts",
         "min_clearance_m",
         "path_length_m",
+        "stuck_robots",
     }
+    assert history.mean_distance.min() < summary["mean_distance_over_run_m"] < history.mean_distance.max()
+    assert 0 <= summary["stuck_robots"] <= 6
     assert summary["contacts"] > 0, "Lloyd's robots slide along walls here"
     assert -2e-3 < summary["min_clearance_m"] < 1e-3
     assert len(summary["path_length_m"]) == 6
@@ -119,3 +185,9 @@ def test_summary_says_what_happened(record: Record) -> None:
 def test_rapf_keeps_clear(cluttered: Environment) -> None:
     quiet = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
     assert contacts(quiet, clearances(quiet)) == 0
+
+
+def test_a_history_is_short_in_words(record: Record) -> None:
+    history = cost_history(record, CoverageCost(record.environment, 16), 1.0)
+    first, last = history.mean_distance[[0, -1]]
+    assert repr(history) == f"<CostHistory 13 moments, 12.0 s, mean distance {first:.3f} to {last:.3f} m>"

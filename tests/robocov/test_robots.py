@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,3 +62,12 @@ def test_teams_have_robots_and_one_value_for_each() -> None:
         Team(ones, np.ones(3), ones, ones, ones, ones, ones)
     with pytest.raises(ParameterError, match="team: cannot be read"):
         Team.from_dict({"robots": 2})
+
+
+def test_it_is_short_in_words() -> None:
+    team = Team.homogeneous(3, max_speed=0.5)
+    assert repr(team) == (
+        "<Team of 3 robots: radius 0.1 m, mass 1 kg, max_speed 0.5 m/s, max_acceleration 2 m/s², "
+        "viscosity 2 N s/m, sensing_range 3 m, communication_range inf m>"
+    )
+    assert "radius 0.1 to 0.3 m," in repr(replace(team, radius=np.array([0.1, 0.3, 0.2])))

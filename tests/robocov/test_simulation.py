@@ -421,3 +421,9 @@ class TestChanges:
         alone.step()
         np.testing.assert_array_equal(pushed.positions[1:], alone.positions[1:])
         assert pushed.velocities[0, 1] > alone.velocities[0, 1] + 0.05
+
+
+def test_it_is_short_in_words(empty: Environment) -> None:
+    simulation = Simulation(empty, Rapf(), empty.start().sample(3), dt=0.05)
+    simulation.step()
+    assert repr(simulation) == "<Simulation rapf on empty, 3 robots, at 0.05 s>"

@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-import errno
 import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pygame
 import pytest
@@ -21,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from robocov.errors import OutputError, ParameterError
+from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.page import tone
@@ -333,48 +331,6 @@ class TestCost:
         assert placed.min() >= -1e-9 and placed.max() <= 100 + 1e-9
         if len(heights) == 1 or np.diff(np.sort(given_heights)).min() >= gap:
             assert placed == pytest.approx(given_heights)
-
-
-class TestSaving:
-    def test_an_svg_is_the_same_every_time_and_everywhere(self, tmp_path):
-        for name in ("a.svg", "b.svg"):
-            save_figure(plot_trajectories(run_of(ROOMS, 4)), tmp_path / name)
-        text = (tmp_path / "a.svg").read_text()
-        assert text == (tmp_path / "b.svg").read_text()
-        assert "<text" not in text and "font-family" not in text
-        assert "<dc:date>" not in text
-
-    def test_a_png_is_the_same_every_time(self, tmp_path):
-        for name in ("a.png", "b.png"):
-            save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / name)
-        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-    def test_the_users_own_style_changes_nothing(self, tmp_path):
-        save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / "a.png")
-        with matplotlib.rc_context(
-            {"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.bbox": "tight"}
-        ):
-            save_figure(plot_cost(curves(1.0, 2.0)), tmp_path / "b.png")
-        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-    def test_other_suffixes_are_refused(self, tmp_path):
-        with pytest.raises(ParameterError, match=r"'\.pdf', but \.png or \.svg was wanted"):
-            save_figure(plot_environment(HALL), tmp_path / "a.pdf")
-
-    def test_a_full_disk_is_named_and_leaves_the_older_file(self, tmp_path, monkeypatch):
-        path = tmp_path / "a.png"
-        path.write_bytes(b"older")
-        figure = plot_environment(HALL)
-
-        def full(part, **options):
-            Path(part).write_bytes(b"half")
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        monkeypatch.setattr(figure, "savefig", full)
-        with pytest.raises(OutputError, match=r"a\.png: cannot be written.*No space"):
-            save_figure(figure, path)
-        assert path.read_bytes() == b"older"
-        assert list(tmp_path.iterdir()) == [path]
 
 
 _LAZY = """

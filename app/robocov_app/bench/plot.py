@@ -34,7 +34,7 @@ MARKS = ("o", "s", "^", "D")
 
 
 def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
-    """Draw every ratio and every goal on logarithmic axes, and write them as PNG or SVG.
+    """Draw every ratio and every goal on logarithmic axes, and write them as PNG, SVG or PDF.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class Arguments:
     json: bool = False
     """Print one JSON object and nothing else."""
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw the ratios to a PNG or SVG."""
+    """Draw the ratios to a PNG, SVG or PDF."""
 
 
 def command(options: Arguments) -> int | None:

@@ -38,7 +38,7 @@ class Arguments:
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
     """Save per-site points (m,2), distances (m,) and owner (m,) there."""
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw a map of the distances to a PNG or SVG."""
+    """Draw a map of the distances to a PNG, SVG or PDF."""
     theme: Literal["light", "dark"] = "light"
     """Colours of the picture."""
     json: bool = False

@@ -108,6 +108,7 @@ def replayed_session(saved: Sequence[Saved]) -> Session:
     InputError
         When the runs do not go together, or are none that the window can show.
     """
+    saved = [each._replace(record=_paced(each.record)) for each in saved]
     records = [each.record for each in saved]
     _check(saved)
     rosters = [roster_of(record) for record in records]
@@ -147,6 +148,20 @@ def control_dt(record: Record) -> float:
     if isinstance(dt, float) and dt > 0.0 and abs(record.dt / dt - round(record.dt / dt)) < 1e-6:
         return dt
     return record.dt
+
+
+def _paced(record: Record) -> Record:
+    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even.
+
+    So do those of the window that are thinned with age.
+    """
+    gap = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
+    steps = round(gap / record.dt)
+    if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
+        return record
+    return replace(
+        record, dt=steps * record.dt, session={**record.session, "control_dt_s": control_dt(record)}
+    )
 
 
 def law_of(record: Record) -> Law:

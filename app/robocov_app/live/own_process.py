@@ -6,11 +6,14 @@ import os
 import signal
 import subprocess
 import sys
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 
-def started(module: str) -> subprocess.Popen[bytes]:
-    """Start a module as a process; pipes lead to its standard input and from its standard output."""
+def started(module: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
+    """Start a module as a process; pipes lead to its standard input and from its standard output.
+
+    What it complains of goes to `stderr`, by default to that of this process.
+    """
     # it is to import what this one does
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -20,6 +23,7 @@ def started(module: str) -> subprocess.Popen[bytes]:
         [sys.executable, "-P", "-m", module],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        stderr=stderr,
         env=environment,
     )
 

@@ -8,6 +8,7 @@ package offers in the entry-point group ``robocov.controllers``, or a class in a
 from __future__ import annotations
 
 import hashlib
+import importlib.abc
 import importlib.util
 import sys
 from importlib.metadata import entry_points
@@ -87,8 +88,14 @@ def _named(kind: type[Any], name: str) -> type[Any]:
     return kind
 
 
-def controller_kind(name: str) -> type[Any]:
+def controller_kind(name: str, *, source: tuple[str, str] | None = None) -> type[Any]:
     """Return the controller class called `name`, or the class of ``file.py:ClassName``.
+
+    Parameters
+    ----------
+    name : str
+    source : (path, text) or None
+        Of the file, which then need not be there; by default it is read.
 
     Raises
     ------
@@ -96,7 +103,7 @@ def controller_kind(name: str) -> type[Any]:
         When there is none; the message gives the nearest name, or what is wrong with the file.
     """
     if ".py:" in name or name.endswith(".py"):
-        return _kind_in_file(name)
+        return _kind_in_file(name, source)
     if name in CONTROLLERS:
         return CONTROLLERS[name]
     offered = _offered(name)
@@ -105,8 +112,12 @@ def controller_kind(name: str) -> type[Any]:
     return offered[name]
 
 
-def make_controller(name: str, gains: Mapping[str, object] | None = None) -> Controller:
+def make_controller(
+    name: str, gains: Mapping[str, object] | None = None, *, source: tuple[str, str] | None = None
+) -> Controller:
     """Return the controller called `name` with the given gains, all others at their defaults.
+
+    `source` is as in `controller_kind`.
 
     >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
     0.3
@@ -116,25 +127,39 @@ def make_controller(name: str, gains: Mapping[str, object] | None = None) -> Con
     ParameterError
         On an unknown controller or gain (with the nearest name), or a gain out of range.
     """
-    kind = controller_kind(name)
+    kind = controller_kind(name, source=source)
     controller = with_gains(kind, gains or {})
     if isinstance(controller, IndividualController) and not hasattr(controller, "decide"):
         return Individually(controller)
     return controller  # type: ignore[no-any-return]
 
 
-def _kind_in_file(name: str) -> type[Any]:
+class _Text(importlib.abc.SourceLoader):
+    """Loads a module from the text of its file, which need not be there any more."""
+
+    def __init__(self, path: str, text: str) -> None:
+        self._path, self._text = path, text
+
+    def get_filename(self, fullname: str) -> str:
+        return self._path
+
+    def get_data(self, path: str) -> bytes:
+        return self._text.encode()
+
+
+def _kind_in_file(name: str, source: tuple[str, str] | None) -> type[Any]:
     file, _, class_name = name.rpartition(":")
     if not class_name or not file.endswith(".py"):
         raise ParameterError(
             f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted"
         )
-    path = Path(file).resolve()
-    if not path.is_file():
+    path = Path(file).resolve() if source is None else Path(source[0])
+    if source is None and not path.is_file():
         raise ParameterError(f"controller {shown(name)}: there is no file {file}")
     # a name of its own for each file, so that two files called mine.py do not replace each other
     module_name = f"robocov_user_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
-    spec = importlib.util.spec_from_file_location(module_name, path)
+    loader = None if source is None else _Text(*source)
+    spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
     if spec is None or spec.loader is None:
         raise ParameterError(f"controller {shown(name)}: {file} is not a Python file")
     module = importlib.util.module_from_spec(spec)

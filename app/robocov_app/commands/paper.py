@@ -1,0 +1,162 @@
+"""`robocov paper`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from robocov_app.options import in_range
+
+if TYPE_CHECKING:
+    from robocov_app.paper.figures import Shown
+    from robocov_app.paper.studying import Forecast, Means
+    from robocov_app.paper.verdicts import Claim
+
+INTERRUPTED = 130
+
+_MOST_WORKERS = 1024
+
+
+@dataclass
+class Arguments:
+    """Run the paper's figures 1 to 8 and test its claims over many maps, starts and seeds.
+
+    The folder gets index.html, a page with every figure beside what the paper claims of it and a plain
+    verdict on every claim; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their
+    tables. How long it takes is told before it begins. Ctrl-C keeps what is done, and the same command goes
+    on from there.
+
+    Example: robocov paper --quick --out paper
+    """
+
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the results; one that holds a part of the same study is gone on with."""
+    quick: bool = False
+    """A small study of about two minutes, to see that all is well; the full one takes about half an hour."""
+    figures_only: bool = False
+    """Only the figures, without the claims."""
+    workers: int | None = None
+    """Processes; by default one a processor."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+    def __post_init__(self) -> None:
+        if self.workers is not None:
+            in_range("--workers", self.workers, 1, _MOST_WORKERS)
+
+
+def command(options: Arguments) -> int:
+    """Run the study and write all that comes of it."""
+    from robocov_app.interruption import Interruption
+    from robocov_app.output import finite
+    from robocov_app.paper.asking import asked
+    from robocov_app.paper.plan import FULL, QUICK
+    from robocov_app.paper.studying import (
+        Means,
+        Stopped,
+        begun,
+        first_record,
+        forecast,
+        studied,
+        studied_figures,
+    )
+    from robocov_app.paper.writing import save_claims, save_page, save_pictures
+    from robocov_app.sweep.pool import processors
+
+    plan = QUICK if options.quick else FULL
+    out, quiet = options.out, options.json
+    begun(out, plan)
+    workers = options.workers or processors()
+    claims: Sequence[Claim] = ()
+    material = None
+    with Interruption() as stop:
+        means = Means(workers, options.scheduler, quiet, stop)
+        if not quiet:
+            _announce(forecast(out, plan, workers, figures_only=options.figures_only), plan.name, means)
+        try:
+            runs: Mapping[str, Shown]
+            if options.figures_only:
+                runs = studied_figures(out, plan, means)
+            else:
+                material = studied(out, plan, means)
+                runs = material.figures
+                claims = asked(material.convex, material.claims, material.gains)
+                save_claims(out, claims)
+            first = first_record()
+            images = save_pictures(out, runs, first, material, quiet=quiet)
+            save_page(out, plan, images, runs, first, material, claims)
+        except Stopped:
+            return _stopped(options)
+    if options.json:
+        answer = {
+            "out": str(out),
+            "plan": plan.name,
+            "interrupted": False,
+            "runs": material.runs if material else len(runs),
+            "failed": material.failed if material else 0,
+            "page": str(out / "index.html"),
+            "claims": [claim.to_json() for claim in claims],
+        }
+        print(json.dumps(finite(answer)))
+        return 0
+    if claims:
+        print_claims(claims)
+    print(f"saved in {out}/: index.html{', claims.json' if claims else ''}, figures/, studies/")
+    return 0
+
+
+def print_claims(claims: Sequence[Claim]) -> None:
+    """Print the verdicts for people."""
+    from rich.table import Table
+
+    from robocov_app.console import console
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("claim", overflow="fold")
+    table.add_column("verdict", style="bold", no_wrap=True)
+    table.add_column("measured", overflow="fold")
+    table.add_column("runs", justify="right", no_wrap=True)
+    for claim in claims:
+        measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
+        table.add_row(claim.claim, claim.verdict, measured, str(claim.runs))
+    console().print(table)
+
+
+def _announce(forecast: Forecast, name: str, means: Means) -> None:
+    from robocov_app.sweep.telling import duration
+
+    if forecast.left == 0:
+        words = f"all {forecast.runs:,} runs are there"
+    else:
+        there = (
+            f", {forecast.runs - forecast.left:,} of them there already"
+            if forecast.left < forecast.runs
+            else ""
+        )
+        each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
+        where = "on a Dask cluster" if means.scheduler else f"on {means.workers} processes"
+        words = (
+            f"{forecast.runs:,} runs{there}, about {duration(forecast.seconds)} {where} (measured: {each} "
+            f"a run); "
+            f"Ctrl-C keeps what is done"
+        )
+    sys.stderr.write(f"paper ({name}): {words}\n")
+    sys.stderr.flush()
+
+
+def _stopped(options: Arguments) -> int:
+    if options.json:
+        print(json.dumps({"out": str(options.out), "interrupted": True}))
+    else:
+        quick = " --quick" if options.quick else ""
+        only = " --figures-only" if options.figures_only else ""
+        print(f"stopped; to go on: robocov paper --out {options.out}{quick}{only}")
+    return INTERRUPTED

@@ -1,0 +1,109 @@
+"""`robocov report`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from robocov.atomic import written
+from robocov.errors import InputError, OutputError, ParameterError, counted
+from robocov_app.output import REPORT, is_report
+
+if TYPE_CHECKING:
+    from robocov_app.report.gathering import Result
+
+
+@dataclass
+class Arguments:
+    """One HTML page of runs, comparisons and sweeps, with an interactive replay; it needs no network.
+
+    Example: robocov report sweeps/rooms --out rooms.html
+    """
+
+    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR [DIR ...]")]
+    """Folders of runs, comparisons or sweeps; several make a section each."""
+    out: Path | None = None
+    """The page; by default report.html in the (first) folder."""
+    overwrite: bool = False
+    """Replace a file that is no report; an earlier report is replaced anyway."""
+    title: str | None = None
+    """What stands above; by default what was run."""
+    theme: Literal["auto", "light", "dark"] = "auto"
+    """Colours; auto follows the reader's preference."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Read, draw and write."""
+    if not options.folders:
+        raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
+    from robocov_app.progress import progress
+    from robocov_app.report.document import report
+    from robocov_app.report.gathering import gathered
+
+    target = options.folders[0] / REPORT if options.out is None else options.out
+    if options.out is not None:
+        check_target(target, overwrite=options.overwrite)
+    results = [gathered(folder) for folder in options.folders]
+    check_target(target, overwrite=options.overwrite)
+    total = sum(len(result.fine) for result in results)
+    with progress("runs read", total, quiet=options.json) as tell:
+        page = report(results, title=options.title, theme=options.theme, tell=tell)
+    data = page.html.encode("utf-8", "replace")
+    with written(target) as part:
+        part.write_bytes(data)
+    if options.json:
+        counts = [
+            _counts(folder, result, shown)
+            for folder, result, shown in zip(options.folders, results, page.shown, strict=True)
+        ]
+        print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
+        return
+    for result in results:
+        print(_told(result))
+    print(f"written to {target} ({len(data) / 1e6:.2f} MB)")
+
+
+def check_target(target: Path, *, overwrite: bool) -> None:
+    """Make sure, before any work is done, that a page may be written there.
+
+    Raises
+    ------
+    InputError
+        When there is a file that is no report, and it is not to be overwritten.
+    OutputError
+        When there is no such folder, or a folder in its place.
+    """
+    if target.is_dir():
+        raise OutputError(f"{target}: cannot be written: it is a folder")
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
+    if target.exists() and not overwrite and not is_report(target):
+        raise InputError(
+            f"{target}: the file is no report of robocov; another --out, or --overwrite, was wanted"
+        )
+
+
+def _counts(folder: Path, result: Result, shown: int) -> dict[str, object]:
+    return {
+        "folder": str(folder),
+        "kind": result.kind,
+        "runs": len(result.fine),
+        "failed": len(result.failed),
+        "missing": result.missing,
+        "shown": shown,
+    }
+
+
+def _told(result: Result) -> str:
+    words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
+    if result.failed:
+        words.append(f"{len(result.failed)} failed")
+    if result.missing:
+        words.append(f"{result.missing} of {result.wanted} missing")
+    return ", ".join(words)

@@ -1,0 +1,128 @@
+"""`robocov sweep`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from robocov.errors import ParameterError
+from robocov_app.options import in_range
+
+if TYPE_CHECKING:
+    from robocov_app.sweep.rehearsal import Rehearsal
+    from robocov_app.sweep.study import Study
+
+INTERRUPTED = 130
+
+
+@dataclass
+class Arguments:
+    """Many runs in parallel: every combination of what a study file lists, each done once.
+
+    The folder holds results.csv and results.parquet, one row a run, and a folder of each run.
+    Whatever ends a sweep, the same command goes on where it was. For the same map and seed every
+    controller begins in the same places.
+
+    A study file: maps = ["rooms", "mine.json"], controllers = ["rapf", "rpf"], seeds = 20, and under
+    [gains.rapf] k_rep = [0.1, 1.0]; robots, starts, duration and [team] as the options of robocov run.
+
+    Example: robocov sweep study.toml --out study --dry-run
+    """
+
+    study: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STUDY.toml")]
+    """The study file."""
+    out: Path | None = None
+    """Folder for the results; by default the study file's name without its suffix."""
+    workers: int | None = None
+    """Processes on this machine; by default one a processor."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    retry_failed: bool = False
+    """Do runs again that have failed."""
+    dry_run: bool = False
+    """Count the runs, do one, estimate time and disk space for all, and write nothing."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+    def __post_init__(self) -> None:
+        if self.workers is not None:
+            in_range("--workers", self.workers, 1, 1024)
+            if self.scheduler is not None:
+                raise ParameterError("--workers: those of a cluster are its own, so one of both was wanted")
+
+
+def command(options: Arguments) -> int:
+    """Do the runs, or say what they would take."""
+    from robocov_app.sweep.study_file import read_study
+
+    study = read_study(options.study)
+    out = options.out or Path(options.study.stem)
+    return _rehearse(options, study, out) if options.dry_run else _sweep(options, study, out)
+
+
+def _sweep(options: Arguments, study: Study, out: Path) -> int:
+    from robocov_app.sweep.sweeping import sweep
+
+    totals = sweep(
+        study,
+        out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        retry_failed=options.retry_failed,
+        quiet=options.json,
+    )
+    if options.json:
+        print(json.dumps({"out": str(out), "runs": len(study), **totals._asdict()}))
+    else:
+        words = [f"{totals.done} runs done"]
+        words += [f"{totals.failed} failed"] * (totals.failed > 0)
+        words += [f"{totals.reused} were there already"] * (totals.reused > 0)
+        print(", ".join(words))
+        if totals.failed:
+            print("why they failed is in the column error; --retry-failed does them again")
+        if totals.interrupted:
+            rest = len(study) - totals.done - totals.failed - totals.reused
+            print(f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/")
+        else:
+            print(f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}")
+    return INTERRUPTED if totals.interrupted else 0
+
+
+def _rehearse(options: Arguments, study: Study, out: Path) -> int:
+    from robocov_app.sweep.pool import processors
+    from robocov_app.sweep.rehearsal import rehearsed
+
+    workers = options.workers or processors()
+    if options.scheduler is not None:
+        from robocov_app.sweep.cluster import Cluster
+
+        with Cluster(options.scheduler) as cluster:
+            workers = max(1, cluster.threads)
+    rehearsal = rehearsed(study, out, workers=workers, retry_failed=options.retry_failed)
+    if options.json:
+        print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))
+    else:
+        print_rehearsal(rehearsal, workers)
+    return 0
+
+
+def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
+    """Print what a sweep would take."""
+    from robocov_app.sweep.telling import duration
+
+    for name, count in rehearsal.axes.items():
+        print(f"{name:<20} {count:>7}")
+    print(f"{'runs':<20} {rehearsal.runs:>7}", end="")
+    done = rehearsal.runs - rehearsal.left
+    print(f"   ({done} of them done already)" if done else "")
+    if rehearsal.error is not None:
+        print(f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}")
+    print(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")
+    many = f"on {workers} worker{'s' if workers > 1 else ''}"
+    print(
+        f"all that is left: about {duration(rehearsal.seconds)} {many}; {rehearsal.bytes / 1e6:.0f} MB in all"
+    )

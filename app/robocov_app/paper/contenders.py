@@ -1,0 +1,58 @@
+"""Who is compared: the laws with their gains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+SHARED = {"k_rep": 1.0, "rho_0": 2.0}
+"""Potential parameters that RAPF and RPF share, as in the paper, which does not print its own.
+
+The repulsion then holds a robot that is pulled with 1 N about 0.83 m off a wall."""
+
+SHARED_ATTRACTION = 3.0
+"""RAPF's k_att beside them: a metre from its goal a robot is pulled with 3 N, enough for full speed."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A law with its gains.
+
+    Attributes
+    ----------
+    key : str
+        What it is called in files: "rapf-shared".
+    label : str
+        What it is called on the page.
+    controller : str
+    gains : dict of name to value
+        All that differ from the controller's defaults.
+    """
+
+    key: str
+    label: str
+    controller: str
+    gains: Mapping[str, float | None]
+
+
+RAPF_SHARED = Contender(
+    "rapf-shared",
+    "RAPF, shared gains",
+    "rapf",
+    {**SHARED, "k_att": SHARED_ATTRACTION, "attraction_limit": None},
+)
+RPF_SHARED = Contender("rpf-shared", "RPF, shared gains", "rpf", SHARED)
+LLOYD = Contender("lloyd", "LA", "lloyd", {})
+RAPF_DEFAULT = Contender("rapf-default", "RAPF, robocov's default", "rapf", {})
+
+
+LABELS = {each.key: each.label for each in (RAPF_SHARED, RPF_SHARED, LLOYD, RAPF_DEFAULT)} | {
+    "rapf-best": "RAPF, its best gains",
+    "rpf-best": "RPF, its best gains",
+}
+"""What every contender is called."""
+
+
+def best(controller: str, gains: Mapping[str, float | None]) -> Contender:
+    """Return RAPF or RPF with the gains that were best on the maps of the tuning."""
+    return Contender(f"{controller}-best", LABELS[f"{controller}-best"], controller, dict(gains))

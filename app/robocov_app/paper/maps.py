@@ -1,0 +1,107 @@
+"""The maps of the study, and the same three kinds of starts on all of them.
+
+- ``corner``: a disc near the lower left corner, as in the paper's figures 4 and 6;
+- ``centre``: a disc near the middle;
+- ``uniform``: anywhere in the free space.
+
+The discs are put by a rule, not by hand: of `ROOMY` metres radius (or the next of `RADII` that fits), wholly
+free, as near to the corner, or the middle, of the map's bounding box as can be. In convex regions there is
+also ``tight``, the smallest disc that holds six robots with a little room, as near to the corner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from robocov.environment import Environment
+from robocov.errors import StartError
+from robocov.starts import DiscStart, StartSpec, UniformStart
+
+KINDS = ("corner", "centre", "uniform")
+"""The starts on non-convex maps; all but the last are clustered."""
+
+CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
+"""The starts in convex regions."""
+
+RADII = (0.8, 0.6, 0.45)
+"""Radii of the discs of clustered starts, m; the first that fits is taken."""
+
+TIGHT = 0.35
+"""Radius of the disc of "tight", m: it has room for the centres of six robots, and hardly more."""
+
+NON_CONVEX = (
+    *("blocks-a", "blocks-b", "l-shape", "rooms", "trap", "gaps", "cave", "courtyard", "corridor"),
+    *("museum", "office", "warehouse", "city"),
+)
+"""Bundled maps of the study: all that are not convex, but for ``campus``, which is 120 m wide: at 1 m/s the
+robots would not have arrived when the run ends."""
+
+CONVEX = ("square", "pentagon")
+"""Bundled maps of the convex case."""
+
+SIDE = 10.0
+"""Metres of the square in which regions are drawn by chance."""
+
+_POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
+
+
+def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
+    """Return the map with the study's starts in place of its own.
+
+    Raises
+    ------
+    StartError
+        When no disc of `RADII` fits the map.
+    """
+    return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
+
+
+def convex_region(seed: int) -> Environment:
+    """Return a convex region without obstacles, drawn by chance.
+
+    It is the convex hull of nine points that are uniform in a square of ten metres; hulls below 40 m², and
+    those narrower than 5 m, are drawn again. Coordinates are whole centimetres.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed gives the same region.
+    """
+    rng = np.random.default_rng([seed, 1])
+    while True:
+        points = np.round(rng.uniform(0.0, SIDE, size=(_POINTS, 2)), 2)
+        hull = shapely.convex_hull(shapely.MultiPoint(points))
+        if hull.area >= _LEAST_AREA and _width(hull) >= _LEAST_WIDTH:
+            break
+    ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
+    corners = tuple((float(x), float(y)) for x, y in ring)
+    return Environment(f"convex-{seed}", corners, description="A convex region drawn by chance.")
+
+
+def side_of_share(environment: Environment, robots: int) -> float:
+    """Return the side of a square as large as one robot's share of the free space, m."""
+    return float(np.sqrt(environment.free_area / robots))
+
+
+def _start(environment: Environment, kind: str) -> StartSpec:
+    if kind == "uniform":
+        return UniformStart()
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    wanted = ((low_x + high_x) / 2, (low_y + high_y) / 2) if kind == "centre" else (low_x, low_y)
+    for radius in (TIGHT,) if kind == "tight" else RADII:
+        room = environment.free.geoms[0].buffer(-radius)
+        if not room.is_empty:
+            nearest = shapely.shortest_line(room, shapely.Point(wanted)).coords[0]
+            # whole centimetres are the same on every processor
+            return DiscStart((round(nearest[0], 2), round(nearest[1], 2)), radius)
+    raise StartError(f"map {environment.name!r}: no free disc of {RADII[-1]:g} m radius")
+
+
+def _width(hull: shapely.Polygon) -> float:
+    """Return the length of the shorter side of the smallest rectangle round a polygon."""
+    corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
+    return float(np.hypot(*np.diff(corners[:3], axis=0).T).min())

@@ -1,0 +1,375 @@
+"""The results of a study of the paper as files: figures, ``claims.json`` and the page."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robocov import __version__
+from robocov.atomic import written
+from robocov.errors import OutputError
+from robocov_app.figure_files import save_figure
+from robocov_app.output import finite
+from robocov_app.paper import told
+from robocov_app.paper.asking import QUESTIONS
+from robocov_app.paper.bars import interval_bar
+from robocov_app.paper.claim_plots import claim_figures
+from robocov_app.paper.contenders import RAPF_SHARED, RPF_SHARED
+from robocov_app.paper.figures import NUMBERS, TEXTS, Shown, draw_figure
+from robocov_app.paper.outcomes import Scenario
+from robocov_app.paper.tables import law_rows, map_rows, settled_text
+from robocov_app.paper.verdicts import amount, described
+from robocov_app.paper.words import seen
+from robocov_app.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+    from robocov.record import Record
+    from robocov_app.paper.plan import Plan
+    from robocov_app.paper.studying import Material
+    from robocov_app.paper.verdicts import Claim
+
+PAGE = "index.html"
+
+CLAIMS = "claims.json"
+
+_SUFFIXES = (".png", ".svg", ".pdf")
+
+_REPLAY_BUDGET = 400_000
+"""Bytes of the runs in the page's replay."""
+
+_WORDS = {
+    "claim-1-convex": "RAPF against LA in convex regions: every pair of runs, the median and its interval.",
+    "claim-2-nonconvex": "RAPF against RPF and LA on non-convex maps: every pair of runs, the median and its "
+    "interval. Left of 1 RAPF is better.",
+    "claim-3-gains": "How far the final cost is above the reference for every set of gains, in percent: the "
+    "mean over the maps of the tuning. The best set of each panel is bold.",
+    "claim-4-starts": "The final cost from each kind of starts, by the reference.",
+    "claim-6-gap": "The final cost of every law on the non-convex maps, by the reference.",
+}
+"""What is said of the claims' plots."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """A picture on the page.
+
+    Attributes
+    ----------
+    name : str
+        Of its files in ``figures/``, without suffix.
+    width, height : int, px
+    words : str
+        What it shows.
+    """
+
+    name: str
+    width: int
+    height: int
+    words: str
+
+
+def save_claims(folder: Path, claims: Sequence[Claim]) -> None:
+    """Write ``claims.json``: a list of {claim, verdict, estimate, interval, runs, ...}.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be written.
+    """
+    text = json.dumps([finite(claim.to_json()) for claim in claims], indent=1, ensure_ascii=False)
+    with written(folder / CLAIMS) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+
+
+def save_pictures(
+    folder: Path, runs: Mapping[str, Shown], first: Record, material: Material | None, *, quiet: bool
+) -> dict[str, Image]:
+    """Write all figures to ``figures/``: PNG, SVG and PDF, and a PNG for dark pages.
+
+    Parameters
+    ----------
+    folder : Path
+    runs : dict of name to Shown
+    first : Record
+        Whose first moment is figure 1.
+    material : Material or None
+        None where only the paper's figures are wanted.
+    quiet : bool
+        Tell nothing.
+
+    Raises
+    ------
+    OutputError
+        When something cannot be written.
+    """
+    target = folder / "figures"
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be used for results: {error.strerror or error}") from error
+    light, dark = (_drawn(runs, first, material, theme) for theme in ("light", "dark"))
+    found: dict[str, Image] = {}
+    with progress("figures", len(light), quiet=quiet) as update:
+        for number, (name, (draw, words)) in enumerate(light.items(), start=1):
+            figure = draw()
+            for suffix in _SUFFIXES:
+                save_figure(figure, target / f"{name}{suffix}")
+            save_figure(dark[name][0](), target / f"{name}-dark.png")
+            found[name] = Image(name, round(figure.bbox.width), round(figure.bbox.height), words)
+            update(number)
+    return found
+
+
+def save_page(
+    folder: Path,
+    plan: Plan,
+    images: Mapping[str, Image],
+    runs: Mapping[str, Shown],
+    first: Record,
+    material: Material | None,
+    claims: Sequence[Claim],
+) -> None:
+    """Write ``index.html``, which needs nothing but ``figures/`` beside it.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be written.
+    """
+    content = page(plan, images, runs, first, material, claims)
+    with written(folder / PAGE) as part:
+        part.write_text(content, encoding="utf-8")
+
+
+def page(
+    plan: Plan,
+    images: Mapping[str, Image],
+    runs: Mapping[str, Shown],
+    first: Record,
+    material: Material | None,
+    claims: Sequence[Claim],
+) -> str:
+    """Return the page; the parameters are those of `save_page`."""
+    import jinja2
+    from markupsafe import Markup
+
+    from robocov_app.plot_curves import curve_styles
+    from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
+    from robocov_app.report.theme_css import theme_rules
+
+    assets = Path(__file__).parent / "assets"
+    surroundings = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(assets),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=_held_together,
+    )
+    replays = [
+        ReplayRun(shown.record, shown.history, f"{_CASES[name.partition('/')[0]]}: {shown.record.label}")
+        for name, shown in runs.items()
+    ]
+    order = list(runs)
+    panes = [order.index("b/rapf"), order.index("b/rpf")]
+    styles = curve_styles(run.record.controller for run in replays)
+    own = (assets / "paper.css").read_text(encoding="utf-8")
+    style = theme_rules(":root") + replay_css() + asset("report.css") + own
+    context: dict[str, Any] = {
+        "version": __version__,
+        "style": Markup(style),
+        "quick": plan.name == "quick",
+        "lead": _lead(plan, material),
+        "notice": _notice(plan, material),
+        "sections": _sections(material),
+        "claims": claims,
+        "counts": _counts(claims),
+        "figure_gains": f"{plan.duration:g} s, RAPF {told.gains_text(RAPF_SHARED)}, "
+        f"RPF {told.gains_text(RPF_SHARED)}",
+        "figures": [
+            {
+                "number": text.number,
+                "image": images[f"figure-{text.number}"],
+                "shows": text.shows,
+                "claim": text.claim,
+                "seen": seen(text.number, runs, first),
+            }
+            for text in TEXTS
+        ],
+        "replay": Markup(replay_part(replays, styles, panes, _REPLAY_BUDGET)),
+        "replay_script": Markup(script(replay_js() + "startReplays();")),
+        "questions": _questions(claims, images),
+        "laws": [],
+        "protocol": told.protocol(
+            plan,
+            material.best if material else {},
+            material.runs if material else len(runs),
+            material.failed if material else 0,
+        ),
+        "depends": told.DEPENDS,
+        "errata": told.ERRATA,
+        "citation": told.CITATION,
+        "made": f"Made by robocov {__version__}: robocov paper{' --quick' if plan.name == 'quick' else ''}",
+        "bar": interval_bar,
+        "amount": amount,
+        "described": described,
+        "settled_text": settled_text,
+    }
+    if material is not None:
+        context |= {
+            "laws": law_rows(material.claims),
+            "maps": map_rows(material.claims, material.references),
+            "map_count": len(set(material.claims.maps)),
+            "restarts": plan.restarts,
+            "failures": _failures(material),
+            "failure_words": _failure_words(material),
+        }
+    return surroundings.get_template("paper.html.jinja").render(context)
+
+
+_QUESTION_NAMES = {
+    1: "Convex regions",
+    2: "RAPF and RPF",
+    3: "Gains",
+    4: "Starts",
+    5: "Lloyd's algorithm",
+    6: "Optimum",
+}
+"""What the questions are called in the page's contents."""
+
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
+
+
+def _held_together(value: object) -> object:
+    """Return a text in which no line breaks between a number and its unit."""
+    if isinstance(value, str) and not hasattr(value, "__html__"):
+        return _UNIT.sub("\N{NO-BREAK SPACE}", value)
+    return value
+
+
+_CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}
+"""Which figure shows which runs."""
+
+
+def _drawn(
+    runs: Mapping[str, Shown], first: Record, material: Material | None, theme: str
+) -> dict[str, tuple[Callable[[], Figure], str]]:
+    """Return how every picture is drawn, and what it shows."""
+
+    def of(number: int) -> Callable[[], Figure]:
+        return lambda: draw_figure(number, runs, first, theme)
+
+    drawn = {
+        f"figure-{text.number}": (of(text.number), f"{text.shows} {seen(text.number, runs, first)}")
+        for text in TEXTS
+    }
+    assert len(drawn) == len(NUMBERS)
+    if material is not None:
+        drawn |= {name: (draw, _WORDS[name]) for name, draw in claim_figures(material, theme).items()}
+    return drawn
+
+
+def _lead(plan: Plan, material: Material | None) -> str:
+    if material is None:
+        return "Figures 1 to 8 on environments of the same kinds."
+    maps = len(set(material.claims.maps)) + len(set(material.convex.maps)) + len(plan.tuning)
+    return (
+        f"Figures 1 to 8 on environments of the same kinds, and its claims tested in {material.runs:,} "
+        f"simulated runs on {maps} maps."
+    )
+
+
+def _notice(plan: Plan, material: Material | None) -> str:
+    if material is None:
+        return "Only the figures were asked for: without --figures-only the claims are tested too."
+    if plan.name == "quick":
+        return (
+            "This is the quick study: it shows that everything works and where things point. Its maps, "
+            "starts "
+            "and seeds are too few for more; the full study is robocov paper without --quick."
+        )
+    return ""
+
+
+def _sections(material: Material | None) -> list[tuple[str, str]]:
+    head = [("verdicts", "Verdicts")] if material else []
+    parts = [("figures", "Figures"), ("replay", "Replay")]
+    if material:
+        parts += [(f"question-{number}", name) for number, name in _QUESTION_NAMES.items()]
+        parts += [("gaps", "Gap to the reference"), ("failures", "Where RAPF fails")]
+    return [*head, *parts, ("protocol", "Protocol"), ("errata", "Errata")]
+
+
+def _counts(claims: Sequence[Claim]) -> str:
+    words = [claim.verdict for claim in claims]
+    parts = [
+        f"{words.count(word)} {text}"
+        for word, text in (
+            ("holds", "hold"),
+            ("holds partly", "hold partly"),
+            ("does not hold", "do not hold"),
+            ("undecided", "are undecided"),
+        )
+        if word in words
+    ]
+    return f"Of {len(claims)} claims {', '.join(parts)}."
+
+
+def _questions(claims: Sequence[Claim], images: Mapping[str, Image]) -> list[dict[str, Any]]:
+    found = []
+    for number, text in QUESTIONS.items():
+        own = [claim for claim in claims if claim.part == number]
+        image = next((each for name, each in images.items() if name.startswith(f"claim-{number}-")), None)
+        if own:
+            found.append({"number": number, "text": text, "claims": own, "image": image})
+    return found
+
+
+def _failures(material: Material) -> list[dict[str, Any]]:
+    from markupsafe import Markup
+
+    from robocov_app.report.pictures import run_picture
+
+    return [
+        {
+            "picture": Markup(run_picture(record, None, 300, 240, numbers=True)),
+            "title": f"{scenario.map}, start {scenario.start}, seed {scenario.seed}",
+            "words": _failure(material, scenario),
+        }
+        for scenario, record in material.worst
+    ]
+
+
+def _failure(material: Material, scenario: Scenario) -> str:
+    outcomes = material.claims
+    k = outcomes.scenarios.index(scenario)
+    gaps = ", ".join(
+        f"{label} {amount(float(outcomes.of(law, 'gap')[k]), '%')}"
+        for law, label in (("rapf-best", "at its best gains"), ("lloyd", "LA"), ("rpf-shared", "RPF"))
+    )
+    held = outcomes.of("rapf-shared", "stuck")[k]
+    return (
+        f"{amount(float(outcomes.of('rapf-shared', 'gap')[k]), '%')} above the reference ({gaps}); "
+        f"{held:.0f} of {len(material.worst[0][1].team)} robots rest away from their goals."
+    )
+
+
+def _failure_words(material: Material) -> str:
+    gap = material.claims.of("rapf-shared", "gap")
+    gap = gap[gap == gap]
+    above = [amount(float((gap > bound).mean()), "%") for bound in (0.25, 0.5, 1.0)]
+    return (
+        f"With the shared gains {above[0]} of the runs end more than 25 % above the reference, {above[1]} "
+        f"more "
+        f"than 50 %, and {above[2]} at more than twice its cost. The goal of a robot, the centroid of its "
+        f"cell, "
+        f"may lie behind a wall or in it; then attraction and repulsion balance in front of the wall and the "
+        f"robot rests there. These are the worst runs, one a map: starts green, trajectories red, final "
+        f"positions blue."
+    )

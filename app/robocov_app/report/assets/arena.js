@@ -1,0 +1,207 @@
+// One moment of a run, drawn on a canvas.
+
+const COLOURS = [
+  "background", "panel", "ink", "faint", "grid", "line", "boundary", "obstacle", "obstacle-edge", "cell-edge", "start",
+  "final", "on-final", "trajectory", "ring", "rapf", "rpf", "lloyd", "other-0", "other-1", "other-2",
+  ...Array.from({ length: 9 }, (_, k) => `cell-${k}`),
+];
+const ONE_HUE_EACH = 9;
+const MAP_COLOURS = 6;
+const FONT = "system-ui, sans-serif";
+
+function lookOf(element) {
+  const style = getComputedStyle(element);
+  return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--rc-${name}`).trim()]));
+}
+
+/** Makes a canvas as sharp as its screen and returns its context in CSS pixels, null while it has no size. */
+function prepared(canvas) {
+  const { clientWidth: width, clientHeight: height } = canvas;
+  if (!width || !height) return null;
+  const dense = Math.max(window.devicePixelRatio || 1, 1);
+  const size = [Math.round(width * dense), Math.round(height * dense)];
+  if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+  const context = canvas.getContext("2d");
+  context.setTransform(dense, 0, 0, dense, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/** The part of a convex polygon [x, y, ...] that is nearer to robot i than to any other: equation (1). */
+function cellOf(region, places, i) {
+  const [x, y] = [places[2 * i], places[2 * i + 1]];
+  const others = [];
+  for (let j = 0; j < places.length / 2; j += 1) {
+    const [dx, dy] = [places[2 * j] - x, places[2 * j + 1] - y];
+    const square = dx * dx + dy * dy;
+    if (j !== i && square > 1e-18) others.push([square, dx, dy]);
+  }
+  others.sort((a, b) => a[0] - b[0]);
+  let cell = Array.from(region);
+  for (const [square, dx, dy] of others) {
+    let farthest = 0;
+    for (let k = 0; k < cell.length; k += 2) {
+      farthest = Math.max(farthest, (cell[k] - x) ** 2 + (cell[k + 1] - y) ** 2);
+    }
+    if (square > 4 * farthest) break; // its bisector passes by, and those of the others beyond it too
+    cell = clipped(cell, x, y, dx, dy, square / 2);
+  }
+  return cell;
+}
+
+/** The part of a convex polygon where (q - p) . d <= limit. */
+function clipped(polygon, x, y, dx, dy, limit) {
+  const kept = [];
+  const size = polygon.length;
+  for (let k = 0; k < size; k += 2) {
+    const [ax, ay] = [polygon[k], polygon[k + 1]];
+    const [bx, by] = [polygon[(k + 2) % size], polygon[(k + 3) % size]];
+    const a = (ax - x) * dx + (ay - y) * dy - limit;
+    const b = (bx - x) * dx + (by - y) * dy - limit;
+    if (a <= 0) kept.push(ax, ay);
+    if (a < 0 !== b < 0 && a !== 0 && b !== 0) {
+      const part = a / (a - b);
+      kept.push(ax + part * (bx - ax), ay + part * (by - ay));
+    }
+  }
+  return kept;
+}
+
+/** Where metres are on a canvas: the whole region, as large as it goes, with a margin. */
+function frameOf(plan, width, height, margin = 2) {
+  const zoom = Math.min((width - 2 * margin) / plan.width, (height - 2 * margin) / plan.height);
+  const left = (width - zoom * plan.width) / 2;
+  const top = (height - zoom * plan.height) / 2;
+  return { zoom, x: (value) => left + (value - plan.left) * zoom, y: (value) => top + (plan.high - value) * zoom };
+}
+
+function traced(frame, rings) {
+  const path = new Path2D();
+  for (const ring of rings) {
+    for (let k = 0; k < ring.length; k += 2) {
+      path[k ? "lineTo" : "moveTo"](frame.x(ring[k]), frame.y(ring[k + 1]));
+    }
+    path.closePath();
+  }
+  return path;
+}
+
+/** Radii in pixels: readable where there is room, in a crowd down to true size. */
+function drawnRadii(run, places, frame, most) {
+  return run.radii.map((radius, i) => {
+    let nearest = Infinity;
+    for (let j = 0; j < run.robots; j += 1) {
+      if (j === i) continue;
+      nearest = Math.min(nearest, Math.hypot(places[2 * i] - places[2 * j], places[2 * i + 1] - places[2 * j + 1]));
+    }
+    return Math.max(radius * frame.zoom, Math.min(Math.max((nearest * frame.zoom) / 2, 2.3), most));
+  });
+}
+
+/** Draws a run at a time. `show` says what: cells, trajectories, goals. */
+function drawArena(canvas, run, time, look, show) {
+  const context = prepared(canvas);
+  if (!context) return;
+  const frame = frameOf(run.plan, canvas.clientWidth, canvas.clientHeight);
+  const places = run.placesAt(time);
+  const region = traced(frame, [run.plan.region]);
+  context.lineJoin = "round";
+  context.fillStyle = look.background;
+  context.fill(region);
+  if (show.cells) drawCells(context, run, places, frame, look);
+  context.lineWidth = 1;
+  context.fillStyle = look.obstacle;
+  context.strokeStyle = look["obstacle-edge"];
+  for (const rings of run.plan.blocked) {
+    const path = traced(frame, rings);
+    context.fill(path, "evenodd");
+    context.stroke(path);
+  }
+  context.lineWidth = 2;
+  context.strokeStyle = look.boundary;
+  context.stroke(region);
+  if (show.trajectories && run.path) drawTrajectories(context, run, time, places, frame, look);
+  drawStarts(context, run, frame, look);
+  const radii = drawnRadii(run, places, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
+  if (show.goals && run.goals) drawGoals(context, run.placesAt(time, run.goals), places, radii, frame, look);
+  drawRobots(context, run, places, radii, frame, look);
+}
+
+function drawCells(context, run, places, frame, look) {
+  const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLOURS;
+  context.lineWidth = 1;
+  context.strokeStyle = look["cell-edge"];
+  for (let i = 0; i < run.robots; i += 1) {
+    const path = traced(frame, [cellOf(run.plan.region, places, i)]);
+    context.fillStyle = look[`cell-${i % hues}`];
+    context.fill(path);
+    context.stroke(path);
+  }
+}
+
+function drawTrajectories(context, run, time, places, frame, look) {
+  const { values, width } = run.where;
+  const last = run.where.before(time);
+  const { left, low, width: wide, height: high } = run.plan;
+  context.lineWidth = run.robots > 30 ? 1.2 : 2;
+  context.lineCap = "round";
+  context.strokeStyle = look.trajectory;
+  context.beginPath();
+  for (let i = 0; i < run.robots; i += 1) {
+    for (let row = 0; row <= last; row += 1) {
+      const x = frame.x(left + values[row * width + 2 * i] * wide);
+      const y = frame.y(low + values[row * width + 2 * i + 1] * high);
+      context[row ? "lineTo" : "moveTo"](x, y);
+    }
+    context.lineTo(frame.x(places[2 * i]), frame.y(places[2 * i + 1]));
+  }
+  context.stroke();
+}
+
+function drawStarts(context, run, frame, look) {
+  const begin = run.placesAt(0);
+  context.lineWidth = 1.8;
+  context.strokeStyle = look.start;
+  for (let i = 0; i < run.robots; i += 1) {
+    context.beginPath();
+    context.arc(frame.x(begin[2 * i]), frame.y(begin[2 * i + 1]), 4, 0, 2 * Math.PI);
+    context.stroke();
+  }
+}
+
+function drawGoals(context, goals, places, radii, frame, look) {
+  context.lineWidth = 1.6;
+  context.strokeStyle = look.ink;
+  context.beginPath();
+  for (let i = 0; i < radii.length; i += 1) {
+    const [x, y] = [frame.x(goals[2 * i]), frame.y(goals[2 * i + 1])];
+    const away = Math.hypot(x - frame.x(places[2 * i]), y - frame.y(places[2 * i + 1]));
+    if (!(away > radii[i])) continue; // there, or no goal at all
+    context.moveTo(x - 5, y);
+    context.lineTo(x + 5, y);
+    context.moveTo(x, y - 5);
+    context.lineTo(x, y + 5);
+  }
+  context.stroke();
+}
+
+function drawRobots(context, run, places, radii, frame, look) {
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  for (let i = 0; i < run.robots; i += 1) {
+    const [x, y, radius] = [frame.x(places[2 * i]), frame.y(places[2 * i + 1]), radii[i]];
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.fillStyle = look.final;
+    context.fill();
+    context.lineWidth = Math.min(1.5, 0.25 * radius);
+    context.strokeStyle = look.ring;
+    context.stroke();
+    const number = String(run.numbers[i]);
+    const size = radius * [1.35, 1.15, 0.9, 0.7][Math.min(number.length, 4) - 1];
+    if (size < 6) continue;
+    context.fillStyle = look["on-final"];
+    context.font = `700 ${size}px ${FONT}`;
+    context.fillText(number, x, y + 0.06 * size);
+  }
+}

@@ -1,0 +1,166 @@
+// Cost curves of the runs that are shown, with a cursor at the time that is shown.
+
+const SMALL = 11.5;
+
+/** Round numbers within [low, high], about `wanted` of them. */
+function roundTicks(low, high, wanted) {
+  const rough = (high - low) / Math.max(wanted, 1);
+  if (!(rough > 0)) return [low];
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((factor) => factor * power).find((value) => value >= rough * 0.999);
+  const ticks = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) ticks.push(k * step);
+  return ticks;
+}
+
+function plain(value) {
+  return String(Number(value.toPrecision(6)));
+}
+
+/** Heights at least `gap` apart, in the same order, within [low, high] as far as there is room. */
+function spreadApart(heights, gap, low, high) {
+  const order = heights.map((_, k) => k).sort((a, b) => heights[a] - heights[b]);
+  const result = [...heights];
+  order.forEach((k, rank) => {
+    const floor = rank ? result[order[rank - 1]] + gap : low;
+    result[k] = Math.max(result[k], floor);
+  });
+  [...order].reverse().forEach((k, rank, reversed) => {
+    const ceiling = rank ? result[reversed[rank - 1]] - gap : high;
+    result[k] = Math.min(result[k], ceiling);
+  });
+  return result;
+}
+
+/** Limits of the chart in data, as the plots have them. */
+function limitsOf(runs) {
+  let [low, high, end] = [Infinity, -Infinity, 0];
+  for (const run of runs) {
+    end = Math.max(end, run.end);
+    if (!run.range) continue;
+    low = Math.min(low, run.range.low);
+    high = Math.max(high, run.range.high);
+  }
+  if (!(low <= high)) return { low: 0, high: 1, end };
+  const room = high > low ? 0.08 * (high - low) : 0.1 * Math.max(Math.abs(high), 1e-3);
+  return { low: low < 0.4 * high ? 0 : low - room, high: high + room, end };
+}
+
+function labelOf(run, number, numbered) {
+  return numbered ? `${number} ${run.label}` : run.label;
+}
+
+/** Draws the chart; returns what turns a pixel into a time. */
+function drawChart(canvas, runs, time, look) {
+  const context = prepared(canvas);
+  if (!context) return () => time;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  const { low, high, end } = limitsOf(runs);
+  context.font = `600 ${SMALL}px ${FONT}`;
+  const labels = runs.map((run, k) => (run.cost ? labelOf(run, k + 1, runs.length > 1) : ""));
+  const wide = Math.max(...labels.map((label) => context.measureText(`${label}  00.000`).width), 0);
+  const box = { left: 36, top: 10, right: width - Math.min(wide + 22, 0.42 * width), bottom: height - 22 };
+  const x = (value) => box.left + (value / (end || 1)) * (box.right - box.left);
+  const y = (value) => box.bottom - ((value - low) / (high - low)) * (box.bottom - box.top);
+  drawAxes(context, box, x, y, { low, high, end }, look);
+  runs.forEach((run, k) => {
+    if (run.cost) drawCurve(context, run, x, y, look, Math.min(runs.length - 1 - k, 3));
+  });
+  const drawn = runs.filter((run) => run.cost);
+  context.lineWidth = 1;
+  context.strokeStyle = look.ink;
+  context.beginPath();
+  context.moveTo(Math.round(x(time)) + 0.5, box.top - 6);
+  context.lineTo(Math.round(x(time)) + 0.5, box.bottom);
+  context.stroke();
+  const values = drawn.map((run) => run.costAt(time));
+  drawn.forEach((run, k) => {
+    if (Number.isFinite(values[k])) drawMark(context, run.mark, x(Math.min(time, run.end)), y(values[k]), 4, look[run.style], look);
+  });
+  const wanted = values.map((value) => (Number.isFinite(value) ? y(value) : box.bottom));
+  const heights = spreadApart(wanted, 15, box.top + 4, box.bottom - 2);
+  context.font = `600 ${SMALL}px ${FONT}`;
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  const names = labels.filter((label) => label);
+  drawn.forEach((run, k) => {
+    const said = Number.isFinite(values[k]) ? values[k].toFixed(3) : "–";
+    context.fillStyle = look[run.style];
+    const value = `  ${said}`;
+    const room = width - box.right - 14 - context.measureText(value).width;
+    context.fillText(cutTo(context, names[k], room) + value, box.right + 12, heights[k]);
+  });
+  return (pixel) => Math.min(Math.max((pixel - box.left) / (box.right - box.left), 0), 1) * end;
+}
+
+function cutTo(context, text, room) {
+  if (context.measureText(text).width <= room) return text;
+  let kept = text;
+  while (kept && context.measureText(`${kept}…`).width > room) kept = kept.slice(0, -1);
+  return `${kept}…`;
+}
+
+function drawAxes(context, box, x, y, { low, high, end }, look) {
+  context.lineWidth = 1;
+  context.font = `${SMALL}px ${FONT}`;
+  context.fillStyle = look.faint;
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  for (const value of roundTicks(low, high, Math.max((box.bottom - box.top) / 24, 2))) {
+    const level = Math.round(y(value)) + 0.5;
+    context.strokeStyle = value === 0 ? look.faint : look.line;
+    context.beginPath();
+    context.moveTo(box.left, level);
+    context.lineTo(box.right, level);
+    context.stroke();
+    context.fillText(plain(value), box.left - 7, level);
+  }
+  context.textAlign = "center";
+  context.textBaseline = "alphabetic";
+  const ticks = roundTicks(0, end, Math.max((box.right - box.left) / 48, 2));
+  ticks.forEach((value, k) => {
+    context.fillText(k === ticks.length - 1 ? `${plain(value)} s` : plain(value), x(value), box.bottom + 16);
+  });
+}
+
+function drawCurve(context, run, x, y, look, above) {
+  const { low, high } = run.range;
+  const { cost } = run;
+  context.lineWidth = 1.8 + 0.7 * above; // the first is the widest and lowest: none hides another
+  context.strokeStyle = look[run.style];
+  context.setLineDash(run.dashes.map((part) => part * 1.8));
+  context.lineCap = "butt";
+  context.beginPath();
+  let begun = false;
+  for (let row = 0; row < cost.count; row += 1) {
+    const value = low + cost.values[row] * (high - low);
+    if (Number.isFinite(value)) context[begun ? "lineTo" : "moveTo"](x(cost.timeOf(row)), y(value));
+    begun = Number.isFinite(value);
+  }
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/** The mark of a curve: a shape of its own beside the colour of its own. */
+function drawMark(context, mark, x, y, size, colour, look) {
+  const corners = { s: [45, 4], D: [0, 4], "^": [-90, 3], v: [90, 3] }[mark];
+  context.beginPath();
+  if (mark === "P") {
+    context.rect(x - size, y - size / 2.6, 2 * size, size / 1.3);
+    context.rect(x - size / 2.6, y - size, size / 1.3, 2 * size);
+  } else if (corners) {
+    const [turn, count] = corners;
+    for (let k = 0; k < count; k += 1) {
+      const angle = ((turn + (360 * k) / count) * Math.PI) / 180;
+      context[k ? "lineTo" : "moveTo"](x + 1.3 * size * Math.cos(angle), y + 1.3 * size * Math.sin(angle));
+    }
+    context.closePath();
+  } else {
+    context.arc(x, y, size, 0, 2 * Math.PI);
+  }
+  context.strokeStyle = look.background;
+  context.lineWidth = 2;
+  context.stroke();
+  context.fillStyle = colour;
+  context.fill();
+}

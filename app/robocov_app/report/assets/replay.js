@@ -1,0 +1,343 @@
+// The replay: up to four runs in lockstep, their costs, and what moves them.
+
+const MOST_PANES = 4;
+const GAP = 16;
+const WORDS = 68; // height of what stands above and below a picture
+const SPEEDS = [0.5, 1, 2, 4, 8, 16];
+const CALM = matchMedia("(prefers-reduced-motion: reduce)");
+
+const ICONS = {
+  play: "M5 3l9 6-9 6z",
+  pause: "M5 3h3v12H5zM10 3h3v12h-3z",
+  start: "M4 3h2v12H4zM15 3v12L7 9z",
+  back: "M12 3v12L4 9z",
+  forward: "M6 3v12l8-6z",
+  end: "M12 3h2v12h-2zM3 3v12l8-6z",
+  add: "M8 3h2v5h5v2h-5v5H8v-5H3V8h5z",
+  remove: "M4.6 3.2L9 7.6l4.4-4.4 1.4 1.4L10.4 9l4.4 4.4-1.4 1.4L9 10.4l-4.4 4.4-1.4-1.4L7.6 9 3.2 4.6z",
+};
+
+function made(tag, attributes = {}, ...content) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...content);
+  return element;
+}
+
+function icon(name) {
+  const holder = document.createElement("template");
+  holder.innerHTML = `<svg viewBox="0 0 18 18" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`;
+  return holder.content.firstChild;
+}
+
+function button(name, label, act) {
+  const element = made("button", { type: "button", class: name, "aria-label": label, title: label }, icon(name));
+  element.addEventListener("click", act);
+  return element;
+}
+
+function choice(label, options, chosen) {
+  const element = made("select", { "aria-label": label });
+  for (const [value, text] of options) element.append(new Option(text, value, false, value === chosen));
+  return element;
+}
+
+/** Columns for pictures side by side, and how wide each may be to stay on the screen together. */
+function columnsFor(count, aspect, width, height) {
+  let best = { columns: 1, wide: 0 };
+  let [most, slot] = [1, width];
+  for (let columns = 1; columns <= count; columns += 1) {
+    const room = (width - (columns - 1) * GAP) / columns;
+    if (columns > 1 && room < 230) break;
+    [most, slot] = [columns, room];
+    const tall = (height - 230) / Math.ceil(count / columns) - WORDS;
+    const wide = Math.min(room, tall * aspect);
+    if (wide > best.wide + 1) best = { columns, wide };
+  }
+  // where they do not fit together, they are at least large enough to be seen
+  const least = Math.min(slot, 420);
+  return best.wide < least ? { columns: most, wide: least } : best;
+}
+
+class Replay {
+  constructor(root, data) {
+    this.root = root;
+    this.plans = data.maps.map((map) => new Plan(map));
+    this.runs = data.runs.map((run) => new Run(run, this.plans[run.map]));
+    this.shown = data.panes.slice(0, MOST_PANES);
+    this.playing = false;
+    this.show = { cells: true, trajectories: true, goals: true };
+    this.time = Infinity;
+    this.build();
+    this.fill();
+    new ResizeObserver(() => this.draw()).observe(this.stage);
+    const again = () => this.recolour();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+    // notebooks change their theme by attributes of the page
+    const watch = new MutationObserver(again);
+    for (const page of [document.documentElement, document.body]) {
+      watch.observe(page, { attributes: true, attributeFilter: ["class", "data-theme", "data-jp-theme-light"] });
+    }
+  }
+
+  get end() {
+    return Math.max(...this.shown.map((k) => this.runs[k].end));
+  }
+
+  get step() {
+    return Math.min(...this.shown.map((k) => this.runs[k].step));
+  }
+
+  build() {
+    this.stage = made("div", { class: "stage", tabindex: "0", role: "group" });
+    this.stage.setAttribute(
+      "aria-label",
+      "Replay. Space plays and pauses, the arrow keys step, Home and End go to the first and last moment.",
+    );
+    this.chart = made("canvas", { class: "chart", role: "img" });
+    this.play = made("button", { type: "button", class: "main" });
+    this.play.addEventListener("click", () => this.toggle());
+    this.slider = made("input", { type: "range", min: "0", step: "any", "aria-label": "Time" });
+    this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
+    this.clock = made("span", { class: "clock" });
+    this.speed = choice("Speed", SPEEDS.map((value) => [String(value), `${value}×`]), "4");
+    this.add = made("button", { type: "button", class: "add" }, icon("add"), "Add a run");
+    this.add.addEventListener("click", () => this.addPane());
+    this.said = made("p", { class: "said", role: "status" });
+    const boxes = ["cells", "trajectories", "goals"].map((name) => this.checkBox(name));
+    const steps = made("div", { class: "steps" });
+    steps.append(
+      button("start", "First moment", () => this.seek(0)),
+      button("back", "One step back", () => this.stepBy(-1)),
+      this.play,
+      button("forward", "One step on", () => this.stepBy(1)),
+      button("end", "Last moment", () => this.seek(this.end)),
+    );
+    const speed = made("label", { class: "speed" }, "Speed ", this.speed);
+    this.controls = made("div", { class: "controls" });
+    this.controls.append(made("div", { class: "transport" }, steps, this.slider, this.clock));
+    this.controls.append(made("div", { class: "settings" }, speed, ...boxes, this.add));
+    const title = made("p", { class: "axis", "aria-hidden": "true" }, "Mean distance to the nearest robot, m");
+    const curves = made("div", { class: "curves" }, title, this.chart);
+    this.live = made("div", { class: "live" }, this.stage, curves, this.controls, this.said);
+    this.root.append(this.live);
+    this.root.addEventListener("keydown", (event) => this.press(event));
+    this.chart.addEventListener("pointerdown", (event) => {
+      this.chart.setPointerCapture(event.pointerId);
+      this.seek(this.timeAt(event.offsetX));
+    });
+    this.chart.addEventListener("pointermove", (event) => {
+      if (this.chart.hasPointerCapture(event.pointerId)) this.seek(this.timeAt(event.offsetX));
+    });
+  }
+
+  checkBox(name) {
+    const box = made("input", { type: "checkbox" });
+    box.checked = this.show[name];
+    box.addEventListener("change", () => {
+      this.show[name] = box.checked;
+      this.draw();
+    });
+    return made("label", { class: name }, box, name[0].toUpperCase() + name.slice(1));
+  }
+
+  /** Makes the panes anew: after a run was added, removed or chosen. */
+  fill() {
+    const { runs, shown } = this;
+    this.time = Math.min(this.time, this.end);
+    this.panes = shown.map((k, place) => this.pane(runs[k], k, place));
+    this.stage.replaceChildren(...this.panes.map((pane) => pane.element));
+    this.add.hidden = shown.length >= Math.min(MOST_PANES, runs.length);
+    this.controls.querySelector(".goals").hidden = !shown.some((k) => runs[k].goals);
+    this.slider.max = String(this.end);
+    this.chart.parentElement.hidden = !shown.some((k) => runs[k].cost);
+    this.recolour();
+    this.update();
+    this.describe();
+  }
+
+  pane(run, k, place) {
+    const canvas = made("canvas", { role: "img" });
+    const mark = made("canvas", { class: "mark", "aria-hidden": "true" });
+    const head = made("div", { class: "head" }, mark);
+    if (this.runs.length > 1) {
+      const names = this.runs.map((other, i) => [String(i), other.title]);
+      const list = choice(`Run in pane ${place + 1}`, names, String(k));
+      list.addEventListener("change", () => {
+        this.shown[place] = Number(list.value);
+        this.fill();
+        this.panes[place].element.querySelector("select").focus();
+      });
+      head.append(list);
+    } else {
+      head.append(made("strong", {}, run.title));
+    }
+    if (this.shown.length > 1) {
+      head.append(
+        button("remove", `Remove pane ${place + 1}`, () => {
+          this.shown.splice(place, 1);
+          this.fill();
+          this.stage.focus();
+        }),
+      );
+    }
+    const [value, note] = [made("strong"), made("span")];
+    const element = made("div", { class: "pane" }, head, canvas, made("p", { class: "facts" }, value, note));
+    canvas.style.aspectRatio = `${run.plan.width} / ${run.plan.height}`;
+    return { element, canvas, mark, value, note, run };
+  }
+
+  addPane() {
+    const free = this.runs.map((_, k) => k).filter((k) => !this.shown.includes(k));
+    const { plan } = this.runs[this.shown.at(-1)];
+    this.shown.push(free.find((k) => this.runs[k].plan === plan) ?? free[0]);
+    this.fill();
+    this.panes.at(-1).element.querySelector("select").focus();
+  }
+
+  /** Shows one run in place of the last pane, unless it is there. */
+  present(k) {
+    if (!this.shown.includes(k)) {
+      if (this.shown.length < MOST_PANES) this.shown.push(k);
+      else this.shown[MOST_PANES - 1] = k;
+      this.fill();
+    }
+    this.stage.focus();
+  }
+
+  toggle() {
+    if (this.playing) {
+      this.stop();
+      return;
+    }
+    if (this.time >= this.end) this.time = 0;
+    this.playing = true;
+    this.update();
+    let before = null;
+    let ahead = this.time;
+    const frame = (now) => {
+      if (!this.playing) return;
+      // a page that was hidden goes on where it was
+      const passed = before === null ? 0 : Math.min((now - before) / 1000, 0.1);
+      before = now;
+      ahead = Math.min(ahead + passed * Number(this.speed.value), this.end);
+      // who wants little motion gets pictures one after the other
+      const held = CALM.matches && ahead < this.end && ahead - this.time < Number(this.speed.value) * 0.5;
+      if (!held) this.time = ahead;
+      if (!held) this.update();
+      if (ahead >= this.end) this.stop();
+      else requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  stop() {
+    this.playing = false;
+    this.update();
+    this.describe();
+  }
+
+  seek(time) {
+    this.playing = false;
+    this.time = Math.min(Math.max(time, 0), this.end);
+    this.update();
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.describe(), 500); // one word for a whole drag
+  }
+
+  stepBy(count) {
+    const rows = this.time / this.step;
+    const next = count > 0 ? Math.floor(rows + 1e-6) + count : Math.ceil(rows - 1e-6) + count;
+    this.seek(next * this.step);
+  }
+
+  press(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select")) return;
+    const inTime = event.target === this.stage || event.target === this.slider;
+    const acts = {
+      " ": inTime && (() => this.toggle()),
+      ",": () => this.stepBy(-1),
+      ".": () => this.stepBy(1),
+      ArrowLeft: inTime && (() => this.stepBy(event.shiftKey ? -10 : -1)),
+      ArrowRight: inTime && (() => this.stepBy(event.shiftKey ? 10 : 1)),
+      Home: inTime && (() => this.seek(0)),
+      End: inTime && (() => this.seek(this.end)),
+    };
+    if (!acts[event.key]) return;
+    event.preventDefault();
+    event.stopPropagation(); // a notebook has keys of its own
+    acts[event.key]();
+  }
+
+  recolour() {
+    this.look = lookOf(this.root);
+    this.draw();
+  }
+
+  /** Brings controls and pictures to the present time. */
+  update() {
+    const [time, end] = [this.time.toFixed(1), this.end.toFixed(1)];
+    this.slider.value = String(this.time);
+    this.slider.setAttribute("aria-valuetext", `${time} of ${end} seconds`);
+    this.clock.textContent = `${time} / ${end} s`;
+    if (this.play.dataset.playing !== String(this.playing)) {
+      this.play.dataset.playing = String(this.playing);
+      this.play.replaceChildren(icon(this.playing ? "pause" : "play"), this.playing ? "Pause" : "Play");
+    }
+    for (const { run, value, note } of this.panes) {
+      const cost = run.costAt(this.time);
+      const ended = this.time > run.end ? `, ended at ${run.end.toFixed(1)} s` : "";
+      value.textContent = Number.isFinite(cost) ? `${cost.toFixed(3)} m` : "";
+      note.textContent = Number.isFinite(cost) ? ` mean distance${ended}` : ended.slice(2);
+    }
+    this.draw();
+  }
+
+  /** Says in words what is seen; never while it plays. */
+  describe() {
+    if (this.playing) return;
+    const at = `At ${this.time.toFixed(1)} s`;
+    const words = this.panes.map(({ run, canvas }) => {
+      const cost = run.costAt(this.time);
+      const distance = Number.isFinite(cost) ? `mean distance to the nearest robot ${cost.toFixed(3)} m` : "cost not known";
+      const robots = run.robots === 1 ? "1 robot" : `${run.robots} robots`;
+      canvas.setAttribute("aria-label", `${run.title}: ${robots} on map ${run.plan.name}. ${at}, ${distance}. ${run.facts}`.trim());
+      return `${run.label}: ${distance}`;
+    });
+    const curves = this.panes.filter(({ run }) => run.cost).map(({ run }) => {
+      const [first, last] = [run.costAt(0), run.costAt(run.end)].map((value) => value.toFixed(3));
+      return `${run.title} from ${first} m to ${last} m after ${run.end.toFixed(1)} s`;
+    });
+    this.chart.setAttribute("aria-label", `Mean distance to the nearest robot against time. ${curves.join("; ")}.`);
+    this.said.textContent = `${at}: ${words.join("; ")}`;
+  }
+
+  draw() {
+    if (!this.look) return;
+    const width = this.stage.clientWidth;
+    if (!width) return;
+    const aspect = Math.min(...this.panes.map(({ run }) => run.plan.width / run.plan.height));
+    const { columns, wide } = columnsFor(this.panes.length, aspect, width, window.innerHeight);
+    const layout = `repeat(${columns}, minmax(0, ${Math.floor(wide)}px))`;
+    if (this.stage.style.gridTemplateColumns !== layout) this.stage.style.gridTemplateColumns = layout;
+    for (const { run, canvas, mark } of this.panes) {
+      drawArena(canvas, run, this.time, this.look, this.show);
+      const context = prepared(mark);
+      if (context) drawMark(context, run.mark, 8, 8, 4.5, this.look[run.style], this.look);
+    }
+    const runs = this.panes.map(({ run }) => run);
+    this.timeAt = drawChart(this.chart, runs, this.time, this.look);
+  }
+}
+
+/** Starts the replays of the page that are not started yet; returns them by their elements. */
+function startReplays() {
+  const started = new Map();
+  for (const root of document.querySelectorAll(".robocov-replay:not([data-live])")) {
+    const data = root.querySelector('script[type="application/json"]');
+    if (!data) continue;
+    root.setAttribute("data-live", "");
+    started.set(root, new Replay(root, JSON.parse(data.textContent)));
+  }
+  return started;
+}

@@ -1,0 +1,84 @@
+// The page round the replays: pictures that open large, and what is printed.
+
+/** The large picture of a run, with the runs before and after it. */
+class Enlarged {
+  constructor() {
+    this.title = made("h2");
+    this.canvas = made("canvas", { role: "img" });
+    this.facts = made("p", { class: "facts" });
+    this.watch = made("button", { type: "button", class: "watch-run" }, icon("play"), "Watch in the replay");
+    this.back = button("back", "The run before", () => this.move(-1));
+    this.forward = button("forward", "The next run", () => this.move(1));
+    const close = button("remove", "Close", () => this.dialog.close());
+    const head = made("div", { class: "head" }, this.title, this.back, this.forward, close);
+    this.dialog = made("dialog", { class: "robocov-replay enlarged" }, head, this.canvas, this.facts, this.watch);
+    this.dialog.setAttribute("data-live", "");
+    document.body.append(this.dialog);
+    this.watch.addEventListener("click", () => {
+      this.opener = null; // the focus goes to the replay
+      this.dialog.close();
+      this.replay.present(this.run);
+      this.replay.root.scrollIntoView({ behavior: CALM.matches ? "auto" : "smooth", block: "start" });
+    });
+    this.dialog.addEventListener("close", () => this.opener?.focus());
+    this.dialog.addEventListener("click", (event) => {
+      if (event.target === this.dialog) this.dialog.close(); // beside its content
+    });
+    this.dialog.addEventListener("keydown", (event) => {
+      const turn = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (turn) this.move(turn);
+    });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  open(replay, run, opener) {
+    Object.assign(this, { replay, opener, count: replay.runs.length });
+    this.dialog.showModal();
+    this.present(run);
+    this.dialog.querySelector(".remove").focus();
+  }
+
+  move(turn) {
+    this.present((this.run + turn + this.count) % this.count);
+  }
+
+  present(k) {
+    this.run = k;
+    const run = this.replay.runs[k];
+    const cost = run.costAt(run.end);
+    const final = Number.isFinite(cost) ? `Mean distance ${cost.toFixed(3)} m after ${run.end.toFixed(1)} s. ` : "";
+    this.title.textContent = run.title;
+    this.facts.textContent = `${final}${run.facts}`;
+    this.canvas.setAttribute("aria-label", `${run.title}: trajectories of all robots. ${final}${run.facts}`);
+    this.canvas.style.aspectRatio = `${run.plan.width} / ${run.plan.height}`;
+    // as large as the screen allows, whatever the shape of the map
+    this.canvas.style.maxWidth = `calc((100vh - 210px) * ${run.plan.width / run.plan.height})`;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.dialog.open) return;
+    const run = this.replay.runs[this.run];
+    drawArena(this.canvas, run, run.end, lookOf(this.dialog), { cells: true, trajectories: true, goals: true });
+  }
+}
+
+function startReport(replays) {
+  const enlarged = new Enlarged();
+  for (const [root, replay] of replays) {
+    const thumbnails = root.closest(".result").querySelectorAll(".thumbnails button");
+    for (const thumbnail of thumbnails) {
+      thumbnail.addEventListener("click", () => enlarged.open(replay, Number(thumbnail.dataset.run), thumbnail));
+    }
+  }
+  // what is folded away is printed all the same
+  let folded = [];
+  addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("details:not([open])")];
+    for (const details of folded) details.open = true;
+  });
+  addEventListener("afterprint", () => {
+    for (const details of folded) details.open = false;
+  });
+}

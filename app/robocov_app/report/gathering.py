@@ -1,0 +1,369 @@
+"""Results from the disk, all in one form: a run, a comparison or a sweep is a list of entries."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+
+from robocov.controllers import CONTROLLERS, gains_of
+from robocov.errors import InputError, RobocovError, shown
+from robocov.mapfile import from_json
+from robocov.metrics import mean_over_run
+from robocov.record import Record
+from robocov.results import read_history, read_results
+from robocov_app.saved import load_saved, roster_of
+from robocov_app.sweep.study import TEAM
+from robocov_app.sweep.table import gain_column, team_column
+
+if TYPE_CHECKING:
+    from robocov.environment import Environment
+    from robocov.metrics import CostHistory
+    from robocov_app.saved import Saved
+
+Kind: TypeAlias = Literal["run", "comparison", "sweep"]
+
+FIGURES = (
+    *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
+    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
+)
+"""What is known of a run in numbers, by the names of the columns of a sweep's table."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One run of a result.
+
+    Attributes
+    ----------
+    map, controller, label : str
+        `label` is the controller's name as shown to people.
+    robots : int
+    team : tuple of (name, value)
+        Parameters of the team of which the result has several values; None for no limit.
+    start : str or None
+    seed : int or None
+    gains : tuple of (name, value)
+    figures : dict of name to value
+        `FIGURES`, None where not known. Empty where the run failed.
+    error : str or None
+        Why it failed.
+    folder : Path
+    """
+
+    map: str
+    controller: str
+    label: str
+    robots: int
+    team: tuple[tuple[str, float | None], ...]
+    start: str | None
+    seed: int | None
+    gains: tuple[tuple[str, float | None], ...]
+    figures: Mapping[str, float | None] = field(compare=False)
+    error: str | None
+    folder: Path
+
+    @property
+    def final(self) -> float:
+        """Mean distance to the nearest robot at the end, m; nan where there is none."""
+        value = self.figures.get("mean_distance_m")
+        return float("nan") if value is None else float(value)
+
+    @property
+    def setting(self) -> tuple[object, ...]:
+        """What costs can be compared on: map, number of robots, team."""
+        return self.map, self.robots, self.team
+
+    @property
+    def case(self) -> tuple[object, ...]:
+        """What pairs of runs share: the setting, the start and the seed."""
+        return *self.setting, self.start, self.seed
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What one folder holds.
+
+    Attributes
+    ----------
+    kind : {"run", "comparison", "sweep"}
+    folder : Path
+    entries : tuple of Entry
+    maps : dict of name to Environment
+    wanted : int
+        How many runs there were to be.
+    units : dict of gain to unit
+    meanings : dict of gain to what it is
+    facts : dict of name to value
+        What all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
+        ``versions``.
+    loaded : dict of folder to Saved
+        Runs that were read already.
+    """
+
+    kind: Kind
+    folder: Path
+    entries: tuple[Entry, ...]
+    maps: Mapping[str, Environment]
+    wanted: int
+    units: Mapping[str, str]
+    meanings: Mapping[str, str]
+    facts: Mapping[str, Any]
+    loaded: Mapping[Path, Saved]
+
+    @cached_property
+    def fine(self) -> tuple[Entry, ...]:
+        """The runs that did not fail."""
+        return tuple(entry for entry in self.entries if entry.error is None)
+
+    @property
+    def failed(self) -> tuple[Entry, ...]:
+        """The runs that failed."""
+        return tuple(entry for entry in self.entries if entry.error is not None)
+
+    @property
+    def missing(self) -> int:
+        """How many runs are not done."""
+        return max(self.wanted - len(self.entries), 0)
+
+    def record(self, entry: Entry) -> Record:
+        """Return the record of a run.
+
+        Raises
+        ------
+        InputError
+            When it cannot be read.
+        """
+        if entry.folder in self.loaded:
+            return self.loaded[entry.folder].record
+        record = Record.load(entry.folder)
+        if not len(record) or not len(record.team) or not np.isfinite(record.positions).all():
+            raise InputError(f"{entry.folder / 'record.npz'}: finite positions of robots were wanted")
+        return record
+
+    def history(self, entry: Entry) -> CostHistory | None:
+        """Return the cost along a run, None where there is no file of it.
+
+        Raises
+        ------
+        InputError
+            When it cannot be read.
+        """
+        if entry.folder in self.loaded:
+            return self.loaded[entry.folder].history
+        path = entry.folder / "cost.csv"
+        return read_history(path) if path.exists() else None
+
+
+def gathered(folder: Path) -> Result:
+    """Return what is in the folder of a run, a comparison or a sweep.
+
+    Raises
+    ------
+    InputError
+        When it is none, or something of it cannot be read, or no run is there; the message names the file.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder; that of a run, comparison or sweep was wanted")
+    if (folder / "study.json").is_file():
+        return _of_sweep(folder)
+    if not any((folder / name).is_file() for name in ("comparison.json", "run.json")):
+        raise InputError(
+            f"{folder}: not the folder of a run, a comparison or a sweep "
+            f"(there is no run.json, no comparison.json and no study.json)"
+        )
+    return _of_runs(folder)
+
+
+def printable(text: str) -> str:
+    """Return a text as a page can hold it: what is no character becomes a question mark of its own.
+
+    >>> printable("a\\x00b")
+    'a\\ufffdb'
+    """
+    return "".join(c if c.isprintable() or c == " " else "\ufffd" for c in text)
+
+
+def _of_runs(folder: Path) -> Result:
+    """Read a run or a comparison."""
+    saved = load_saved(folder)
+    entries: list[Entry] = []
+    maps: dict[str, Environment] = {}
+    facts: dict[str, Any] = {}
+    for each in saved:
+        record = each.record
+        content = _json(each.folder / "run.json")
+        name = printable(record.environment.name)
+        maps.setdefault(name, roster_of(record).environment)
+        entries.append(
+            Entry(
+                map=name,
+                controller=record.controller,
+                label=printable(record.label),
+                robots=len(record.team),
+                team=(),
+                start=None if record.start is None else printable(str(record.start)),
+                seed=record.seed,
+                gains=_gains(record.gains),
+                figures=_figures(content.get("summary"), each.history),
+                error=None,
+                folder=each.folder,
+            )
+        )
+        facts = facts or {
+            "duration_s": float(record.time[-1]),
+            "dt_s": record.dt,
+            "lattice": content.get("lattice"),
+            "team": content.get("team"),
+            "versions": content.get("versions"),
+        }
+    kind: Kind = "comparison" if (folder / "comparison.json").is_file() else "run"
+    wanted = len(_json(folder / "comparison.json").get("folders", ())) if kind == "comparison" else 1
+    return Result(
+        kind=kind,
+        folder=folder,
+        entries=_labelled(entries),
+        maps=maps,
+        wanted=max(wanted, len(entries)),
+        facts=facts,
+        loaded={each.folder: each for each in saved},
+        **_known_gains(entries, {}),
+    )
+
+
+def _of_sweep(folder: Path) -> Result:
+    """Read a sweep, finished or not."""
+    results = read_results(folder)
+    study, path = results.study, folder / "study.json"
+    try:
+        maps = {str(each["name"]): from_json(each["map"], f"{path}: maps") for each in study["maps"]}
+        gains = {name: list(each["choices"][0]) for name, each in study["gains"].items()}
+        teams = [dict(team) for team in study["teams"]]
+        wanted = int(study["runs"])
+        facts = {name: study.get(name) for name in ("duration_s", "dt_s", "lattice", "cost_hz", "record_hz")}
+    except RobocovError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path}: the study cannot be read: {type(error).__name__}: {error}") from error
+    swept = [name for name in TEAM if len({team.get(name) for team in teams}) > 1]
+    rows = results.to_table().to_pylist()
+    if not rows:
+        raise InputError(f"{folder}: not one of the {wanted} runs of the sweep is done")
+    entries = []
+    for row in rows:
+        controller = str(row["controller"])
+        entries.append(
+            Entry(
+                map=printable(str(row["map"])),
+                controller=controller,
+                label=printable(_label(controller)),
+                robots=int(row["robots"]),
+                team=tuple((name, row.get(team_column(name))) for name in swept),
+                start=printable(str(row["start"])),
+                seed=row["seed"],
+                gains=tuple((name, row.get(gain_column(name))) for name in gains.get(controller, ())),
+                figures={name: row.get(name) for name in FIGURES} if row["error"] is None else {},
+                error=None if row["error"] is None else printable(str(row["error"])),
+                folder=folder / "runs" / Path(str(row["run"])).name,
+            )
+        )
+    if teams:
+        facts["team"] = {name: value for name, value in teams[0].items() if name not in swept}
+    facts["versions"] = _versions(entries)
+    told: dict[str, tuple[str, str]] = {}
+    for column in results.dataset.schema:
+        about = column.metadata or {}
+        told[column.name] = (about.get(b"unit", b"").decode(), about.get(b"meaning", b"").decode())
+    known = {
+        name: told[gain_column(name)]
+        for names in gains.values()
+        for name in names
+        if gain_column(name) in told
+    }
+    return Result(
+        kind="sweep",
+        folder=folder,
+        entries=_labelled(entries),
+        maps={printable(name): environment for name, environment in maps.items()},
+        wanted=wanted,
+        facts=facts,
+        loaded={},
+        **_known_gains(entries, known),
+    )
+
+
+def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
+    """Return the entries with labels that tell the controllers apart."""
+    labels: dict[str, str] = {}
+    for entry in entries:
+        if entry.controller not in labels:
+            number = 1 + sum(label.partition(" #")[0] == entry.label for label in labels.values())
+            labels[entry.controller] = entry.label if number == 1 else f"{entry.label} #{number}"
+    return tuple(
+        entry if entry.label == labels[entry.controller] else replace(entry, label=labels[entry.controller])
+        for entry in entries
+    )
+
+
+def _label(controller: str) -> str:
+    """Return what a controller is called; a user's is not loaded for that."""
+    return str(getattr(CONTROLLERS.get(controller), "label", controller.rpartition(":")[2]))
+
+
+def _gains(gains: Mapping[str, float | None]) -> tuple[tuple[str, float | None], ...]:
+    return tuple((printable(str(name)), value) for name, value in gains.items())
+
+
+def _known_gains(entries: list[Entry], told: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, str]]:
+    """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
+    units, meanings = {}, {}
+    for controller in dict.fromkeys(entry.controller for entry in entries):
+        if controller in CONTROLLERS:
+            for name, gain in gains_of(CONTROLLERS[controller]).items():
+                units[name], meanings[name] = gain.unit, gain.meaning
+    for name, (unit, meaning) in told.items():
+        if unit or meaning:
+            units.setdefault(name, printable(unit))
+            meanings.setdefault(name, printable(meaning))
+    return {"units": units, "meanings": meanings}
+
+
+def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
+    """Return the figures of a single run out of its summary."""
+    known = summary if isinstance(summary, dict) else {}
+    figures: dict[str, float | None] = {}
+    for name in FIGURES:
+        value = known.get(name)
+        if name == "path_length_m" and isinstance(value, list) and value:
+            value = sum(value) / len(value)
+        figures[name] = value if isinstance(value, int | float) and not isinstance(value, bool) else None
+    if history is not None and len(history.time):
+        final = float(history.mean_distance[-1])
+        if figures["mean_distance_m"] is None and np.isfinite(final):
+            figures["mean_distance_m"] = final
+        if figures["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
+            figures["mean_distance_over_run_m"] = mean_over_run(history.time, history.mean_distance)
+    return figures
+
+
+def _versions(entries: list[Entry]) -> Any:
+    """Return the versions that the first run was made with."""
+    for entry in entries:
+        if entry.error is None and (entry.folder / "run.json").is_file():
+            return _json(entry.folder / "run.json").get("versions")
+    return None
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: {shown(content)}, but an object was wanted")
+    return content

@@ -1,0 +1,179 @@
+"""Small pictures of maps and runs as SVG without a script: they print, and stand where no script may run.
+
+Colours are CSS variables (`robocov_app.report.theme_css`): one picture suits light and dark.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from robocov.voronoi import partition
+from robocov_app.report.embedding import has_path
+from robocov_app.saved import roster_of
+from robocov_app.view.spacing import fitted_radii, mark_size
+from robocov_app.view.theme import ONE_HUE_EACH, robot_hues
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from robocov.arrays import Array
+    from robocov.environment import Environment
+    from robocov.metrics import CostHistory
+    from robocov.record import Record
+
+_MARGIN = 3.0
+"""Pixels round the region."""
+
+_FINE = 0.2
+"""Pixels by which a line may be simplified."""
+
+MOST_ROBOTS = 400
+"""Robots up to which cells and trajectories are drawn: a larger team would make too large a picture."""
+
+
+class Frame:
+    """Where the metres of a map are in a picture.
+
+    Parameters
+    ----------
+    environment : Environment
+    width, height : float, px
+        The picture fits into them; one of them is filled.
+    """
+
+    def __init__(self, environment: Environment, width: float, height: float) -> None:
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        room_x, room_y = width - 2 * _MARGIN, height - 2 * _MARGIN
+        self.zoom = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
+        self.corner = np.array([low_x, high_y])
+        self.width = round(self.zoom * (high_x - low_x) + 2 * _MARGIN, 1)
+        self.height = round(self.zoom * (high_y - low_y) + 2 * _MARGIN, 1)
+
+    def at(self, points: Array) -> Array:
+        """Return (..., 2) m as pixels from the upper left corner."""
+        return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN)
+
+
+def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
+    """Return a picture of a map as an SVG element, with its facts as its text."""
+    frame = Frame(environment, width, height)
+    return _svg(frame, _map_shapes(environment, frame), map_sentence(environment))
+
+
+def run_picture(
+    record: Record,
+    history: CostHistory | None,
+    width: float = 300.0,
+    height: float = 220.0,
+    *,
+    numbers: bool = False,
+    hidden: bool = False,
+) -> str:
+    """Return a picture of a whole run as an SVG element: cells, trajectories, starts, final positions.
+
+    Parameters
+    ----------
+    record : Record
+    history : CostHistory or None
+    width, height : float, px
+        The picture fits into them.
+    numbers : bool
+        Whether the robots carry their numbers where they are large enough.
+    hidden : bool
+        Whether it is hidden from screen readers, because what it stands in says it all.
+    """
+    frame = Frame(record.environment, width, height)
+    n = len(record.team)
+    last = record.positions[-1]
+    parts: list[str] = []
+    if n <= MOST_ROBOTS:
+        cells = partition(last, record.environment.region)
+        hues = robot_hues(n, cells.adjacency if n > ONE_HUE_EACH else None).tolist()
+        for cell, hue in zip(cells.polygons, hues, strict=True):
+            if len(cell) > 2:
+                parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')
+    parts.append(_map_shapes(record.environment, frame))
+    tracks = np.moveaxis(frame.at(record.positions), 1, 0)
+    if has_path(record) and n <= MOST_ROBOTS:
+        lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in tracks if len(track) > 1]
+        parts.append(f'<path class="way" d="{_path([np.asarray(line.coords) for line in lines])}"/>')
+    starts, ends = frame.at(record.positions[0]), frame.at(last)
+    ring = mark_size(starts, 2.4, 5.0) / 2
+    parts += [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}"/>' for x, y in starts]
+    most = 9.0 if numbers else 4.5
+    radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, most)
+    for number, (x, y), r in zip(roster_of(record).numbers, ends, radii, strict=True):
+        parts.append(f'<circle class="robot" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>')
+        size = r * (1.35, 1.15, 0.9, 0.7)[min(len(str(number)), 4) - 1]
+        if numbers and size >= 6.0:
+            parts.append(
+                f'<text x="{x:.1f}" y="{y + 0.36 * size:.1f}" font-size="{size:.1f}">{number}</text>'
+            )
+    return _svg(frame, "".join(parts), None if hidden else run_sentence(record, history))
+
+
+def map_sentence(environment: Environment) -> str:
+    """Return what a picture of a map shows, in words."""
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
+    count = len(environment.obstacles)
+    obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
+    return (
+        f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m {obstacles}, "
+        f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked."
+    )
+
+
+def run_sentence(record: Record, history: CostHistory | None) -> str:
+    """Return what a picture of a run shows, in words."""
+    n = len(record.team)
+    span = record.time[-1] - record.time[0]
+    start = f" from start {record.start}" if record.start else ""
+    text = (
+        f"{record.label} on map {record.environment.name}: trajectories of {n} robot{'s' if n > 1 else ''}"
+        f"{start} over {span:.4g} s."
+    )
+    if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
+        first, final = history.mean_distance[[0, -1]]
+        word = "falls" if final < first else "goes"
+        text += f" The mean distance to the nearest robot {word} from {first:.3f} m to {final:.3f} m."
+    return text
+
+
+def _svg(frame: Frame, content: str, sentence: str | None) -> str:
+    label = 'aria-hidden="true"' if sentence is None else f'role="img" aria-label="{escape(sentence)}"'
+    # no size of its own: the page gives it a width, and the view box the height
+    return (
+        f'<svg class="robocov-picture" viewBox="0 0 {frame.width:g} {frame.height:g}" {label}>{content}</svg>'
+    )
+
+
+def _map_shapes(environment: Environment, frame: Frame) -> str:
+    region = _path([frame.at(environment.region.vertices)], closed=True)
+    blocked = shapely.simplify(environment.blocked, _FINE / frame.zoom)
+    rings = [
+        frame.at(np.asarray(ring.coords)[:-1])
+        for part in shapely.get_parts(blocked)
+        for ring in (part.exterior, *part.interiors)
+    ]
+    shapes = f'<path class="blocked" d="{_path(rings, closed=True)}"/>' if rings else ""
+    return f'{shapes}<path class="region" d="{region}"/>'
+
+
+def _path(lines: Iterable[Array], *, closed: bool = False) -> str:
+    """Return the path of lines of (k, 2) px: relative, in tenths of a pixel, that no error adds up."""
+    words = []
+    for line in lines:
+        if len(line) == 0:
+            continue
+        tenths = np.rint(line * 10).astype(int)
+        steps = np.diff(tenths, axis=0)
+        steps = steps[(steps != 0).any(axis=1)]
+        x, y = (tenths[0] / 10).tolist()
+        moves = " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps.tolist())
+        words.append(f"M{x:g} {y:g}" + (f"l{moves}" if moves else "h0") + ("z" if closed else ""))
+    return "".join(words)

@@ -1,0 +1,316 @@
+"""The tables of a report: captions, heads and cells as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from robocov.errors import counted
+from robocov_app.report.groups import (
+    Comparison,
+    Group,
+    gain_text,
+    medians,
+    relative,
+    setting_label,
+    settings,
+    shown_groups,
+    variants,
+)
+from robocov_app.statistics import Interval
+
+if TYPE_CHECKING:
+    from robocov_app.plot_curves import CurveStyle
+    from robocov_app.report.gathering import Entry, Result
+
+NOTHING = "–"
+"""Stands where there is no number."""
+
+MOST_ROWS = 60
+"""Runs up to which each has a row of its own."""
+
+MOST_SETS = 200
+"""Sets of gains up to which they are listed."""
+
+MOST_SETTINGS = 40
+"""Settings up to which the summary is told for each."""
+
+
+class Cell(NamedTuple):
+    """A cell: its text, and the style of the curve that it names."""
+
+    text: str
+    style: CurveStyle | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes
+    ----------
+    caption : str
+    head : tuple of str
+        The first column names the rows.
+    rows : sequence of tuple of Cell
+    texts : frozenset of int
+        Columns of words; all others but the first are numbers.
+    notes : tuple of str
+        What stands below.
+    """
+
+    caption: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[Cell, ...]]
+    texts: frozenset[int] = frozenset()
+    notes: tuple[str, ...] = ()
+
+
+def controllers_table(result: Result, styles: dict[str, CurveStyle]) -> Table:
+    """Return the controllers with their gains, or between which values these are."""
+    apart = variants(result)
+    used = {name for group in apart for name, _ in group.gains or ()}
+    meanings = [f"{name}: {result.meanings[name]}" for name in result.meanings if name in used]
+    notes = ("; ".join(meanings) + ".",) if meanings else ()
+    groups = shown_groups(result)
+    known = {group.controller for group in groups}
+    lost: dict[str, Group] = {}
+    for entry in result.failed:
+        if entry.controller not in known:
+            lost.setdefault(entry.controller, Group(entry.label, entry.controller, None, (entry,)))
+    return _gains_table("Controllers and their gains", [*groups, *lost.values()], result, styles, notes)
+
+
+def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
+    """Return all sets of gains by letters, None where `controllers_table` has them or they are many."""
+    apart = variants(result)
+    if len(apart) == len(shown_groups(result)) or len(apart) > MOST_SETS:
+        return None
+    return _gains_table("Sets of gains", apart, result, styles, ())
+
+
+def _gains_table(
+    caption: str,
+    groups: Sequence[Group],
+    result: Result,
+    styles: dict[str, CurveStyle],
+    notes: tuple[str, ...],
+) -> Table:
+    rows = []
+    for group in groups:
+        gains = _ranges_text(group, result) if group.gains is None else gain_text(group.gains, result.units)
+        cells = Cell(group.label, styles[group.controller]), Cell(group.controller), Cell(gains or NOTHING)
+        rows.append(cells)
+    return Table(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}), notes)
+
+
+def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]:
+    """Return what came of each group, over everything and in each setting."""
+    groups = shown_groups(result)
+    every = settings(result)
+    tables = []
+    if len(every) > 1:
+        scales = medians(result)
+        rows = []
+        for group in groups:
+            row = _summary_row(group, styles)
+            # metres of different maps have no common median
+            rows.append((*row[:2], Cell(_quartiles(relative(group, scales).tolist(), 3)), *row[4:]))
+        head = (*_HEAD[:2], "Mean distance / median", *_HEAD[4:])
+        note = (
+            "Mean distance / median: divided by the median over all runs on the same map with the same team."
+        )
+        tables.append(Table("All maps and teams together", head, rows, notes=(note,)))
+    for setting in every if len(every) <= MOST_SETTINGS else ():
+        parts = [group.at(setting) for group in groups]
+        rows = [_summary_row(part, styles) for part in parts if part.entries]
+        caption = setting_label(result, setting) if len(every) > 1 else "Final figures"
+        tables.append(Table(caption, _HEAD, rows))
+    if tables and any(len(group.entries) > 1 for group in groups):
+        note = (
+            "Of several runs: the median, and quartiles in brackets; contacts: runs in which a robot touched "
+            "a wall or another robot; clearance: the smallest gap to a wall in any of them."
+        )
+        tables[-1] = replace(tables[-1], notes=(note,))
+    return tables
+
+
+_HEAD = (
+    *("Controller", "Runs", "Mean distance, m", "Over the run, m", "Settled", "Settled at, s"),
+    *("Contacts", "Clearance, m", "Path, m", "Stuck robots"),
+)
+
+
+def pairs_table(comparisons: Sequence[Comparison], styles: dict[str, CurveStyle]) -> Table:
+    """Return how the groups compare, pair by pair."""
+    several = max(len(each.a) for each in comparisons) > 1
+    rows = []
+    for each in comparisons:
+        said = each.paired
+        names = Cell(each.first.label, styles[each.first.controller]), Cell(each.second.label)
+        how = Cell(_interval(said.ratio)), Cell(_interval(said.difference))
+        more = (Cell(str(said.pairs)), *how, Cell(_percent(said.wins)))
+        rows.append((*names, *(more if several else how)))
+    figures = ("Pairs", "Median ratio", "Median difference, m", "First is lower, %")
+    head = ("First", "Second", *(figures if several else ("Ratio", "Difference, m")))
+    return Table("Final mean distance of the first by that of the second", head, rows, frozenset({1}))
+
+
+def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
+    """Return every run in a row of its own, None where they are too many."""
+    if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
+        return None  # too many, or the summary tells all of them
+    labels = {entry: group for group in variants(result) for entry in group.entries}
+    rows = []
+    for entry in result.fine:
+        figures = entry.figures
+        rows.append(
+            (
+                Cell(labels[entry].label, styles[entry.controller]),
+                Cell(setting_label(result, entry.setting)),
+                Cell(entry.start or NOTHING),
+                Cell(NOTHING if entry.seed is None else str(entry.seed)),
+                Cell(_decimals(figures.get("mean_distance_m"), 3)),
+                Cell(_decimals(figures.get("mean_distance_over_run_m"), 3)),
+                Cell(_decimals(figures.get("settled_at_s"), 1, "no")),
+                Cell(_decimals(figures.get("contacts"), 0)),
+                Cell(_decimals(figures.get("min_clearance_m"), 3)),
+                Cell(_decimals(figures.get("path_length_m"), 2)),
+                Cell(_decimals(figures.get("stuck_robots"), 0)),
+            )
+        )
+    head = ("Controller", "Map", "Start", "Seed", *_HEAD[2:4], "Settled at, s", "Contacts", *_HEAD[7:])
+    return Table("Every run", head, rows, frozenset({1, 2}))
+
+
+def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
+    """Return the runs that failed, each with its error; None where none did."""
+    rows = [
+        (
+            Cell(entry.label, styles[entry.controller]),
+            Cell(setting_label(result, entry.setting)),
+            Cell(f"{entry.start}, {entry.seed}"),
+            Cell(gain_text(entry.gains, result.units)),
+            Cell(entry.error or ""),
+        )
+        for entry in result.failed[:MOST_ROWS]
+    ]
+    if not rows:
+        return None
+    left = len(result.failed) - len(rows)
+    notes = (f"{counted(left, 'more failed run')} in results.csv.",) if left else ()
+    head = ("Controller", "Map", "Start, seed", "Gains", "Error")
+    return Table("Runs that failed", head, rows, frozenset({1, 2, 3, 4}), notes)
+
+
+def _summary_row(group: Group, styles: dict[str, CurveStyle]) -> tuple[Cell, ...]:
+    entries = group.entries
+    settled = [e for e in entries if _known(e, "settled_at_s")]
+    return (
+        Cell(group.label, styles[group.controller]),
+        Cell(str(len(entries))),
+        Cell(_spread(entries, "mean_distance_m", 3)),
+        Cell(_spread(entries, "mean_distance_over_run_m", 3)),
+        Cell(_share(len(settled), len(entries))),
+        Cell(_spread(settled, "settled_at_s", 1)),
+        Cell(_contacts(entries)),
+        Cell(_least(entries, "min_clearance_m")),
+        Cell(_spread(entries, "path_length_m", 2)),
+        Cell(_stuck(entries)),
+    )
+
+
+def _known(entry: Entry, name: str) -> bool:
+    value = entry.figures.get(name)
+    return value is not None and bool(np.isfinite(value))
+
+
+def _values(entries: Sequence[Entry], name: str) -> list[float]:
+    return [float(entry.figures[name] or 0.0) for entry in entries if _known(entry, name)]
+
+
+def _spread(entries: Sequence[Entry], name: str, decimals: int) -> str:
+    return _quartiles(_values(entries, name), decimals)
+
+
+def _quartiles(values: Sequence[float], decimals: int) -> str:
+    """Return the median with the quartiles, of a single value the value."""
+    if not values:
+        return NOTHING
+    low, middle, high = np.percentile(values, [25, 50, 75])
+    text = f"{middle:.{decimals}f}"
+    return text if len(values) == 1 else f"{text} ({low:.{decimals}f}–{high:.{decimals}f})"
+
+
+def _least(entries: Sequence[Entry], name: str) -> str:
+    values = _values(entries, name)
+    return _signed(f"{min(values):.3f}") if values else NOTHING
+
+
+def _share(count: int, total: int) -> str:
+    if total == 1:
+        return "yes" if count else "no"
+    return f"{count} of {total}"
+
+
+def _contacts(entries: Sequence[Entry]) -> str:
+    values = _values(entries, "contacts")
+    if len(entries) == 1:
+        return f"{values[0]:.0f}" if values else NOTHING
+    return f"{sum(value > 0 for value in values)} of {len(values)}" if values else NOTHING
+
+
+def _stuck(entries: Sequence[Entry]) -> str:
+    values = _values(entries, "stuck_robots")
+    if not values:
+        return NOTHING
+    return f"{values[0]:.0f}" if len(entries) == 1 else f"{np.mean(values):.2g} per run"
+
+
+def _interval(interval: Interval) -> str:
+    text = _signed(f"{interval.estimate:.3f}")
+    if np.isnan(interval.low):
+        return text
+    return f"{text} ({_signed(f'{interval.low:.3f}')} to {_signed(f'{interval.high:.3f}')})"
+
+
+def _signed(number: str) -> str:
+    """Return a number with a minus that is as wide as a digit."""
+    return number.replace("-", "\u2212")
+
+
+def _percent(interval: Interval) -> str:
+    text = f"{100 * interval.estimate:.0f}"
+    if np.isnan(interval.low):
+        return text
+    return f"{text} ({100 * interval.low:.0f} to {100 * interval.high:.0f})"
+
+
+def _decimals(value: Any, decimals: int, nothing: str = NOTHING) -> str:
+    return nothing if value is None or not np.isfinite(value) else _signed(f"{value:.{decimals}f}")
+
+
+def _ranges_text(group: Group, result: Result) -> str:
+    """Return between which values the gains of a controller vary."""
+    values: dict[str, list[float | None]] = {}
+    for entry in group.entries:
+        for name, value in entry.gains:
+            values.setdefault(name, []).append(value)
+    parts = []
+    for name, every in values.items():
+        finite = [value for value in every if value is not None]
+        unit = result.units.get(name, "")
+        if not finite:
+            parts.append(f"{name} none")
+        elif min(finite) == max(finite) and len(finite) == len(every):
+            parts.append(f"{name} {finite[0]:.6g} {unit}".rstrip())
+        else:
+            also = " or none" if len(finite) < len(every) else ""
+            span = (
+                f"{min(finite):.4g} to {max(finite):.4g}" if min(finite) < max(finite) else f"{finite[0]:.6g}"
+            )
+            parts.append(f"{name} {span} {unit}".rstrip() + also)
+    return ", ".join(parts)

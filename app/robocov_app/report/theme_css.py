@@ -1,0 +1,89 @@
+"""The project's colours as CSS variables, for pages that follow the reader's preference.
+
+Every colour has one name in both themes: what is drawn with names is drawn once and is right in light
+and dark. Names begin with ``--rc-``, so that they meet no others in a notebook.
+"""
+
+from __future__ import annotations
+
+from robocov_app.plot_gains import quiet_heat
+from robocov_app.view.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
+
+
+def hex_code(colour: Colour) -> str:
+    """Return a colour as CSS writes it.
+
+    >>> hex_code((136, 204, 238))
+    '#88ccee'
+    """
+    red, green, blue = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def named_colours(theme: Theme) -> dict[str, Colour]:
+    """Return the colours that pages use, by the names that they have there."""
+    return {
+        "background": theme.background,
+        "panel": theme.panel,
+        "ink": theme.ink,
+        "faint": theme.faint,
+        "grid": theme.grid,
+        "line": mix(theme.grid, theme.background, 0.45),
+        "accent": theme.controller("rapf"),
+        "warning": theme.controller("rpf"),
+        "boundary": theme.boundary,
+        "obstacle": theme.obstacle,
+        "obstacle-edge": theme.obstacle_edge,
+        "cell-edge": theme.cell_edge,
+        "start": theme.start,
+        "final": theme.final,
+        "on-final": readable_on(theme.final),
+        "on-accent": readable_on(theme.controller("rapf")),
+        "trajectory": theme.trajectory,
+        "ring": theme.robot_ring,
+        **{name: theme.controller(name) for name in theme.controllers},
+        **{f"other-{k}": colour for k, colour in enumerate(theme.others)},
+        **{
+            f"cell-{k}": mix(theme.background, colour, theme.paper_tint)
+            for k, colour in enumerate(theme.robots)
+        },
+        **{f"heat-{k}": colour for k, colour in enumerate(quiet_heat(theme))},
+    }
+
+
+def variables(theme: Theme) -> str:
+    """Return the declarations of a theme's colours, to stand between braces."""
+    colours = "".join(f"--rc-{name}:{hex_code(colour)};" for name, colour in named_colours(theme).items())
+    return f"color-scheme:{theme.name};{colours}"
+
+
+def theme_rules(scope: str, theme: str = "auto") -> str:
+    """Return CSS that gives the elements of `scope` their colours.
+
+    Parameters
+    ----------
+    scope : str
+        A selector.
+    theme : {"auto", "light", "dark"}
+        "auto" follows the reader: what a notebook says of itself, else what the browser prefers. Paper
+        is always white.
+
+    Raises
+    ------
+    ParameterError
+        When there is no such theme.
+    """
+    light, dark = variables(LIGHT), variables(DARK)
+    if theme != "auto":
+        from robocov_app.view.theme import theme_named
+
+        return f"{scope}{{{variables(theme_named(theme))}}}@media print{{{scope}{{{light}}}}}\n"
+    notebook = f':is([data-jp-theme-light="{{}}"],[data-vscode-theme-kind$="{{}}"]) {scope}'
+    return (
+        f"{scope}{{{light}}}"
+        f"@media (prefers-color-scheme:dark){{{scope}{{{dark}}}}}"
+        f"{notebook.format('true', 'light')}{{{light}}}"
+        f"{notebook.format('false', 'dark')}{{{dark}}}"
+        # as strong as the rules for notebooks, and after them
+        f"@media print{{{scope},:is([data-jp-theme-light],[data-vscode-theme-kind]) {scope}{{{light}}}}}\n"
+    )

@@ -1,0 +1,1 @@
+"""Sweeps: many runs in parallel, each done once, and their table."""

@@ -1,0 +1,284 @@
+"""The gains that a study tries: every combination of lists, and samples of ranges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from robocov.controllers import gain_values, gains_of
+from robocov.controllers.gains import with_gains
+from robocov.errors import ParameterError, RobocovError, shown, unknown_name
+from robocov.strictjson import place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.arrays import Array
+    from robocov.controllers.gains import Gain
+
+Scale: TypeAlias = Literal["linear", "log"]
+Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
+
+NO_LIMIT = "null"
+"""What stands for None where a file has no word for it."""
+
+MOST_SAMPLES = 100_000
+
+_DIGITS = 6
+"""Digits of a sampled gain: more say nothing, and the last ones differ from one processor to the next."""
+
+Place: TypeAlias = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Range:
+    """A range of a gain that is to be sampled, both ends included.
+
+    Attributes
+    ----------
+    low, high : float
+        In the gain's unit.
+    scale : "linear" or "log"
+        What is sampled evenly: the value, or its logarithm.
+    """
+
+    low: float
+    high: float
+    scale: Scale = "linear"
+
+    def values(self, parts: Array) -> list[float]:
+        """Return the values at (m,) parts of the range, from 0 to 1, rounded to six digits."""
+        if self.scale == "log":
+            low, high = math.log(self.low), math.log(self.high)
+            exact = np.exp(low + (high - low) * parts)
+        else:
+            exact = self.low + (self.high - self.low) * parts
+        return [min(max(float(f"{x:.{_DIGITS}g}"), self.low), self.high) for x in exact.tolist()]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How ranges are sampled: all ranges of a controller together.
+
+    Controllers with the same ranges get the same samples. The first samples of a Sobol or a Halton
+    sequence stay the same when there are more of them.
+
+    Attributes
+    ----------
+    method : "sobol", "latin-hypercube" or "halton"
+        Of `scipy.stats.qmc`, scrambled.
+    samples : int
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        On another method, or a number out of range.
+    """
+
+    method: Method = "sobol"
+    samples: int = 16
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ParameterError(f"sampling.method: {unknown_name('method', self.method, get_args(Method))}")
+        whole("sampling.samples", self.samples, 1, MOST_SAMPLES)
+        whole("sampling.seed", self.seed, 0, 2**63 - 1)
+
+    def points(self, dimensions: int) -> Array:
+        """Return as many points of the unit cube as there are samples, (samples, dimensions)."""
+        from scipy.stats import qmc
+
+        rng = np.random.default_rng(self.seed)
+        if self.method == "latin-hypercube":
+            return np.asarray(qmc.LatinHypercube(dimensions, seed=rng).random(self.samples))
+        if self.method == "halton":
+            return np.asarray(qmc.Halton(dimensions, seed=rng).random(self.samples))
+        # the beginning of a longer, balanced sequence
+        whole = qmc.Sobol(dimensions, seed=rng).random_base2((self.samples - 1).bit_length())
+        return np.asarray(whole[: self.samples])
+
+
+Choice: TypeAlias = Mapping[str, float | None]
+"""A value for every gain of a controller."""
+
+Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
+"""What a study may be told of a controller's gains; see `Gains.of`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The gains of one controller in a study.
+
+    Attributes
+    ----------
+    choices : tuple of dict
+        One for each set of gains that is tried, with a value for every gain of the controller.
+    ranges : dict of name to Range
+        Those that were sampled.
+    """
+
+    choices: tuple[Choice, ...]
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, kind: type[Any], wanted: Wanted, sampling: Sampling | None, path: Place = ()) -> Gains:
+        """Return what is tried of a controller.
+
+        Parameters
+        ----------
+        kind : class
+            Of the controller.
+        wanted : Gains, dict or sequence of dict
+            Either each set of gains by itself, as dicts of name to value; or one dict of name to a value,
+            a list of values (every combination of them is tried), or a `Range`. What is not
+            given has its default.
+        sampling : Sampling or None
+            How ranges are sampled; for each combination of the lists, the same samples.
+        path : tuple
+            What messages call the place.
+
+        Raises
+        ------
+        ParameterError
+            On an unknown gain (with the nearest name), a value out of range, a value given twice, or a
+            range without a way to sample it; the message begins with the place.
+        """
+        if isinstance(wanted, Gains):
+            return cls(cls.of(kind, wanted.choices, None, path).choices, wanted.ranges)
+        if isinstance(wanted, Mapping):
+            return _of_axes(kind, wanted, sampling, path)
+        if not wanted:
+            raise ParameterError(f"{place(path)}: none, but at least one set of gains was wanted")
+        known = gains_of(kind)
+        choices = []
+        for k, given in enumerate(wanted):
+            values = {name: _value(known, name, value, (*path, k, name)) for name, value in given.items()}
+            choices.append(_choice(kind, values, (*path, k)))
+        once(choices, path)
+        return cls(tuple(choices))
+
+
+def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None, path: Place) -> Gains:
+    """Return every combination of the lists with every sample of the ranges, the samples innermost."""
+    known = gains_of(kind)
+    lists: dict[str, list[float | None]] = {}
+    ranges: dict[str, Range] = {}
+    for name, given in axes.items():
+        at = (*path, name)
+        if isinstance(given, Range):
+            ranges[name] = _checked_range(known, name, given, at)
+        elif isinstance(given, Sequence) and not isinstance(given, str):
+            if not given:
+                raise ParameterError(f"{place(at)}: none, but at least one value was wanted")
+            lists[name] = [_value(known, name, value, (*at, k)) for k, value in enumerate(given)]
+            once(lists[name], at)
+        else:
+            lists[name] = [_value(known, name, given, at)]
+    samples: list[dict[str, float]] = [{}]
+    if ranges:
+        if sampling is None:
+            at = (*path, next(iter(ranges)))
+            raise ParameterError(f"{place(at)}: a range, but sampling says neither a method nor how many")
+        points = sampling.points(len(ranges))
+        columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
+        samples = [dict(zip(ranges, row, strict=True)) for row in zip(*columns, strict=True)]
+    combined = [
+        {**dict(zip(lists, row, strict=True)), **sample}
+        for row in product(*lists.values())
+        for sample in samples
+    ]
+    choices = [_choice(kind, values, path) for values in combined]
+    once(choices, (*path, "samples"))  # as of a range that is narrower than the digits of a sample
+    return Gains(tuple(choices), ranges)
+
+
+def _choice(kind: type[Any], values: Mapping[str, float | None], path: Place) -> Choice:
+    """Return a value for every gain, as the controller takes them."""
+    try:
+        return gain_values(with_gains(kind, values))
+    except RobocovError:
+        raise
+    except Exception as error:  # a class of a user's may check its fields in its own way
+        raise ParameterError(f"{place(path)}: {type(error).__name__}: {error}") from error
+
+
+def _value(known: Mapping[str, Gain], name: str, value: object, path: Place) -> float | None:
+    """Return a value of a gain; both ``inf`` and ``"null"`` stand for no limit where there may be none."""
+    gain = _known(known, name, path)
+    if gain.optional and value in (NO_LIMIT, math.inf):
+        return None
+    return _at(path, lambda: gain.validated(value, ""))
+
+
+def _known(known: Mapping[str, Gain], name: str, path: Place) -> Gain:
+    if name not in known:
+        above = place(path[: len(path) - 1 - isinstance(path[-1], int)])
+        if not known:
+            raise ParameterError(f"{above}: {shown(name)}, but the controller has no gains")
+        raise ParameterError(f"{above}: {unknown_name('gain', name, known)}")
+    return known[name]
+
+
+def _checked_range(known: Mapping[str, Gain], name: str, given: Range, path: Place) -> Range:
+    gain = _known(known, name, path)
+    for end in ("low", "high"):
+        if getattr(given, end) is None:
+            raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
+    low = _at((*path, "low"), lambda: gain.validated(given.low, ""))
+    high = _at((*path, "high"), lambda: gain.validated(given.high, ""))
+    assert low is not None and high is not None
+    if given.scale not in get_args(Scale):
+        raise ParameterError(
+            f"{place((*path, 'scale'))}: {unknown_name('scale', given.scale, get_args(Scale))}"
+        )
+    if not low < high:
+        raise ParameterError(f"{place((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted")
+    if given.scale == "log" and low <= 0.0:
+        wanted = "a number above 0, as the scale is that of logarithms,"
+        raise ParameterError(f"{place((*path, 'low'))}: {low:g}, but {wanted} was wanted")
+    return Range(low, high, given.scale)
+
+
+def _at(path: Place, check: Callable[[], float | None]) -> float | None:
+    """Return what `check` returns; its complaint is told of `path`."""
+    try:
+        return check()
+    except ParameterError as error:
+        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+
+
+def once(values: Sequence[object], path: Place) -> None:
+    """Check that nothing is given twice.
+
+    Raises
+    ------
+    ParameterError
+        The message names the second place, and the first.
+    """
+    seen: dict[object, int] = {}
+    for k, value in enumerate(values):
+        first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)
+        if first < k:
+            raise ParameterError(
+                f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}; "
+                f"each once was wanted"
+            )
+
+
+def whole(at: str, value: object, low: int, high: int) -> None:
+    """Check that a value is a whole number in range.
+
+    Raises
+    ------
+    ParameterError
+        The message begins with `at`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ParameterError(f"{at}: {shown(value)}, but a whole number from {low} to {high} was wanted")

@@ -1,0 +1,143 @@
+"""Doing one task: from what a run needs to the files that come of it."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+import traceback
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.array_cache import ArrayCache
+from robocov.controllers import make_controller
+from robocov.cost import CoverageCost
+from robocov.errors import RobocovError
+from robocov.mapfile import from_json
+from robocov.metrics import cost_history, summarise
+from robocov.record import ARRAYS, Recorder
+from robocov.simulation import Simulation
+from robocov_app.output import csv_text, finite
+from robocov_app.run import COST_COLUMNS, cost_rows
+from robocov_app.sweep.study import team_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from robocov.environment import Environment
+    from robocov.metrics import CostHistory
+    from robocov.record import Record
+    from robocov_app.sweep.task import Task
+
+_REMEMBERED = 4
+"""Maps whose costs a worker keeps; tasks come map by map."""
+
+FIGURES = (
+    *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
+    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
+)
+"""What the table holds of a run, in this order."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a task.
+
+    Attributes
+    ----------
+    files : dict of name to bytes
+        What belongs into the run's folder.
+    figures : dict of name to value
+        What the table holds of the run, empty where it failed.
+    error : str or None
+        Why it failed, one line.
+    """
+
+    files: Mapping[str, bytes]
+    figures: Mapping[str, float | int | None]
+    error: str | None = None
+
+
+def perform(task: Task) -> Outcome:
+    """Do a run; what goes wrong in it is a part of the outcome."""
+    try:
+        return _performed(task)
+    except (Exception, SystemExit) as error:
+        message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
+        return failed(message, traceback.format_exc())
+
+
+def failed(message: str, details: str) -> Outcome:
+    """Return the outcome of a run that failed."""
+    # one line of what files can hold, whatever a controller of a user's says
+    message = " ".join(message.split()).encode(errors="replace").decode()
+    content = {"error": message, "traceback": details}
+    return Outcome({"error.json": _json(content)}, {}, message)
+
+
+def simulated(task: Task, environment: Environment) -> Record:
+    """Simulate a run, and return the whole of it."""
+    source = None if task.path is None or task.source is None else (task.path, task.source)
+    controller = make_controller(task.controller, task.gains, source=source)
+    team = team_of(task.robots, task.team)
+    start = environment.start(task.start)
+    positions = start.sample(task.robots, seed=task.seed, radius=float(team.radius[0]))
+    simulation = Simulation(environment, controller, positions, team, task.dt)
+    recorder = Recorder(
+        environment, team, controller, task.dt, name=task.controller, start=task.start, seed=task.seed
+    )
+    for snapshot in simulation.snapshots(task.duration):
+        recorder.add(snapshot)
+    return recorder.record()
+
+
+def prepared(task: Task) -> tuple[Environment, CoverageCost]:
+    """Return the map of a task and its cost, those of the last few maps as they were."""
+    # the threads of one worker must not share what a cost computes with
+    known: OrderedDict[Any, tuple[Environment, CoverageCost]]
+    known = _KNOWN.__dict__.setdefault("costs", OrderedDict())
+    key = task.document, task.lattice
+    if key not in known:
+        environment = from_json(json.loads(task.document), task.map)
+        known[key] = environment, CoverageCost(environment, task.lattice, cache=ArrayCache.of_user())
+        if len(known) > _REMEMBERED:
+            known.popitem(last=False)
+    known.move_to_end(key)
+    return known[key]
+
+
+_KNOWN = threading.local()
+
+
+def _performed(task: Task) -> Outcome:
+    environment, cost = prepared(task)
+    record = simulated(task, environment)
+    history = cost_history(record, cost, task.cost_hz)
+    # of all moments: what is kept of them is for people to look at
+    summary = finite(summarise(record, history))
+    path = summary["path_length_m"]
+    figures = {**summary, "path_length_m": sum(path) / len(path)}
+    return Outcome(_files(task, record, history, summary), {name: figures[name] for name in FIGURES})
+
+
+def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return what ``robocov run`` writes of the numbers of a run, with a part of its moments."""
+    content = record.to_json(summary, lattice=task.lattice)
+    content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
+    if task.source is not None:
+        content["controller"]["source"] = task.source
+    kept = record.thinned(task.record_hz)
+    arrays = io.BytesIO()
+    np.savez_compressed(arrays, **{name: getattr(kept, name) for name in ARRAYS})
+    return {
+        "run.json": _json(content),
+        "record.npz": arrays.getvalue(),
+        "cost.csv": csv_text(COST_COLUMNS, cost_rows(history)).encode(),
+    }
+
+
+def _json(content: object) -> bytes:
+    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

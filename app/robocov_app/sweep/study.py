@@ -1,0 +1,323 @@
+"""A study: what a sweep runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from robocov.controllers import controller_kind
+from robocov.errors import InputError, ParameterError, shown, unknown_name
+from robocov.mapfile import to_json
+from robocov.robots import DEFAULT_RADIUS, Team
+from robocov.simulation import DEFAULT_DT, check_dt
+from robocov.strictjson import place
+from robocov_app.options import MOST_ROWS
+from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
+
+if TYPE_CHECKING:
+    from robocov.environment import Environment
+
+MOST_RUNS = 1_000_000
+
+ALL = "*"
+"""Stands for all starts of a map."""
+
+TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
+"""Parameters of a team that a study may sweep."""
+
+_RANGES = ("sensing_range", "communication_range")
+"""Those that may be without limit."""
+
+_LONGEST_NAME = 100
+
+_HUGE = 1e300
+"""What a float can hold, with some to spare."""
+
+Swept: TypeAlias = float | Sequence[float | None] | None
+"""One value, or several, each of which is tried."""
+
+
+@dataclass(frozen=True)
+class StudyMap:
+    """A map of a study.
+
+    Attributes
+    ----------
+    name : str
+        What the table calls it.
+    environment : Environment
+    """
+
+    name: str
+    environment: Environment
+
+
+class Source(NamedTuple):
+    """The file of a controller of one's own.
+
+    Attributes
+    ----------
+    path : str
+        Absolute.
+    text : str
+    """
+
+    path: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What a sweep runs: every combination of what is given.
+
+    For the same map, team and seed every controller begins in the same places.
+
+    Attributes
+    ----------
+    maps : tuple of StudyMap
+    controllers : tuple of str
+        By name, or ``mine.py:MyController``.
+    gains : dict of controller to Gains
+        What is tried of each controller: dicts of name to value, list of values or `Range`, or a list of
+        dicts of name to value; see `Gains.of`. Without an entry, the defaults.
+    robots : tuple of int
+    starts : tuple of str
+        Names of starts; none: the first of each map; ``("*",)``: all of each map.
+    seeds : tuple of int
+    duration : float, s
+    dt : float, s
+        Control period.
+    radius, max_speed, max_acceleration, viscosity, sensing_range, communication_range
+        Of the team, m, m/s, m/s², N s/m, m, m: a value, or several of which each is tried. None (or
+        inf) is a range without limit.
+    lattice : int
+        The coverage cost is evaluated on a lattice of so many sites along a side.
+    cost_hz : float, Hz
+        How often it is evaluated; 0: at the first moment and the last.
+    record_hz : float, Hz
+        How many moments of each run are kept; 0: the first and the last.
+    sampling : Sampling or None
+        How ranges of gains are sampled.
+    folder : Path
+        Where relative paths of controllers begin.
+    sources : dict of controller to Source
+        The files of controllers that are none of the project's; read when the study is made.
+    teams : tuple of dict
+        Every combination of the parameters of a team.
+
+    Raises
+    ------
+    ParameterError, StartError
+        On a value that cannot be used; the message begins with its place, as in ``gains.rapf.k_rep[1]``.
+    """
+
+    maps: tuple[StudyMap, ...]
+    controllers: tuple[str, ...]
+    gains: Mapping[str, Wanted] = field(default_factory=dict)
+    robots: Sequence[int] = (6,)
+    starts: Sequence[str] = ()
+    seeds: Sequence[int] = (0,)
+    duration: float = 60.0
+    dt: float = DEFAULT_DT
+    radius: Swept = DEFAULT_RADIUS
+    max_speed: Swept = 1.0
+    max_acceleration: Swept = 2.0
+    viscosity: Swept = 2.0
+    sensing_range: Swept = 3.0
+    communication_range: Swept = None
+    lattice: int = 64
+    cost_hz: float = 2.0
+    record_hz: float = 5.0
+    sampling: Sampling | None = None
+    folder: Path = Path()
+    sources: Mapping[str, Source] = field(init=False)
+    teams: tuple[Mapping[str, float | None], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name in ("maps", "controllers", "robots", "starts", "seeds"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        self._check_names()
+        for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
+            for k, value in enumerate(getattr(self, name)):
+                whole(place((name, k)), value, low, high)
+        whole("lattice", self.lattice, 2, 2048)
+        for name, most in (("duration", 1e6), ("cost_hz", 1e4), ("record_hz", 1e4)):
+            object.__setattr__(self, name, _number(name, getattr(self, name), most))
+        object.__setattr__(self, "dt", _number("dt", self.dt, 1.0))
+        check_dt(self.dt)
+        for name in ("maps", "controllers", "robots", "seeds"):
+            if not getattr(self, name):
+                raise ParameterError(f"{name}: none, but at least one was wanted")
+            once([item.name for item in self.maps] if name == "maps" else getattr(self, name), (name,))
+        self._check_starts()
+        object.__setattr__(self, "teams", self._every_team())
+        object.__setattr__(self, "sources", self._read_sources())
+        object.__setattr__(self, "gains", self._every_gain())
+        if len(self) > MOST_RUNS:
+            raise ParameterError(f"runs: {len(self):.3g}, but at most {MOST_RUNS:.0e} were wanted")
+        rows = self.duration / self.dt * max(self.robots)
+        if rows > MOST_ROWS:
+            raise ParameterError(
+                f"duration: {self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} "
+                f"rows of a record, but at most {MOST_ROWS:.0e} were wanted"
+            )
+
+    def __len__(self) -> int:
+        """How many runs there are."""
+        starts = sum(len(self.starts_on(each)) for each in self.maps)
+        choices = sum(len(self.gains_of(name).choices) for name in self.controllers)
+        return starts * len(self.robots) * len(self.teams) * len(self.seeds) * choices
+
+    @property
+    def swept(self) -> tuple[str, ...]:
+        """The parameters of a team of which there is more than one value."""
+        return tuple(name for name in TEAM if len({team[name] for team in self.teams}) > 1)
+
+    def gains_of(self, controller: str) -> Gains:
+        """Return what is tried of a controller of the study."""
+        gains = self.gains[controller]
+        assert isinstance(gains, Gains)
+        return gains
+
+    def starts_on(self, each: StudyMap) -> tuple[str, ...]:
+        """Return the names of the starts that are taken on a map."""
+        environment = each.environment
+        if not self.starts:
+            return (environment.start().name,)
+        if self.starts == (ALL,):
+            return tuple(environment.starts) or (environment.start().name,)
+        return tuple(self.starts)
+
+    def kind(self, controller: str) -> type[Any]:
+        """Return the class of a controller of the study."""
+        return controller_kind(controller, source=self.sources.get(controller))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``study.json``: the whole study, with maps, sources and all gains."""
+        return {
+            "format": "robocov-study",
+            "version": 1,
+            "runs": len(self),
+            "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
+            "controllers": [
+                {"name": name, **({"source": self.sources[name].text} if name in self.sources else {})}
+                for name in self.controllers
+            ],
+            "gains": {
+                name: {
+                    "choices": [dict(choice) for choice in self.gains_of(name).choices],
+                    "ranges": {gain: asdict(each) for gain, each in self.gains_of(name).ranges.items()},
+                }
+                for name in self.controllers
+            },
+            "sampling": None if self.sampling is None else asdict(self.sampling),
+            "robots": list(self.robots),
+            "teams": [dict(team) for team in self.teams],
+            "starts": {each.name: list(self.starts_on(each)) for each in self.maps},
+            "seeds": list(self.seeds),
+            "duration_s": self.duration,
+            "dt_s": self.dt,
+            "lattice": self.lattice,
+            "cost_hz": self.cost_hz,
+            "record_hz": self.record_hz,
+        }
+
+    def _check_names(self) -> None:
+        for k, name in enumerate(self.controllers):
+            if not isinstance(name, str):
+                raise ParameterError(f"controllers[{k}]: {shown(name)}, but a text was wanted")
+        for k, each in enumerate(self.maps):
+            name = each.name
+            if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
+                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
+                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
+
+    def _check_starts(self) -> None:
+        once(self.starts, ("starts",))
+        if self.starts == (ALL,):
+            return
+        for k, name in enumerate(self.starts):
+            if name == ALL:
+                raise ParameterError(
+                    f"starts[{k}]: {shown(ALL)} is all of them, so nothing beside it was wanted"
+                )
+            for each in self.maps:
+                try:
+                    each.environment.start(name)
+                except InputError as error:
+                    raise type(error)(f"starts[{k}]: {error}") from None
+
+    def _every_team(self) -> tuple[Mapping[str, float | None], ...]:
+        axes = []
+        for name in TEAM:
+            given = getattr(self, name)
+            several = isinstance(given, Sequence) and not isinstance(given, str)
+            path = ("team", name)
+            values = [
+                _team_value(name, value, (*path, k) if several else path)
+                for k, value in enumerate(given if several else (given,))
+            ]
+            if not values:
+                raise ParameterError(f"team.{name}: none, but at least one value was wanted")
+            once(values, path)
+            axes.append(values)
+        return tuple(dict(zip(TEAM, row, strict=True)) for row in product(*axes))
+
+    def _read_sources(self) -> dict[str, Source]:
+        sources = {}
+        for k, name in enumerate(self.controllers):
+            file, _, class_name = name.rpartition(":")
+            if ".py:" not in name and not name.endswith(".py"):
+                continue
+            path = (self.folder / file).resolve()
+            try:
+                if class_name and file.endswith(".py"):
+                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
+                raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
+        return sources
+
+    def _every_gain(self) -> dict[str, Gains]:
+        for name in self.gains:
+            if name not in self.controllers:
+                known = unknown_name("controller of the study", name, self.controllers)
+                raise ParameterError(f"{place(('gains', name))}: {known}")
+        found = {}
+        for k, name in enumerate(self.controllers):
+            try:
+                kind = self.kind(name)
+            except ParameterError as error:
+                raise ParameterError(f"controllers[{k}]: {error}") from error
+            found[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
+        if self.sampling is not None and not any(gains.ranges for gains in found.values()):
+            raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
+        return found
+
+
+def _number(at: str, value: object, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
+        raise ParameterError(f"{at}: {shown(value)}, but a number from 0 to {most:g} was wanted")
+    return float(value)
+
+
+def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
+    """Return a parameter of a team, None for a range without limit."""
+    if name in _RANGES and value in (None, NO_LIMIT, math.inf):
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
+        raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
+    try:
+        Team.homogeneous(1, **{name: float(value)})
+    except ParameterError as error:
+        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+    return float(value)
+
+
+def team_of(robots: int, team: Mapping[str, float | None]) -> Team:
+    """Return so many equal robots with the parameters of a study."""
+    return Team.homogeneous(robots, **{name: math.inf if x is None else x for name, x in team.items()})

@@ -1,0 +1,241 @@
+"""The table of a sweep: ``results.csv``, which grows, and ``results.parquet``, which appears at the end."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from contextlib import ExitStack, suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from robocov.atomic import written
+from robocov.controllers import gains_of
+from robocov.errors import OutputError
+from robocov.robots import UNITS
+from robocov_app.sweep.performing import FIGURES
+from robocov_app.sweep.study import TEAM
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from robocov_app.sweep.ledger import Entry
+    from robocov_app.sweep.study import Study
+    from robocov_app.sweep.task import Task
+
+ROW_GROUP = 4096
+"""Rows of a row group, and the most that are in memory."""
+
+_KEY_UNITS = {"m": "m", "m/s": "m_s", "m/s²": "m_s2", "N s/m": "n_s_m"}
+"""Units in the names of columns."""
+
+
+class Column(NamedTuple):
+    """A column of the table.
+
+    Attributes
+    ----------
+    name : str
+    kind : "string", "int64" or "double"
+    unit : str
+    meaning : str
+        One line.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    meaning: str
+
+
+_BEFORE = (
+    Column("map", "string", "", "the map, as the study calls it"),
+    Column("controller", "string", "", "the controller"),
+    Column("robots", "int64", "", "number of robots"),
+    Column("start", "string", "", "the start, as the map calls it"),
+    Column("seed", "int64", "", "seed of the starting positions"),
+)
+_DURATION = Column("duration_s", "double", "s", "simulated time")
+_FIGURES = (
+    Column("mean_distance_m", "double", "m", "mean distance to the nearest robot, (22) by area, at the end"),
+    Column("mean_distance_over_run_m", "double", "m", "mean of it over the time of the run"),
+    Column("cost_m3", "double", "m³", "coverage cost (22) at the end"),
+    Column("uncovered_area_m2", "double", "m²", "area cut off from every robot"),
+    Column("settled_at_s", "double", "s", "when the team came to rest, null if it did not"),
+    Column("contacts", "int64", "", "how often a robot began to touch a wall or another robot"),
+    Column("min_clearance_m", "double", "m", "smallest gap between a robot and a wall"),
+    Column("path_length_m", "double", "m", "distance travelled, mean over the robots"),
+    Column(
+        "stuck_robots", "int64", "", "robots at rest away from their goals at the end, null without goals"
+    ),
+)
+_AFTER = (
+    Column("run", "string", "", "the run's folder in runs/"),
+    Column("error", "string", "", "why the run failed, null if it did not"),
+)
+assert tuple(column.name for column in _FIGURES) == FIGURES
+
+
+def columns_of(study: Study) -> tuple[Column, ...]:
+    """Return the columns of a study's table: the gains and the teams that it tries among those of all."""
+    gains: dict[str, Column] = {}
+    for controller in study.controllers:
+        known = gains_of(study.kind(controller))
+        for name in study.gains_of(controller).choices[0]:
+            gains.setdefault(name, Column(gain_column(name), "double", known[name].unit, known[name].meaning))
+    team = (
+        Column(team_column(name), "double", UNITS[name], f"{name.replace('_', ' ')} of the robots")
+        for name in study.swept
+    )
+    return (*_BEFORE, *gains.values(), *team, _DURATION, *_FIGURES, *_AFTER)
+
+
+def gain_column(name: str) -> str:
+    """Return the name of the column of a gain: its own, unless another column has it."""
+    taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, *_AFTER)}
+    taken |= {team_column(parameter) for parameter in TEAM}
+    return f"gain_{name}" if name in taken else name
+
+
+def team_column(name: str) -> str:
+    """Return the name of the column of a parameter of a team.
+
+    >>> team_column("max_speed")
+    'max_speed_m_s'
+    """
+    return f"{name}_{_KEY_UNITS[UNITS[name]]}"
+
+
+def row_of(task: Task, entry: Entry) -> dict[str, Any]:
+    """Return the row of a run, by the names of the columns."""
+    return {
+        "map": task.map,
+        "controller": task.controller,
+        "robots": task.robots,
+        "start": task.start,
+        "seed": task.seed,
+        **{gain_column(name): value for name, value in task.gains.items()},
+        **{team_column(name): value for name, value in task.team.items()},
+        "duration_s": task.duration,
+        **entry.figures,
+        "run": task.name,
+        "error": entry.error,
+    }
+
+
+class Table:
+    """Writes the rows of a sweep in the order in which they come; a context.
+
+    ``results.csv`` grows row by row. ``results.parquet`` is written aside, and gets its name when the
+    context ends well; an earlier one, perhaps of another study, goes at the beginning.
+
+    Parameters
+    ----------
+    folder : Path
+    columns : sequence of Column
+
+    Raises
+    ------
+    OutputError
+        When something cannot be written; no half of a row is left then.
+    """
+
+    def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+        self._folder, self._columns = folder, columns
+        self._names = [column.name for column in columns]
+        self._rows: list[dict[str, Any]] = []
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Table:
+        import pyarrow.parquet as pq
+
+        with ExitStack() as stack:
+            self._path = self._folder / "results.csv"
+            self._csv = stack.enter_context(_LineFile(self._path))
+            self._csv.write(_csv_line(self._names))
+            parquet = self._folder / "results.parquet"
+            parquet.unlink(missing_ok=True)
+            part = stack.enter_context(written(parquet))
+            self._schema = _schema(self._columns)
+            self._parquet = stack.enter_context(pq.ParquetWriter(part, self._schema))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *exception: Any) -> bool | None:
+        if exception[0] is None:
+            try:
+                self._flush()
+            except BaseException as error:
+                self._stack.__exit__(type(error), error, error.__traceback__)
+                raise
+        return self._stack.__exit__(*exception)
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Append a row; what it does not hold is null."""
+        values = {name: row.get(name) for name in self._names}
+        self._csv.write(_csv_line(values.values()))
+        self._rows.append(values)
+        if len(self._rows) == ROW_GROUP:
+            self._flush()
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+
+        if not self._rows:
+            return
+        table = pa.Table.from_pylist(self._rows, schema=self._schema)
+        self._rows.clear()
+        try:
+            self._parquet.write_table(table, row_group_size=ROW_GROUP)
+        except OSError as error:
+            path = self._folder / "results.parquet"
+            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+class _LineFile:
+    """A text file of whole lines, whatever happens."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> _LineFile:
+        try:
+            self._file = self._path.open("wb", buffering=0)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
+        self._size = 0
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._file.close()
+
+    def write(self, line: str) -> None:
+        data = line.encode()
+        try:
+            rest = memoryview(data)
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            with suppress(OSError):
+                os.ftruncate(self._file.fileno(), self._size)
+            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
+        self._size += len(data)
+
+
+def _csv_line(values: Any) -> str:
+    """Return a line of CSV; numbers keep all their digits, and null is nothing."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(values)
+    return text.getvalue()
+
+
+def _schema(columns: Sequence[Column]) -> pa.Schema:
+    import pyarrow as pa
+
+    fields = [
+        pa.field(column.name, column.kind, metadata={"unit": column.unit, "meaning": column.meaning})
+        for column in columns
+    ]
+    return pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})

@@ -1,0 +1,120 @@
+"""Tasks: the runs of a study one by one, each with all that it needs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from robocov.mapfile import to_json
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from robocov_app.sweep.study import Study
+
+_FORMAT = "robocov-task 1"
+"""Another one whenever the same inputs give other results: what is done already is then done anew."""
+
+_SHORT = 24
+"""Characters of each name in the name of a folder."""
+
+_DIGITS = 10
+"""Hexadecimal digits of the digest in the name of a folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One run; nothing but this is needed to do it, on whatever machine.
+
+    Attributes
+    ----------
+    map : str
+        What the study calls the map.
+    document : str
+        The whole map as JSON.
+    controller : str
+    path, source : str or None
+        Of a controller of one's own, the file and its text.
+    gains : dict of name to value
+        All of them.
+    robots : int
+    team : dict of name to value
+        As `Team.homogeneous` takes them, None for a range without limit.
+    start : str
+    seed : int
+    duration, dt : float, s
+    lattice : int
+    cost_hz, record_hz : float, Hz
+    digest : str
+        Of all of this but `path`: tasks of one digest have one result.
+    """
+
+    map: str
+    document: str
+    controller: str
+    path: str | None
+    source: str | None
+    gains: Mapping[str, float | None]
+    robots: int
+    team: Mapping[str, float | None]
+    start: str
+    seed: int
+    duration: float
+    dt: float
+    lattice: int
+    cost_hz: float
+    record_hz: float
+    digest: str = ""
+
+    @property
+    def name(self) -> str:
+        """The name of the run's folder."""
+        words = (self.map, self.controller.rpartition(":")[2], self.robots, self.start, self.seed)
+        return "-".join([*(_fit(str(word)) for word in words), self.digest[:_DIGITS]])
+
+
+def tasks_of(study: Study) -> Iterator[Task]:
+    """Yield the runs of a study in their fixed order, that of the rows of its table.
+
+    Maps are outermost; then robots, the rest of the team, starts and seeds; controllers and their gains
+    are innermost.
+    """
+    once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
+    once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
+    laws: list[dict[str, Any]] = []
+    for name in study.controllers:
+        source = study.sources.get(name)
+        path, text = (None, None) if source is None else (source.path, source.text)
+        laws += [
+            {"controller": name, "path": path, "source": text, "gains": dict(choice)}
+            for choice in study.gains_of(name).choices
+        ]
+    sources = {text: _digest(text) for text in {law["source"] for law in laws} if text is not None}
+    for each in study.maps:
+        document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
+        short = {"document": _digest(document)}
+        for robots in study.robots:
+            for team in study.teams:
+                for start in study.starts_on(each):
+                    for seed in study.seeds:
+                        place = {"map": each.name, "robots": robots, "team": dict(team), "start": start}
+                        for law in laws:
+                            inputs = {**once, **place, "seed": seed, **law, "document": document}
+                            said = {**inputs, **short, "source": sources.get(law["source"]), "path": None}
+                            yield Task(**inputs, digest=_digest(_FORMAT + json.dumps(said, sort_keys=True)))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _fit(word: str) -> str:
+    """Return a word as it can be a part of a folder's name on any system.
+
+    >>> _fit("Two rooms: a/b")
+    'Two-rooms-a-b'
+    """
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", word).strip(".-")[:_SHORT] or "x"

@@ -1,0 +1,134 @@
+"""How far a sweep is: a bar in a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+PERIOD = 10.0
+"""Seconds between two lines where there is no terminal."""
+
+
+@dataclass
+class Count:
+    """How many runs there are, and what became of them so far.
+
+    Attributes
+    ----------
+    total : int
+    done, failed : int
+        Those of this sweep.
+    reused : int
+        Those that were there already.
+    began : float, s
+        When it began, by the clock of `time.perf_counter`.
+    """
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    reused: int = 0
+    began: float = field(default_factory=time.perf_counter)
+
+    @property
+    def rate(self) -> float:
+        """Runs a second; 0 before the first one."""
+        seconds = time.perf_counter() - self.began
+        return (self.done + self.failed) / seconds if seconds > 0 else 0.0
+
+    @property
+    def left(self) -> float | None:
+        """Seconds to the end, None before the first run."""
+        rest = self.total - self.done - self.failed - self.reused
+        return rest / self.rate if self.rate else None
+
+    def __str__(self) -> str:
+        words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
+        words += [f"{self.failed} failed"] * (self.failed > 0)
+        words += [f"{self.reused} were there"] * (self.reused > 0)
+        words += [f"{self.rate:.2g} a second"] * (self.rate > 0)
+        return ", ".join(words)
+
+
+class _Teller:
+    """Is called whenever the count has changed, or some time has passed."""
+
+    def __call__(self, count: Count) -> None:
+        """Say how far it is."""
+
+
+class _Lines(_Teller):
+    def __init__(self, title: str) -> None:
+        self._title, self._said = title, time.perf_counter()
+
+    def __call__(self, count: Count, *, at_once: bool = False) -> None:
+        now = time.perf_counter()
+        if at_once or now - self._said >= PERIOD:
+            self._said = now
+            left = "" if not count.left else f", {duration(count.left)} left"
+            sys.stderr.write(f"{self._title}: {count}{left}\n")
+            sys.stderr.flush()
+
+
+class _Bar(_Teller):
+    def __init__(self, bar: Progress, title: str, total: int) -> None:
+        self._bar, self._task = bar, bar.add_task(title, total=total, said="", left="")
+
+    def __call__(self, count: Count) -> None:
+        done = count.done + count.failed + count.reused
+        left = "" if not count.left else f"{duration(count.left)} left"
+        self._bar.update(self._task, completed=done, said=str(count), left=left)
+
+
+@contextmanager
+def told(title: str, count: Count, *, quiet: bool) -> Iterator[Any]:
+    """Give a function to be called with the count when it has changed, and now and then.
+
+    Parameters
+    ----------
+    title : str
+    count : Count
+    quiet : bool
+        Say nothing.
+    """
+    if quiet:
+        yield _Teller()
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TextColumn("{task.fields[said]}", markup=False),
+            TextColumn("{task.fields[left]}", markup=False),
+        )
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            yield _Bar(bar, title, count.total)
+    else:
+        lines = _Lines(title)
+        yield lines
+        lines(count, at_once=True)
+
+
+def duration(seconds: float) -> str:
+    """Return a time for people.
+
+    >>> duration(8.2), duration(95), duration(4000), duration(200000)
+    ('8 s', '1 min 35 s', '1 h 7 min', '2 d 8 h')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    if whole < 86400:
+        return f"{whole // 3600} h {whole % 3600 // 60} min"
+    return f"{whole // 86400} d {whole % 86400 // 3600} h"

@@ -1,0 +1,63 @@
+"""The process that does tasks: ``python -m robocov_app.sweep.worker``, for a `LocalPool` only.
+
+It ends when nobody is there any more who could give it a task, also in the midst of one.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import queue
+import signal
+import sys
+import threading
+from contextlib import suppress
+from typing import BinaryIO
+
+READY = "ready"
+"""What a worker says when it has begun."""
+
+
+def main() -> None:
+    """Do tasks until there are no more."""
+    # Ctrl-C is for the parent
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.enable()
+    source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    target = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    # a controller of a user's may read and print what it likes
+    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file
+        os.dup2(nothing.fileno(), sys.stdin.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    # what takes long is imported once somebody listens
+    from robocov_app.live.messages import send
+    from robocov_app.sweep.performing import perform
+
+    inbox: queue.SimpleQueue[object] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(source, inbox), daemon=True).start()
+    with suppress(OSError):  # nobody may be there any more
+        send(target, READY)
+        while True:
+            task = inbox.get()
+            _forget_complaints()
+            send(target, perform(task))  # type: ignore[arg-type]
+
+
+def _listen(source: BinaryIO, inbox: queue.SimpleQueue[object]) -> None:
+    from robocov_app.live.messages import receive
+
+    while (task := receive(source)) is not None:
+        inbox.put(task)
+    os._exit(0)
+
+
+def _forget_complaints() -> None:
+    """Empty the file that stderr is, so that it holds those of one task only and does not grow for ever."""
+    with suppress(OSError, ValueError):
+        sys.stderr.flush()
+        os.ftruncate(sys.stderr.fileno(), 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+"""Seeded random maps of several kinds, each with what was asked for: obstacles, blocked area, gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import shapely
+
+from robocov.environment import Environment
+from robocov.errors import MapError, ParameterError, shown, unknown_name
+from robocov.generator.blocks import city
+from robocov.generator.polygons import scattered
+from robocov.generator.request import SIDES, Request, checked
+from robocov.generator.rooms import building
+from robocov.maprules import check_rules
+from robocov.passages import narrowest_gap
+from robocov.starts import DiscStart, UniformStart
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.environment import Obstacle
+
+    Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], "list[Obstacle] | None"]
+
+AREA_TOLERANCE = 0.005
+"""Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""
+
+_ATTEMPTS = 40
+"""Layouts that are drawn before the parameters count as impossible."""
+
+_TEAM = 0.6
+"""Radius in metres of a start in which some robots of the usual size find room."""
+
+_DISC = 0.25, 0.1
+"""Radius of a start, in sides of a square for each obstacle, and at most, in shorter sides of the map."""
+
+_LEAST = 0.4
+"""Part of that radius that is left at least where walls are near."""
+
+_MARGIN = 0.02
+"""Distance of the disc in a corner from the boundary, in shorter sides of the map."""
+
+_OFF = 0.3
+"""How far the disc near the middle may be from there, in shorter sides of the map."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of generated maps.
+
+    Attributes
+    ----------
+    layout : callable
+        Returns the obstacles for a `Request`, with the disc of the start in the corner left free, by
+        random numbers of a generator alone; None where that draw leads nowhere.
+    description : str
+        One line.
+    counted : str
+        What `obstacles` counts, in the plural.
+    obstacles : int
+    area : float
+        What is taken where nothing else is asked for.
+    """
+
+    layout: Layout
+    description: str
+    counted: str
+    obstacles: int
+    area: float
+
+
+GENERATORS: dict[str, Kind] = {
+    "polygons": Kind(scattered, "scattered obstacles: convex polygons, L and U shapes", "obstacles", 6, 0.2),
+    "blocks": Kind(city, "a town: blocks between streets", "blocks", 12, 0.4),
+    "rooms": Kind(building, "a building: rooms with doors, and some furniture", "rooms", 6, 0.12),
+}
+"""The kinds of maps by their names."""
+
+
+def generated_map(
+    seed: int,
+    *,
+    kind: str = "polygons",
+    obstacles: int | None = None,
+    area: float | None = None,
+    gap: float = 0.6,
+    side: float = 10.0,
+    width: float | None = None,
+    height: float | None = None,
+) -> Environment:
+    """Return a random map; the same seed and parameters give the same one.
+
+    The free space of a map is one piece without a passage narrower than `gap`, and the blocked part of its
+    area is `area` to within `AREA_TOLERANCE`. There are three starts: ``corner``, a disc in one of the
+    corners, ``centre``, a disc near the middle, and ``uniform``. Coordinates are whole centimetres, or
+    millimetres where the gap is narrow. What was asked for stands in the map's `extra`.
+
+    Parameters
+    ----------
+    seed : int
+    kind : str
+        One of `GENERATORS`. ``polygons``: obstacles that keep `gap` from each other and from the
+        boundary, convex, L-shaped or U-shaped (`robocov.generator.polygons.MIX`). ``blocks``: blocks between
+        streets, which are at least `gap` wide, also along the boundary. ``rooms``: rooms, each with a way
+        to all others through doors that are at least `gap` wide, and furniture.
+    obstacles : int
+        How many obstacles, blocks, or rooms; by default as many as the kind says.
+    area : float
+        Blocked area as a part of the map's; by default as the kind says.
+    gap : float, m
+    side : float, m
+        Of a square map.
+    width, height : float, m
+        Of a rectangular map, in place of `side`.
+
+    Raises
+    ------
+    ParameterError
+        When a parameter is out of range, or no layout is found that fulfils all of them.
+
+    Examples
+    --------
+    >>> environment = generated_map(7, obstacles=4, area=0.15)
+    >>> environment.name, len(environment.obstacles), len(environment.free.geoms)
+    ('polygons 7', 4, 1)
+    """
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
+        raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")
+    if not isinstance(kind, str) or kind not in GENERATORS:
+        raise ParameterError(unknown_name("kind of map", str(kind), GENERATORS))
+    of_kind = GENERATORS[kind]
+    side = checked("side", side, *SIDES)
+    request = Request(
+        of_kind.obstacles if obstacles is None else obstacles,
+        of_kind.area if area is None else area,
+        gap,
+        side if width is None else width,
+        side if height is None else height,
+    )
+    for attempt in range(_ATTEMPTS):
+        rng = np.random.default_rng([int(seed), attempt])
+        corner = _corner(request, rng)
+        layout = of_kind.layout(request, corner, rng)
+        if layout is None:
+            continue
+        environment = _environment(int(seed), kind, request, corner, layout)
+        if environment is not None and _fulfils(environment, request):
+            return environment
+    raise ParameterError(
+        f"area: {request.area:g}, but no layout of {request.obstacles} {of_kind.counted} was found that "
+        f"blocks it on {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m; "
+        f"another area, a narrower gap or another number was wanted"
+    )
+
+
+def _radius(request: Request) -> float:
+    """Return the radius of a start's disc, where there is room for it."""
+    of_obstacle, of_map = _DISC
+    return request.floor(
+        min(of_map * min(request.width, request.height), max(of_obstacle * request.unit, _TEAM))
+    )
+
+
+def _corner(request: Request, rng: np.random.Generator) -> DiscStart:
+    """Return a disc in one of the corners."""
+    right, top = rng.integers(0, 2, 2).tolist()
+    radius = _radius(request)
+    off = radius + _MARGIN * min(request.width, request.height)
+    x, y = (request.width - off if right else off), (request.height - off if top else off)
+    return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
+
+
+def _environment(
+    seed: int, kind: str, request: Request, corner: DiscStart, layout: list[Obstacle]
+) -> Environment | None:
+    """Return the map with its starts, None where there is no room for these."""
+    width, height = float(request.width), float(request.height)
+    boundary = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+    plain = Environment(kind, boundary, tuple(layout))
+    within, centre = _within(plain, request, corner), _centre(plain, request)
+    if within is None or centre is None:
+        return None
+    counted = GENERATORS[kind].counted
+    return Environment(
+        f"{kind} {seed}",
+        boundary,
+        tuple(layout),
+        {"corner": within, "centre": centre, "uniform": UniformStart()},
+        f"Generated with seed {seed}: {request.obstacles} {counted}, {request.area:.3g} of the area blocked, "
+        f"every passage at least {request.gap:g} m wide.",
+        {
+            "generator": {
+                "kind": kind,
+                "seed": seed,
+                "obstacles": int(request.obstacles),
+                "area": float(request.area),
+                "gap_m": float(request.gap),
+                "width_m": width,
+                "height_m": height,
+            }
+        },
+    )
+
+
+def _within(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+    """Return the disc, smaller and nearer to its corner where walls are in its way; None for none."""
+    middle = np.array(corner.center)
+    away = np.sign(middle - np.array([request.width, request.height]) / 2.0)
+    radius = corner.radius
+    while radius >= _LEAST * corner.radius:
+        x, y = request.rounded(middle + away * (corner.radius - radius)).tolist()
+        if environment.free.contains(shapely.Point(x, y).buffer(radius)):
+            return DiscStart((x, y), radius)
+        radius = request.floor(0.9 * radius)
+    return None
+
+
+def _centre(environment: Environment, request: Request) -> DiscStart | None:
+    """Return a disc near the middle with as much room as there is, None for none."""
+    reach = _OFF * min(request.width, request.height)
+    offset = np.stack(np.meshgrid(*[np.linspace(-reach, reach, 41)] * 2), axis=-1).reshape(-1, 2)
+    place = request.rounded(offset + np.array([request.width, request.height]) / 2.0)
+    inside = shapely.contains_xy(environment.free, place[:, 0], place[:, 1])
+    if not inside.any():
+        return None
+    place, offset = place[inside], offset[inside]
+    room = shapely.distance(environment.free.boundary, shapely.points(place))
+    largest = 0.8 * _radius(request)
+    score = np.minimum(room, largest) - 0.2 * np.hypot(offset[:, 0], offset[:, 1])
+    best = int(score.argmax())
+    radius = request.floor(min(max(float(room[best]), _LEAST * largest), largest))
+    return DiscStart((float(place[best, 0]), float(place[best, 1])), radius)
+
+
+def _fulfils(environment: Environment, request: Request) -> bool:
+    """Return whether a map is valid, and as it was asked for."""
+    try:
+        check_rules(environment, environment.name)
+    except MapError:
+        return False
+    share = 1.0 - environment.free_area / environment.area
+    if abs(share - request.area) > AREA_TOLERANCE or len(environment.free.geoms) != 1:
+        return False
+    # where a disc as wide as the gap may be must hang together
+    if not isinstance(environment.free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon):
+        return False
+    narrowest = narrowest_gap(environment.free)
+    return narrowest is None or narrowest.width >= request.gap - 1e-6

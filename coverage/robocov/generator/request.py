@@ -1,0 +1,119 @@
+"""What is asked of a generated map, and how its coordinates are rounded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.errors import ParameterError, shown
+from robocov.robots import DEFAULT_RADIUS
+from robocov.starts import GAP
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.environment import Ring
+
+LEAST_GAP = 0.21
+"""Narrowest passage in metres that may be asked for: robots of the usual size pass it."""
+
+assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + GAP)
+
+MOST_OBSTACLES = 200
+
+SIDES = 1.0, 1000.0
+"""Least and largest side of a map, in metres."""
+
+_WIDE = 0.5
+"""From gaps of so many metres on a centimetre is fine enough, below a millimetre."""
+
+
+def checked(name: str, value: object, least: float, most: float) -> float:
+    """Return a number in its range.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, or out of it.
+    """
+    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not (number and least <= value <= most):  # type: ignore[operator]
+        raise ParameterError(f"{name}: {shown(value)}, but a number from {least:g} to {most:g} was wanted")
+    return float(value)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a map is to be like.
+
+    Attributes
+    ----------
+    obstacles : int
+        How many; what is counted depends on the kind.
+    area : float
+        Blocked area as a part of the map's.
+    gap : float, m
+        Least width of every passage.
+    width, height : float, m
+        Of the map, a rectangle from [0, 0].
+
+    Raises
+    ------
+    ParameterError
+        When one of them is out of range.
+    """
+
+    obstacles: int
+    area: float
+    gap: float
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        count = self.obstacles
+        if (
+            not isinstance(count, (int, np.integer))
+            or isinstance(count, bool)
+            or not 1 <= count <= MOST_OBSTACLES
+        ):
+            raise ParameterError(
+                f"obstacles: {shown(count)}, but a whole number from 1 to {MOST_OBSTACLES} was wanted"
+            )
+        checked("area", self.area, 0.01, 0.9)
+        checked("width", self.width, *SIDES)
+        checked("height", self.height, *SIDES)
+        checked("gap", self.gap, LEAST_GAP, min(self.width, self.height) / 3.0)
+
+    @property
+    def blocked(self) -> float:
+        """The area to be blocked, m²."""
+        return self.area * self.width * self.height
+
+    @property
+    def unit(self) -> float:
+        """The side of a square of which there is one for each obstacle, m."""
+        return math.sqrt(self.width * self.height / self.obstacles)
+
+    @property
+    def digits(self) -> int:
+        """Digits after the point of all coordinates."""
+        return 2 if self.gap >= _WIDE else 3
+
+    @property
+    def step(self) -> float:
+        """What coordinates are rounded to, m."""
+        return 10.0**-self.digits
+
+    def rounded(self, points: Array) -> Array:
+        """Return coordinates rounded."""
+        return np.round(points, self.digits) + 0.0
+
+    def ring(self, points: Array) -> Ring:
+        """Return (k, 2) coordinates, rounded, as an outline."""
+        return tuple((x, y) for x, y in self.rounded(points).tolist())
+
+    def floor(self, value: float) -> float:
+        """Return a length rounded down."""
+        return round(math.floor(value / self.step + 1e-9) * self.step, self.digits)

@@ -1,0 +1,152 @@
+"""Maps of the kind `rooms`: a building with doors and furniture."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.generator.floorplan import Box, floor_plan
+
+if TYPE_CHECKING:
+    from robocov.environment import Obstacle
+    from robocov.generator.floorplan import FloorPlan
+    from robocov.generator.request import Request
+    from robocov.starts import DiscStart
+
+_WALLS = 0.3, 0.5, 0.9
+"""Part of the blocked area that walls take: the least, the most, and the most where rooms are small."""
+
+_SMALL, _SMALLEST = 6.0, 3.0
+"""Sides of usual rooms that are small, and very small, in gaps: furniture finds less and less room there."""
+
+_LENGTH = 1.5
+"""Length of the walls of a room, about, in its sides: without doors, each wall counted half for each room."""
+
+_THICKEST = 0.06
+"""Largest thickness of walls, in sides of a usual room."""
+
+_PIECES = 2.2
+"""Pieces of furniture in a room, on average."""
+
+_TRIES = 32
+"""Places that are tried for one piece, and pieces in a row that find none before that is given up."""
+
+_ENOUGH = 0.001
+"""What is left to be blocked, as a part of the map, which is too little for a piece."""
+
+
+def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Return walls and furniture; None if there is no room for so much of it.
+
+    Furniture stands against walls, or at least `gap` away from them; from doors and other furniture
+    it keeps that in any case.
+    """
+    thickness = _thickness(request, rng)
+    plan = floor_plan(request, thickness, rng)
+    if plan is None:
+        return None
+    walls: list[Obstacle] = [*plan.solid(thickness)]
+    whole = shapely.box(0.0, 0.0, request.width, request.height)
+    built = shapely.union_all([wall.polygon for wall in walls]).intersection(whole).area if walls else 0.0
+    furniture = _furniture(request, corner, plan, thickness, request.blocked - built, rng)
+    return None if furniture is None else [*walls, *furniture]
+
+
+def _thickness(request: Request, rng: np.random.Generator) -> float:
+    """Return how thick walls are, m, so that their faces have rounded coordinates."""
+    least, most, of_small = _WALLS
+    small = min(max((_SMALL - request.unit / request.gap) / (_SMALL - _SMALLEST), 0.0), 1.0)
+    part = rng.uniform(least, most + (of_small - most) * small)
+    half = min(part * request.area / _LENGTH, _THICKEST) * request.unit / 2.0
+    return 2.0 * max(request.floor(half), request.step)
+
+
+def _furniture(
+    request: Request,
+    corner: DiscStart,
+    plan: FloorPlan,
+    thickness: float,
+    area: float,
+    rng: np.random.Generator,
+) -> list[Obstacle] | None:
+    """Return furniture that blocks so much, None if it finds no place."""
+    enough = _ENOUGH * request.width * request.height
+    if area < -enough:
+        return None
+    clear = shapely.Point(corner.center).buffer(corner.radius)
+    inner = [_inner(request, box, thickness) for box in plan.rooms]
+    sizes = np.array([box.sides[0] * box.sides[1] for box in inner])
+    kept: list[list[shapely.Polygon]] = [
+        [door.box(thickness) for door in plan.doors if k in door.rooms] for k in range(len(inner))
+    ]
+    # pieces are as large as a few of them for each room must be
+    usual = area / (_PIECES * len(inner))
+    furniture: list[Obstacle] = []
+    missed = 0
+    while area > enough:
+        room = int(rng.choice(len(inner), p=sizes / sizes.sum()))
+        piece = _piece(request, inner[room], kept[room], clear, min(area, usual * rng.uniform(0.5, 1.5)), rng)
+        if piece is None:
+            missed += 1
+            if missed == _TRIES:
+                return None
+            continue
+        missed = 0
+        kept[room].append(piece.polygon)
+        furniture.append(piece)
+        area -= piece.polygon.area
+    return furniture
+
+
+def _inner(request: Request, room: Box, thickness: float) -> Box:
+    """Return a room up to the faces of its walls; the boundary has none."""
+    low = [0.0 if edge == 0.0 else edge + thickness / 2.0 for edge in room[:2]]
+    ends = zip(room[2:], (request.width, request.height), strict=True)
+    high = [edge if edge == end else edge - thickness / 2.0 for edge, end in ends]
+    return Box(*(round(edge, request.digits) for edge in (*low, *high)))
+
+
+def _piece(
+    request: Request,
+    room: Box,
+    others: list[shapely.Polygon],
+    clear: shapely.Polygon,
+    area: float,
+    rng: np.random.Generator,
+) -> CircleObstacle | PolygonObstacle | None:
+    """Return a piece of furniture of about that area at a free place of a room, None if there is none."""
+    kind = str(rng.choice(["cabinet", "table", "round table"], p=[0.5, 0.3, 0.2]))
+    stretch = rng.uniform(1.6, 3.5) if kind == "cabinet" else rng.uniform(1.0, 2.0)
+    long, deep = math.sqrt(area * stretch), math.sqrt(area / stretch)
+    size = np.array([long, deep] if rng.random() < 0.5 else [deep, long])
+    if kind == "round table":
+        size = np.full(2, 2.0 * math.sqrt(area / math.pi))
+    size = np.maximum(request.rounded(size), 2.0 * request.step)
+    space = np.array(room.sides) - size
+    if (space < 0.0).any():
+        return None
+    for _ in range(_TRIES):
+        off = rng.random(2) * space
+        if kind == "cabinet":
+            # with its back to the wall
+            side = int(size[0] > size[1])
+            off[side] = space[side] * rng.integers(0, 2)
+        low = request.rounded(off + room[:2])
+        free = np.array([*(low - room[:2]), *(np.array(room[2:]) - low - size)])
+        if ((free > request.step / 2.0) & (free < request.gap)).any():
+            continue
+        piece: CircleObstacle | PolygonObstacle
+        if kind == "round table":
+            x, y = request.rounded(low + size / 2.0).tolist()
+            piece = CircleObstacle((x, y), request.floor(size[0] / 2.0), kind)
+        else:
+            (x, y), (right, top) = low.tolist(), request.rounded(low + size).tolist()
+            piece = PolygonObstacle(((x, y), (right, y), (right, top), (x, top)), name=kind)
+        shape = piece.polygon
+        if shape.disjoint(clear) and all(shape.distance(other) >= request.gap for other in others):
+            return piece
+    return None

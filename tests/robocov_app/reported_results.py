@@ -1,0 +1,198 @@
+"""Results for the tests of reports: made up in memory, and really run on the disk."""
+
+from __future__ import annotations
+
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+from drawn_run import ROOMS, SQUARE
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment
+from robocov.metrics import CostHistory, cost_history, summarise
+from robocov.record import Record
+from robocov.robots import Team
+from robocov_app.output import finite, write_json
+from robocov_app.report.gathering import FIGURES, Entry, Result
+from robocov_app.run import Run, save_numbers
+from robocov_app.saved import Saved
+
+HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
+"""A name that would like to be more than a name."""
+
+LABELS = {"rapf": "RAPF", "rpf": "RPF", "lloyd": "LA"}
+
+
+def walk(
+    environment: Environment = ROOMS,
+    *,
+    controller: str = "rapf",
+    label: str | None = None,
+    robots: int = 4,
+    seconds: float = 6.0,
+    hz: float = 10.0,
+    seed: int = 0,
+    gains: dict[str, float | None] | None = None,
+) -> Record:
+    """Return a made-up record: every robot walks on a bent way between two free places."""
+    begin = environment.start("spread").sample(robots, seed)
+    end = environment.start("spread").sample(robots, seed + 1000)
+    time = np.arange(round(seconds * hz) + 1) / hz
+    part = (time / max(seconds, 1e-9))[:, None, None]
+    side = np.random.default_rng(seed).normal(size=(1, robots, 2)) * 0.4
+    positions = begin + (end - begin) * part + side * np.sin(np.pi * part)
+    low, high = environment.region.vertices.min(axis=0), environment.region.vertices.max(axis=0)
+    positions = np.clip(positions, low + 0.1, high - 0.1)
+    nothing = np.full_like(positions, np.nan)
+    return Record(
+        environment=environment,
+        team=Team.homogeneous(robots),
+        controller=controller,
+        label=LABELS.get(controller, controller) if label is None else label,
+        gains={} if gains is None else gains,
+        start="spread",
+        seed=seed,
+        dt=1.0 / hz,
+        time=time,
+        positions=positions,
+        velocities=np.zeros_like(positions),
+        forces=np.zeros_like(positions),
+        goals=nothing if controller == "rpf" else np.broadcast_to(end, positions.shape).copy(),
+        obstacle_points=nothing,
+    )
+
+
+def falling(record: Record, final: float, hz: float = 10.0) -> CostHistory:
+    """Return a made-up cost that falls from 6 m to `final`."""
+    time = record.time[:: max(round(1.0 / record.dt / hz), 1)]
+    if time[-1] != record.time[-1]:
+        time = np.append(time, record.time[-1])
+    span = max(float(time[-1]), 1e-9)
+    distance = final + (6.0 - final) * (1.0 - time / span) ** 2
+    return CostHistory(time, distance, 50.0 * distance, np.zeros_like(time))
+
+
+def entry(
+    controller: str = "rapf",
+    seed: int = 0,
+    final: float | None = 2.0,
+    *,
+    map_name: str = "rooms",
+    robots: int = 4,
+    gains: tuple[tuple[str, float | None], ...] = (),
+    team: tuple[tuple[str, float | None], ...] = (),
+    start: str | None = "spread",
+    error: str | None = None,
+    **figures: float | None,
+) -> Entry:
+    """Return a run as a report knows it."""
+    told = dict.fromkeys(FIGURES) | {"mean_distance_m": final, "contacts": 0} | figures
+    name = "-".join(map(str, (map_name, controller, robots, start, seed, gains, team)))
+    return Entry(
+        map=map_name,
+        controller=controller,
+        label=LABELS.get(controller, controller),
+        robots=robots,
+        team=team,
+        start=start,
+        seed=seed,
+        gains=gains,
+        figures={} if error else told,
+        error=error,
+        folder=Path(name.replace("/", "-")),
+    )
+
+
+def result_of(
+    entries: list[Entry],
+    *,
+    kind: str = "sweep",
+    loaded: dict[Path, Saved] | None = None,
+    maps: dict[str, Environment] | None = None,
+    wanted: int | None = None,
+    units: dict[str, str] | None = None,
+) -> Result:
+    """Return a result of these runs."""
+    return Result(
+        kind=kind,
+        folder=Path("study"),
+        entries=tuple(entries),
+        maps=dict.fromkeys(dict.fromkeys(each.map for each in entries), ROOMS) if maps is None else maps,
+        wanted=len(entries) if wanted is None else wanted,
+        units={} if units is None else units,
+        meanings={},
+        facts={"duration_s": 6.0, "dt_s": 0.1, "lattice": 16},
+        loaded={} if loaded is None else loaded,
+    )
+
+
+def watched(entries: list[Entry], environment: Environment = ROOMS, **walking: float) -> Result:
+    """Return a result whose runs have made-up records and costs."""
+    loaded = {}
+    for each in entries:
+        if each.error is None:
+            record = walk(
+                environment,
+                controller=each.controller,
+                label=each.label,
+                robots=each.robots,
+                seed=each.seed or 0,
+                **walking,
+            )
+            history = falling(record, 2.0 if np.isnan(each.final) else each.final)
+            loaded[each.folder] = Saved(each.folder, record, history)
+    names = dict.fromkeys(each.map for each in entries)
+    return result_of(entries, loaded=loaded, maps=dict.fromkeys(names, environment))
+
+
+def saved_run(folder: Path, record: Record) -> Run:
+    """Write the folder of a run with its real cost."""
+    folder.mkdir(parents=True)
+    history = cost_history(record, CoverageCost(record.environment, 16), 5.0)
+    run = Run(record, history, summarise(record, history))
+    save_numbers(run, folder, 16)
+    return run
+
+
+def saved_comparison(folder: Path, controllers: tuple[str, ...] = ("rapf", "rpf")) -> None:
+    """Write the folder of a comparison."""
+    runs = {name: saved_run(folder / name, walk(SQUARE, controller=name)) for name in controllers}
+    rows = [{"controller": name, **run.summary} for name, run in runs.items()]
+    content = {"format": "robocov-comparison", "version": 1, "folders": list(runs), "runs": rows}
+    write_json(folder / "comparison.json", finite(content))
+
+
+class Page(HTMLParser):
+    """What a page consists of: every element with its attributes, and all of its words."""
+
+    VOID = frozenset("area base br col embed hr img input link meta source track wbr".split())
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.scripts: list[str] = []
+        self.open: list[str] = []
+        self.feed(html)
+        self.close()
+        assert self.open == [], self.open
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        assert len(dict(attributes)) == len(attributes), (tag, attributes)
+        self.elements.append((tag, dict(attributes)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open[-1] == tag, (tag, self.open)
+        self.open.pop()
+
+    def handle_data(self, data: str) -> None:
+        (self.scripts if self.open and self.open[-1] in ("script", "style") else self.words).append(data)
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]

@@ -1,0 +1,65 @@
+"""Small studies and what comes of them, for the tests of sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from robocov.environment import CircleObstacle, Environment
+from robocov.starts import DiscStart, UniformStart
+from robocov_app.sweep.study import Study, StudyMap
+
+ROOM = Environment(
+    "A room",
+    ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)),
+    (CircleObstacle((3.0, 2.0), 0.6),),
+    {"corner": DiscStart((1.0, 1.0), 0.7), "spread": UniformStart()},
+)
+HALL = Environment(
+    "A hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (0.0, 3.0)), (), {"door": DiscStart((1, 1), 0.6)}
+)
+
+TABLES = ("results.csv", "results.parquet")
+
+HEAD = """
+import os, signal, time
+from dataclasses import dataclass
+from pathlib import Path
+
+@dataclass(frozen=True)
+class Mine:
+    pull: float = 1.0
+
+    def force(self, own):
+"""
+PULL = "        return self.pull * (own.centroid - own.position)\n"
+
+
+def small_study(**changes: Any) -> Study:
+    """A study whose runs take some hundredths of a second."""
+    said: dict[str, Any] = {
+        "maps": (StudyMap("room", ROOM),),
+        "controllers": ("rapf", "rpf"),
+        "seeds": range(2),
+        "robots": (2,),
+        "duration": 0.5,
+        "dt": 0.05,
+        "lattice": 8,
+        "record_hz": 4.0,
+    }
+    return Study(**said | changes)
+
+
+def controller(folder: Path, law: str, name: str = "mine.py") -> str:
+    """Write a controller of one's own, of which `law` is the beginning; return its name."""
+    (folder / name).write_text(HEAD + law + PULL)
+    return f"{folder / name}:Mine"
+
+
+def tables(folder: Path) -> list[bytes]:
+    return [(folder / name).read_bytes() for name in TABLES]
+
+
+def run_folders(folder: Path) -> list[str]:
+    runs = folder / "runs"
+    return sorted(path.name for path in runs.iterdir()) if runs.is_dir() else []

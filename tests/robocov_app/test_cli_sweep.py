@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+from pathlib import Path
+
+import pytest
+from called import answer, complaint
+from swept import ROOM, controller, run_folders, tables
+
+from robocov.mapfile import save_map
+from robocov.results import read_results
+from robocov_app.cli import main
+
+STUDY = """
+maps = ["room.json"]
+controllers = ["rapf", "rpf", "mine.py:Mine"]
+robots = 3
+seeds = 2
+duration = 1
+dt = 0.05
+lattice = 8
+record_hz = 2
+[gains.rpf]
+k_rep = [1, 3]
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    save_map(ROOM, tmp_path / "room.json")
+    controller(tmp_path, "")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_a_sweep_answers_in_words(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = study.parent / "out"
+    assert main(["sweep", str(study), "--out", str(out), "--workers", "1"]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines() == [
+        "8 runs done",
+        f"the table is {out}/results.csv, and as Parquet {out}/results.parquet",
+    ]
+    assert said.err.splitlines()[-1].startswith("sweep: 8 of 8 runs, ")
+    assert main(["sweep", str(study), "--out", str(out)]) == 0
+    assert capsys.readouterr().out.startswith("0 runs done, 8 were there already\n")
+
+
+def test_a_sweep_answers_in_json(
+    study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(study.parent)
+    found = answer(capsys, "sweep", "study.toml", "--workers", "1")
+    assert found == {
+        "out": "study",
+        "runs": 8,
+        "done": 8,
+        "failed": 0,
+        "reused": 0,
+        "interrupted": False,
+    }
+    results = read_results("study")
+    assert len(results) == 8
+    assert (
+        results.to_table(["controller"])["controller"].to_pylist()
+        == ["rapf", "rpf", "rpf", "mine.py:Mine"] * 2
+    )
+
+
+def test_failures_are_told_and_are_no_error(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study.write_text(STUDY.replace("robots = 3", "robots = 900"))
+    out = study.parent / "out"
+    assert main(["sweep", str(study), "--out", str(out), "--workers", "1"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[:2] == [
+        "0 runs done, 8 failed",
+        "why they failed is in the column error; --retry-failed does them again",
+    ]
+    assert main(["sweep", str(study), "--out", str(out), "--retry-failed", "--workers", "1"]) == 0
+    assert capsys.readouterr().out.startswith("0 runs done, 8 failed\n")
+
+
+def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(study.parent.rglob("*"))
+    out = str(study.parent / "out")
+    found = answer(capsys, "sweep", str(study), "--out", out, "--dry-run", "--workers", "3")
+    assert (found["runs"], found["left"], found["workers"]) == (8, 8, 3)
+    assert found["seconds"] == pytest.approx(found["seconds_a_run"] * 8 / 3)
+    assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "gains of rpf               2\n" in said
+    assert "runs                       8\n" in said
+    assert "all that is left: about" in said
+    assert sorted(study.parent.rglob("*")) == before
+
+    study.write_text(STUDY.replace("robots = 3", "robots = 900"))
+    assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
+    assert "failed: start 'corner': room for about" in capsys.readouterr().out
+
+
+def test_a_dry_run_says_what_is_done_already(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(study.parent / "out")
+    answer(capsys, "sweep", str(study), "--out", out, "--workers", "1")
+    study.write_text(STUDY.replace("seeds = 2", "seeds = 3"))
+    assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
+    assert "runs                      12   (8 of them done already)\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--workers", "0"), "--workers: 0, but a number from 1 to 1024 was wanted"),
+        (("--workers", "2", "--scheduler", "tcp://here:1"), "--workers: those of a cluster are its own"),
+        (("--seeds", "3"), "unknown option --seeds"),
+    ],
+)
+def test_options_are_checked(
+    study: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert message in complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"), *words)
+    assert not (study.parent / "out").exists()
+
+
+def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study.write_text(STUDY.replace("k_rep", "k_rap"))
+    said = complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"))
+    assert said.startswith(f"{study}: gains.rpf: unknown gain 'k_rap': did you mean 'k_rep'?")
+    assert "no such file" in complaint(capsys, "sweep", str(study.parent / "none.toml"))
+    assert not (study.parent / "out").exists()
+
+
+def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
+    study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    out = study.parent / "out"
+    words = ("sweep", str(study), "--out", str(out), "--workers", "1")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        said = complaint(capsys, *words, "--json")
+    assert said.endswith("cannot be written: No space left on device")
+    assert run_folders(out) == []
+    assert answer(capsys, *words)["done"] == 8
+    again = study.parent / "again"
+    answer(capsys, "sweep", str(study), "--out", str(again), "--workers", "1")
+    assert tables(again) == tables(out)
+
+
+def test_a_run_of_a_sweep_can_be_seen_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = study.parent / "out"
+    answer(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")
+    with (out / "results.csv").open(newline="") as file:
+        run = out / "runs" / next(csv.DictReader(file))["run"]
+    content = json.loads((run / "run.json").read_text())
+    assert content["record_hz"] == 2.0
+    frames = study.parent / "frames"
+    words = ("replay", str(run), "--frames", "--fps", "4", "--film-speed", "1", "--size", "320x240")
+    assert answer(capsys, *words, "--out", str(frames))["interrupted"] is False
+    assert len(list((frames / "frames").iterdir())) == 4 + 1 + 4, "as many as of a run with all moments"

@@ -1,0 +1,510 @@
+"""The report in a real browser: the replay, the keyboard, the large pictures, dark, print, telephones."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn_run import ROOMS
+from reported_results import HOSTILE, entry, falling, walk, watched
+
+from robocov.voronoi import partition
+from robocov_app.report.document import report
+from robocov_app.report.replay import ReplayRun, asset, replay_html
+from robocov_app.view.theme import DARK, LIGHT
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+pytestmark = [
+    pytest.mark.xdist_group("browser"),
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver"),
+]
+
+PATIENCE = 20.0
+SECONDS = 6.0
+ENTRIES = [
+    entry(name, seed, base + 0.1 * seed) for seed in (0, 1) for name, base in (("rapf", 1.5), ("rpf", 3.0))
+]
+
+READABLE = """
+function channels(code) { return code.match(/[\\d.]+/g).map(Number); }
+function light(code) {
+  const [r, g, b] = channels(code).slice(0, 3).map((c) => c / 255)
+    .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+function ground(element) {
+  for (let e = element; e; e = e.parentElement) {
+    const { backgroundColor: colour } = getComputedStyle(e);
+    if ((channels(colour)[3] ?? 1) === 1 && colour !== "transparent") return colour;
+  }
+  return "rgb(255, 255, 255)";
+}
+const bad = [];
+let looked = 0;
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const element = walker.currentNode.parentElement;
+  const style = getComputedStyle(element);
+  if (!walker.currentNode.textContent.trim() || element.closest("script, style")) continue;
+  if (!element.checkVisibility({ visibilityProperty: true })) continue;
+  const ink = element.ownerSVGElement ? style.fill : style.color;
+  let below = ground(element);
+  // numbers of robots stand on their discs
+  if (element.closest(".robocov-picture")) below = style.getPropertyValue("--rc-final");
+  if (below.startsWith("#")) below = below.match(/[0-9a-f]{2}/g).map((x) => parseInt(x, 16)).join(",");
+  const [low, high] = [light(ink), light(below)].sort((a, b) => a - b);
+  looked += 1;
+  if ((high + 0.05) / (low + 0.05) < 4.5) bad.push([element.outerHTML.slice(0, 120), ink, below]);
+}
+return [looked, bad];
+"""
+
+
+class Browser:
+    """A browser on one page, without network."""
+
+    def __init__(self, profile: Path) -> None:
+        from selenium import webdriver
+        from selenium.webdriver.chrome.options import Options
+        from selenium.webdriver.chrome.service import Service
+
+        options = Options()
+        for word in (
+            *("headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "hide-scrollbars"),
+            *("disable-background-networking", "disable-component-update", "disable-sync"),
+            f"user-data-dir={profile}",
+        ):
+            options.add_argument(f"--{word}")
+        options.binary_location = CHROMIUM or ""
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = webdriver.Chrome(service=Service(executable_path=DRIVER), options=options)
+
+    def open(self, path: Path, width: int = 1280, height: int = 900, **media: str) -> None:
+        phone = width < 500
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self.prefer(**media)
+        self.driver.get(path.as_uri())
+        # what is to be clicked must not move meanwhile
+        self.js("document.documentElement.style.scrollBehavior = 'auto'")
+
+    def prefer(self, medium: str = "", **media: str) -> None:
+        """Say what the reader prefers, as in color_scheme="dark"."""
+        features = [
+            {"name": f"prefers-{name.replace('_', '-')}", "value": value} for name, value in media.items()
+        ]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": medium, "features": features})
+
+    def js(self, script: str, *values: object) -> Any:
+        return self.driver.execute_script(script, *values)
+
+    def find(self, selector: str) -> Any:
+        return self.driver.find_element("css selector", selector)
+
+    def all(self, selector: str) -> list[Any]:
+        return self.driver.find_elements("css selector", selector)
+
+    def keys(self, *keys: str) -> None:
+        from selenium.webdriver import ActionChains
+
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def until(self, condition: Callable[[], object]) -> None:
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, "nothing came of it"
+            time.sleep(0.03)
+
+    def complaints(self) -> list[str]:
+        return [each["message"] for each in self.driver.get_log("browser")]
+
+    def drawn(self) -> list[str]:
+        """Return what is on every canvas of the replay: panes, then curves."""
+        script = (
+            "return [...document.querySelectorAll('.robocov-replay .pane > canvas, .robocov-replay .chart')]"
+            ".map((canvas) => canvas.toDataURL())"
+        )
+        return self.js(script)
+
+    def pixel(self, pane: int, x: float, y: float) -> tuple[int, int, int]:
+        script = (
+            "const canvas = document.querySelectorAll('.pane > canvas')[arguments[0]];"
+            "return [...canvas.getContext('2d').getImageData(arguments[1], arguments[2], 1, 1).data]"
+        )
+        red, green, blue, _ = self.js(script, pane, round(x), round(y))
+        return red, green, blue
+
+    @property
+    def time(self) -> float:
+        return float(self.find(".transport input").get_property("value"))
+
+    @property
+    def playing(self) -> bool:
+        return self.find(".main").text == "Pause"
+
+    def seek(self, seconds: float) -> None:
+        self.js(
+            "const slider = document.querySelector('.transport input'); slider.value = arguments[0];"
+            "slider.dispatchEvent(new Event('input', {bubbles: true}))",
+            seconds,
+        )
+
+    def focus_is_in(self, selector: str) -> bool:
+        return bool(self.js(f"return document.activeElement.matches({json.dumps(selector)})"))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    # its own manager, which would ask the network, has nothing to do
+    os.environ["SE_OFFLINE"] = "true"
+    shared = Browser(tmp_path_factory.mktemp("profile"))
+    try:
+        yield shared
+    finally:
+        shared.driver.quit()
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    result = replace(watched([*ENTRIES, entry("lloyd", error="it broke")], seconds=SECONDS), wanted=9)
+    path.write_text(report([result]).html, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser: Browser, page: Path) -> Browser:
+    browser.open(page)
+    browser.complaints()
+    return browser
+
+
+def test_it_opens_without_a_complaint_and_asks_for_nothing(browser, page, tmp_path) -> None:
+    browser.open(page)
+    browser.until(lambda: browser.all(".pane"))
+    assert browser.complaints() == []
+    assert browser.js("return performance.getEntriesByType('resource').length") == 0
+    assert [box.text for box in browser.all(".facts strong")] == ["1.500 m", "3.000 m"]
+    names = "return Object.getOwnPropertyNames(window)"
+    before = browser.js(names)
+    empty = tmp_path / "empty.html"
+    empty.write_text("<!doctype html><p>nothing")
+    browser.open(empty)
+    ours = {name for name in set(before) - set(browser.js(names)) if not name.startswith("se_")}
+    assert not ours  # no global name but the driver's
+
+
+def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
+    opened.seek(0.0)
+    before = opened.drawn()
+    opened.find(".main").click()
+    assert opened.playing
+    opened.until(lambda: opened.time > 1.0)
+    opened.find(".main").click()
+    assert not opened.playing
+    after, at = opened.drawn(), opened.time
+    assert len(after) == 3 and all(old != new for old, new in zip(before, after, strict=True))
+    time.sleep(0.2)
+    assert opened.time == at and opened.drawn() == after
+
+
+def test_it_ends_and_begins_again(opened) -> None:
+    assert opened.time == SECONDS  # it shows the end first
+    opened.js("const list = document.querySelector('.speed select'); list.value = '16'")
+    opened.find(".main").click()
+    opened.until(lambda: 0.0 < opened.time < SECONDS)
+    opened.until(lambda: not opened.playing)
+    assert opened.time == SECONDS
+    assert opened.find(".clock").text == "6.0 / 6.0 s"
+
+
+@pytest.mark.parametrize("seconds", [0.0, 2.4, 6.0])
+def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
+    opened.seek(seconds)
+    places = opened.js(
+        "return [...document.querySelectorAll('.pane > canvas')].map((c) => [c.width, c.height])"
+    )
+    for pane, (name, final) in enumerate((("rapf", 1.5), ("rpf", 3.0))):
+        record = walk(controller=name, seed=0, seconds=SECONDS)
+        history = falling(record, final)
+        cost = np.interp(seconds, history.time, history.mean_distance)
+        assert float(opened.all(".facts strong")[pane].text.split()[0]) == pytest.approx(cost, abs=2e-3)
+        moment = round(seconds * 10)
+        width, height = places[pane]
+        zoom = min((width - 4) / 16, (height - 4) / 10)
+        for x, y in record.positions[moment]:
+            column = (width - zoom * 16) / 2 + x * zoom
+            row = (height - zoom * 10) / 2 + (10 - y) * zoom
+            others = np.hypot(*(record.positions[moment] - (x, y)).T)
+            if np.sort(others)[1] * zoom > 24:  # left of its number, where nobody hides it
+                assert opened.pixel(pane, column - 7, row) == LIGHT.final
+
+
+def test_a_click_into_the_curves_goes_to_that_time(opened) -> None:
+    from selenium.webdriver import ActionChains
+
+    chart = opened.find(".chart")
+    ActionChains(opened.driver).move_to_element_with_offset(
+        chart, -chart.size["width"] // 4, 0
+    ).click().perform()
+    first = opened.time
+    ActionChains(opened.driver).move_to_element_with_offset(chart, 0, 0).click().perform()
+    assert 0.5 < first < opened.time < SECONDS
+
+
+def test_all_of_it_can_be_done_with_the_keyboard(opened) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    opened.js("document.querySelector('.stage').focus()")
+    scrolled = opened.js("return scrollY")
+    opened.keys(Keys.HOME)
+    assert opened.time == 0.0
+    opened.keys(Keys.ARROW_RIGHT)
+    assert opened.time == pytest.approx(0.2)
+    opened.keys(".", ".")
+    assert opened.time == pytest.approx(0.6)
+    opened.keys(Keys.ARROW_LEFT, ",")
+    assert opened.time == pytest.approx(0.2)
+    opened.keys(" ")
+    assert opened.playing
+    opened.until(lambda: opened.time > 0.5)
+    opened.keys(" ")
+    assert not opened.playing
+    opened.keys(Keys.END)
+    assert opened.time == SECONDS
+    assert opened.js("return scrollY") == scrolled  # the page has stayed where it was
+    # what a list of runs does with keys is its own business
+    opened.js("document.querySelector('.pane select').focus()")
+    opened.keys(".")
+    assert opened.time == SECONDS
+
+
+def test_the_focus_is_seen(opened) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    opened.keys(Keys.TAB)
+    assert opened.focus_is_in(".skip")
+    seen = set()
+    for _ in range(45):
+        opened.keys(Keys.TAB)
+        name, outline = opened.js(
+            "const e = document.activeElement; const s = getComputedStyle(e);"
+            "return [e.className || e.tagName, s.outlineStyle + ' ' + s.outlineWidth]"
+        )
+        seen.add(name)
+        assert outline == "solid 2px" or name in ("BODY", "HTML"), (name, outline)
+    assert {"stage", "main"} <= seen
+
+
+def test_controls_have_names(opened) -> None:
+    tree = opened.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    roles: dict[str, int] = {}
+    for node in tree:
+        role = node.get("role", {}).get("value")
+        wanted = ("button", "checkbox", "combobox", "slider", "link", "region", "navigation", "image", "img")
+        if role in wanted and not node["ignored"]:
+            roles[role] = roles.get(role, 0) + 1
+            assert node.get("name", {}).get("value"), node
+    assert roles["slider"] == 1 and roles["checkbox"] == 3 and roles["combobox"] == 3
+    assert roles["button"] > 10
+
+
+def test_the_time_is_told_when_it_stands_and_not_while_it_runs(opened) -> None:
+    said = "return document.querySelector('.said').textContent"
+    opened.seek(3.0)
+    opened.until(lambda: opened.js(said).startswith("At 3.0 s: RAPF: mean distance to the nearest robot"))
+    opened.js(
+        "window.told = 0; new MutationObserver(() => { window.told += 1; })"
+        ".observe(document.querySelector('.said'), {childList: true, characterData: true, subtree: true})"
+    )
+    opened.find(".main").click()
+    opened.until(lambda: opened.time > 4.5)
+    assert opened.js("return window.told") == 0
+    opened.find(".main").click()
+    opened.until(lambda: opened.js("return window.told") == 1)
+    label = opened.find(".pane > canvas").get_attribute("aria-label")
+    assert "RAPF" in label and "4 robots" in label and f"{opened.time:.1f} s" in label
+
+
+def test_panes_are_added_changed_and_removed(opened) -> None:
+    add = opened.find(".add")
+    add.click()
+    add.click()
+    assert len(opened.all(".pane")) == 4 and not add.is_displayed()
+    shown = opened.js("return [...document.querySelectorAll('.pane select')].map((list) => list.value)")
+    assert sorted(shown) == ["0", "1", "2", "3"]
+    opened.seek(3.0)
+    opened.js(
+        "const list = document.querySelector('.pane select'); list.value = '1';"
+        "list.dispatchEvent(new Event('change'))"
+    )
+    assert opened.time == 3.0 and opened.focus_is_in(".pane select")
+    for _ in range(3):
+        opened.find(".remove").click()
+    assert len(opened.all(".pane")) == 1 and not opened.all(".pane .remove")
+    assert opened.complaints() == []
+
+
+def test_a_picture_opens_large_and_the_focus_comes_back(opened) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    opened.js("document.querySelectorAll('.thumbnails button')[2].focus()")
+    opened.keys(Keys.ENTER)
+    dialog = opened.find("dialog")
+    opened.until(dialog.is_displayed)
+    assert opened.focus_is_in("dialog .remove")
+    title = opened.find("dialog h2").text
+    drawn = "return document.querySelector('dialog canvas').toDataURL()"
+    before = opened.js(drawn)
+    assert opened.find("dialog canvas").size["width"] > 600
+    opened.keys(Keys.ARROW_LEFT)
+    assert opened.find("dialog h2").text != title and opened.js(drawn) != before
+    assert "Mean distance 3.000 m after 6.0 s." in opened.find("dialog .facts").text
+    opened.keys(Keys.ESCAPE)
+    opened.until(lambda: not dialog.is_displayed())
+    assert opened.js("return document.activeElement.dataset.run") == "2"
+
+
+def test_a_large_picture_can_be_watched(opened) -> None:
+    opened.js("document.querySelectorAll('.thumbnails button')[3].click()")
+    opened.find(".watch-run").click()
+    opened.until(lambda: len(opened.all(".pane")) == 3)
+    assert opened.focus_is_in(".stage") and not opened.find("dialog").is_displayed()
+    assert opened.all(".pane select")[2].get_property("value") == "3"
+
+
+@pytest.mark.parametrize(("scheme", "theme"), [("light", LIGHT), ("dark", DARK)])
+def test_light_and_dark_follow_the_reader_and_can_be_read(browser, page, scheme, theme) -> None:
+    browser.open(page, color_scheme=scheme)
+    ground = browser.js("return getComputedStyle(document.documentElement).backgroundColor")
+    assert ground == f"rgb({', '.join(map(str, theme.background))})"
+    looked, bad = browser.js(READABLE)
+    assert looked > 150 and bad == []
+    # a reader who changes the preference sees it at once, in what is drawn as well
+    other = {"light": "dark", "dark": "light"}[scheme]
+    before = browser.drawn()
+    browser.prefer(color_scheme=other)
+    browser.until(lambda: browser.drawn() != before)
+
+
+def test_it_prints_without_controls(browser, page) -> None:
+    browser.open(page, color_scheme="dark")
+    pdf = browser.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    content = base64.b64decode(pdf["data"])
+    assert (
+        content.startswith(b"%PDF")
+        and 1 <= content.count(b"/Type /Page\n") + content.count(b"/Type /Page ") <= 12
+    )
+    browser.prefer("print", color_scheme="dark")
+    shown = browser.js(
+        "return ['.live', '.stills', 'nav', '.keys']"
+        ".map((name) => document.querySelector(name).checkVisibility())"
+    )
+    assert shown == [False, True, False, False]
+    looked, bad = browser.js(READABLE)
+    assert looked > 100 and bad == []
+    browser.prefer()
+
+
+@pytest.mark.parametrize("width", [360, 390, 768, 1920])
+def test_nothing_sticks_out_at_any_width(browser, page, width) -> None:
+    browser.open(page, width, 844)
+    browser.until(lambda: browser.all(".pane"))
+    assert browser.js("return document.documentElement.scrollWidth") <= width
+    browser.js("document.querySelector('.thumbnails button').click()")
+    inside = browser.js(
+        "const box = document.querySelector('dialog').getBoundingClientRect();"
+        "const canvas = document.querySelector('dialog canvas').getBoundingClientRect();"
+        "return [box.left, box.right, canvas.left - box.left, box.right - canvas.right]"
+    )
+    assert inside[0] >= 0 and inside[1] <= width and inside[2] >= 0 and inside[3] >= 0
+    assert browser.complaints() == []
+
+
+def test_who_wants_little_motion_gets_few_pictures(browser, page) -> None:
+    browser.open(page, reduced_motion="reduce")
+    browser.js(
+        "window.seen = new Set(); const slider = document.querySelector('.transport input');"
+        "const look = () => { window.seen.add(slider.value); requestAnimationFrame(look); }; look()"
+    )
+    browser.seek(0.0)
+    browser.find(".main").click()
+    browser.until(lambda: browser.time == SECONDS)
+    assert 3 <= browser.js("return window.seen.size") <= 8
+
+
+def test_hostile_names_do_nothing(browser, tmp_path) -> None:
+    entries = [replace(entry(HOSTILE, seed, map_name=HOSTILE), label=HOSTILE) for seed in range(2)]
+    path = tmp_path / "hostile.html"
+    path.write_text(
+        report([watched(entries, replace(ROOMS, name=HOSTILE), seconds=2.0)]).html, encoding="utf-8"
+    )
+    browser.open(path)
+    browser.find(".add").click()
+    browser.js("document.querySelector('.thumbnails button').click()")
+    assert browser.complaints() == [] and not browser.all("img")
+    assert browser.find("dialog h2").text.startswith("</script>")
+
+
+def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
+    runs = [ReplayRun(walk(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
+    cells = "".join(f"<section>{replay_html([run], standalone=False)}</section>" for run in runs)
+    path = tmp_path / "notebook.html"
+    path.write_text(
+        f'<!doctype html><meta charset="utf-8"><body data-jp-theme-light="false">{cells}', "utf-8"
+    )
+    browser.open(path)
+    assert browser.complaints() == []
+    assert [each.text for each in browser.all(".head strong")] == ["run 0", "run 1"]
+    ground = browser.js("return getComputedStyle(document.querySelector('.robocov-replay')).backgroundColor")
+    assert ground == f"rgb({', '.join(map(str, DARK.background))})"
+    before = browser.drawn()
+    browser.seek(0.0)
+    after = browser.drawn()
+    assert before[0] != after[0] and before[2:] == after[2:]  # only the first one went back
+    assert not browser.all(".chart")[0].is_displayed()  # without a cost there are no curves
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5, 40])
+def test_cells_are_voronoi_cells(browser, robots) -> None:
+    record = walk(robots=robots, seed=robots)
+    places = record.positions[0]
+    if robots == 5:
+        places[4] = places[3]  # two in one place have the same cell
+    script = asset("arena.js") + (
+        "const [region, places] = arguments;"
+        "return Array.from({length: places.length / 2}, (_, i) => cellOf(region, places, i))"
+    )
+    cells = browser.js(script, ROOMS.region.vertices.ravel().tolist(), places.ravel().tolist())
+    wanted = partition(places, ROOMS.region)
+    for cell, mass in zip(cells, wanted.mass, strict=True):
+        x, y = np.array(cell).reshape(-1, 2).T
+        area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        assert area == pytest.approx(mass, rel=1e-9)
+
+
+def test_labels_of_curves_do_not_overlap(browser) -> None:
+    script = asset("arena.js") + asset("chart.js") + "return spreadApart(...arguments)"
+    rng = np.random.default_rng(2)
+    for count in (1, 2, 4, 7):
+        heights = rng.uniform(0.0, 120.0, count).tolist()
+        apart = browser.js(script, heights, 15, 0, 150)
+        order = np.argsort(heights, kind="stable")
+        assert (np.diff(np.array(apart)[order]) >= 15 - 1e-9).all()
+        assert min(apart) >= 0 and max(apart) <= 150
+    assert browser.js(asset("arena.js") + asset("chart.js") + "return roundTicks(0, 60, 5)") == [
+        0,
+        20,
+        40,
+        60,
+    ]

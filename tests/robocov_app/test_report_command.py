@@ -1,0 +1,134 @@
+"""`robocov report`: from folders to a file."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from called import answer, complaint
+from drawn_run import SQUARE
+from reported_results import saved_comparison, saved_run, walk
+
+from robocov_app.cli import main
+from robocov_app.output import cleared, is_report
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    saved_run(tmp_path / "one", walk(SQUARE))
+    return tmp_path / "one"
+
+
+def test_a_page_stands_in_the_folder_of_the_run(run, capsys) -> None:
+    assert main(["report", str(run)]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[0] == f"{run}: run of 1 run"
+    assert is_report(run / "report.html")
+    before = (run / "report.html").read_bytes()
+    assert main(["report", str(run)]) == 0  # an earlier one is replaced without a word
+    assert (run / "report.html").read_bytes() == before
+
+
+def test_the_answer_as_json(run, tmp_path, capsys) -> None:
+    saved_comparison(tmp_path / "both")
+    out = tmp_path / "page.html"
+    said = answer(capsys, "report", str(run), str(tmp_path / "both"), "--out", str(out), "--title", "<Two>")
+    assert said["path"] == str(out) and said["bytes"] == out.stat().st_size
+    assert [(each["kind"], each["runs"], each["shown"]) for each in said["results"]] == [
+        ("run", 1, 1),
+        ("comparison", 2, 2),
+    ]
+    assert {each["failed"] + each["missing"] for each in said["results"]} == {0}
+    assert "<title>&lt;Two&gt; – robocov</title>" in out.read_text()
+
+
+def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
+    (run / "report.html").write_text("mine")
+    said = complaint(capsys, "report", str(run))
+    assert said.startswith(f"{run / 'report.html'}: the file is no report of robocov")
+    assert (run / "report.html").read_text() == "mine"
+    assert main(["report", str(run), "--overwrite", "--theme", "dark"]) == 0
+    assert is_report(run / "report.html")
+
+
+def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run) -> None:
+    assert main(["report", str(run)]) == 0
+    cleared(run)
+    assert list(run.iterdir()) == []
+    saved_run(run / "again", walk(SQUARE))
+    (run / "again" / "report.html").write_text("mine")
+    cleared(run / "again")
+    assert [path.name for path in (run / "again").iterdir()] == ["report.html"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nothing"], "nothing: there is no such folder"),
+        (["."], ".: not the folder of a run, a comparison or a sweep"),
+        (["one", "--out", "no/page.html"], "no/page.html: cannot be written: there is no folder no"),
+        (["one", "--out", "one"], "one: cannot be written: it is a folder"),
+        ([], "DIR"),
+    ],
+)
+def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) -> None:
+    monkeypatch.chdir(tmp_path)
+    if words:
+        assert message in complaint(capsys, "report", *words)
+    else:
+        assert main(["report"]) == 2
+        assert message in capsys.readouterr().err
+    assert list(tmp_path.rglob("*.html")) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_to_is_named(run, capsys) -> None:
+    run.chmod(0o500)
+    try:
+        assert "cannot be written" in complaint(capsys, "report", str(run))
+    finally:
+        run.chmod(0o700)
+
+
+def test_the_page_does_not_say_where_it_was_made(run) -> None:
+    assert main(["report", str(run)]) == 0
+    assert str(run.parent) not in (run / "report.html").read_text()
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys\nfrom robocov_app.cli import main\nmain(['report', '--help'])\n"
+        "print('LOADED', ' '.join(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    said, _, loaded = done.stdout.partition("LOADED")
+    assert "Example: robocov report" in said and re.search(r"--theme \{auto,light,dark\}", said)
+    assert not set(loaded.split()) & {"matplotlib", "jinja2", "pyarrow", "pygame", "scipy"}
+
+
+def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
+    from hatchling.builders.wheel import WheelBuilder
+
+    (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    packed = set(zipfile.ZipFile(wheel).namelist())
+    parts = {path.name for path in (ROOT / "app/robocov_app/report/assets").iterdir()}
+    assert {"report.html.jinja", "report.css", "replay.js"} <= parts
+    assert {f"robocov_app/report/assets/{name}" for name in parts} <= packed
+
+
+def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
+    saved_comparison(tmp_path / "both")
+    content = json.loads((tmp_path / "both/comparison.json").read_text())
+    content |= {"folders": ["rapf", "rpf", "lloyd"], "runs": []}
+    (tmp_path / "both/comparison.json").write_text(json.dumps(content))
+    said = answer(capsys, "report", str(tmp_path / "both"))
+    assert said["results"][0]["missing"] == 1
+    assert "Not finished: 1 of 3 runs is missing." in (tmp_path / "both/report.html").read_text()

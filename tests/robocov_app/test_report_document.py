@@ -1,0 +1,216 @@
+"""The page as a whole: its parts, its size, and that nothing can go out of it or break it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from base64 import b64encode
+from dataclasses import replace
+from html import unescape
+
+import pytest
+from drawn_run import HALL, ROOMS
+from reported_results import HOSTILE, Page, entry, result_of, watched
+
+from robocov.errors import ParameterError
+from robocov_app.output import is_report
+from robocov_app.report.document import MARKS, report
+from robocov_app.report.replay import asset
+from robocov_app.saved import Saved
+
+SWEEP = [
+    entry(name, seed, base + 0.2 * seed + 0.3 * k, gains=(("k_rep", k), ("limit", None if k > 1 else 2.0)))
+    for seed in range(5)
+    for name, base in (("rapf", 1.0), ("rpf", 2.0))
+    for k in (0.1, 1.0, 3.0)
+]
+
+
+@pytest.fixture(scope="module")
+def html() -> str:
+    """A page of a sweep with gains, failures and missing runs."""
+    return report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
+
+
+def test_it_is_well_formed_and_its_ids_are_unique(html) -> None:
+    page = Page(html)
+    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    for _, attributes in page.elements:
+        for name in ("aria-labelledby", "aria-describedby", "for"):
+            assert attributes.get(name) is None or attributes[name] in ids
+        if (attributes.get("href") or "").startswith("#"):
+            assert attributes["href"][1:] in ids
+
+
+def test_it_has_its_landmarks_headings_and_a_way_past_the_head(html) -> None:
+    page = Page(html)
+    for tag in ("header", "nav", "main", "footer", "h1", "title"):
+        assert len(page.all(tag)) == 1, tag
+    levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1 and set(levels[1:]) == {2}
+    skip = next(each for each in page.all("a"))
+    assert skip == {"class": "skip", "href": "#content"}
+    for section in page.all("section"):
+        assert "aria-label" in section or "aria-labelledby" in section
+
+
+def test_all_that_is_drawn_is_said_in_words(html) -> None:
+    page = Page(html)
+    pictures = page.all("svg")
+    assert len(pictures) > 30
+    for each in pictures:
+        hidden = each.get("aria-hidden") == "true"
+        assert hidden or (each.get("role") == "img" and len(each.get("aria-label") or "") > 20)
+    said = " ".join(each.get("aria-label") or "" for each in pictures)
+    for number in (
+        "1.430 m at the end (median of 5 runs, quartiles 1.230 to 1.630)",
+        "medians at 0.1: 1.430",
+    ):
+        assert number in said, number
+    for button in page.all("button"):
+        assert "Open large." in button["aria-label"] and "final mean distance" in button["aria-label"]
+    assert not page.all("img") and not page.all("canvas")  # canvases and their words are made by the script
+
+
+def test_tables_have_captions_and_scopes(html) -> None:
+    page = Page(html)
+    assert len(page.all("table")) == len(page.all("caption")) >= 5
+    assert {each.get("scope") for each in page.all("th")} == {"col", "row"}
+
+
+def test_nothing_can_go_out_of_it(html) -> None:
+    assert not re.findall(r"(?:https?:)?//[\w.-]+\.\w|@import|url\((?!#)", unescape(html))
+    page = Page(html)
+    for _, attributes in page.elements:
+        for name in ("src", "srcset", "action", "data", "poster"):
+            assert name not in attributes
+        assert (attributes.get("href") or "#").startswith("#")
+        assert not [name for name in attributes if name.startswith("on")]
+    (policy,) = [each["content"] for each in page.all("meta") if "http-equiv" in each]
+    assert "default-src 'none'" in policy
+    (script,) = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
+    digest = b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy and "unsafe-eval" not in policy
+
+
+def test_hostile_names_stay_names() -> None:
+    entries = [
+        replace(
+            entry(HOSTILE, seed, 2.0 + seed, map_name=HOSTILE, gains=((HOSTILE, 1.0 + seed),)), label=HOSTILE
+        )
+        for seed in range(3)
+    ]
+    entries.append(replace(entries[0], error=HOSTILE, figures={}, start=HOSTILE, seed=9))
+    result = watched(entries, replace(ROOMS, name=HOSTILE))
+    result = replace(result, units={HOSTILE: HOSTILE}, meanings={HOSTILE: HOSTILE})
+    html = report([result], title=HOSTILE).html
+    page = Page(html)
+    assert not page.all("img")
+    assert [each.get("type") for each in page.all("script")] == ["application/json", None]
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+    assert data["maps"][0]["name"] == HOSTILE and HOSTILE in data["runs"][0]["title"]
+    assert HOSTILE in "".join(page.words)
+    assert "{{7*7}}" in "".join(page.words) and "49" not in re.findall(r"\b49\b", "".join(page.words))
+
+
+def test_the_same_results_give_the_same_bytes(html) -> None:
+    again = report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
+    assert again == html
+
+
+def test_fifty_runs_take_less_than_three_megabytes() -> None:
+    entries = [
+        entry(name, seed, 2.0 + 0.1 * seed, robots=6, map_name=("rooms", "flat")[seed % 2])
+        for seed in range(25)
+        for name in ("rapf", "rpf")
+    ]
+    page = report([watched(entries, seconds=60.0, hz=60.0)])
+    assert page.shown == (50,)
+    assert len(page.html.encode()) < 3_000_000
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page.html)[1])
+    assert len(data["runs"]) == 50 and data["rate"] >= 2.0
+
+
+def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
+    entries = [entry("rapf", seed, 2.0, robots=30) for seed in range(50)]
+    result = watched(entries[:1], seconds=300.0, hz=5.0)
+    (saved,) = result.loaded.values()
+    loaded = {each.folder: Saved(each.folder, saved.record, saved.history) for each in entries}
+    page = report([result_of(entries, loaded=loaded, maps={"rooms": ROOMS})])
+    assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
+
+
+def test_several_results_are_sections_that_share_nothing() -> None:
+    one = watched([entry(), entry("rpf", final=3.0)])
+    other = watched([entry("lloyd", map_name="hall")], HALL)
+    page = report(
+        [replace(one, kind="comparison"), replace(other, kind="run"), replace(one, kind="comparison")]
+    )
+    parsed = Page(page.html)
+    ids = [attributes["id"] for _, attributes in parsed.elements if "id" in attributes]
+    assert len(ids) == len(set(ids)) and page.shown == (2, 1, 2)
+    levels = [int(tag[1]) for tag, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[:3] == [1, 2, 3] and levels.count(2) == 3
+    assert "3 results" in parsed.words
+
+
+def test_what_there_is_nothing_of_has_no_section() -> None:
+    headings = re.findall(r"<h2[^>]*>([^<]+)", report([replace(watched([entry()]), kind="run")]).html)
+    assert headings == ["What was run", "Results", "Replay", "Cost over time"]
+    failed = report([result_of([entry(error="it broke")])]).html
+    assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["What was run", "Failures"]
+    assert "it broke" in failed and "No run has a result." in failed
+
+
+def test_sections_are_there_where_they_tell_something(html) -> None:
+    headings = re.findall(r"<h2[^>]*>([^<]+)", html)
+    assert headings == [
+        *("What was run", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
+        *("What the result depends on", "Trajectories", "Failures"),
+    ]
+    assert "Not finished: 9 of 40 runs are missing." in html and "1 of 31 runs failed." in html
+    assert html.count('class="thumbnails"') == 1 and html.count("data-run=") == 30
+
+
+@pytest.mark.parametrize("theme", ["auto", "light", "dark"])
+def test_themes(theme) -> None:
+    html = report([watched([entry()])], theme=theme).html
+    assert ("prefers-color-scheme" in html.partition("</style>")[0]) == (theme == "auto")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: report([]), "no results were given"),
+        (lambda: report([watched([entry()])], theme="sepia"), "unknown theme 'sepia'"),
+    ],
+)
+def test_bad_input_is_named(call, message) -> None:
+    with pytest.raises(ParameterError) as caught:
+        call()
+    assert message in str(caught.value)
+
+
+def test_progress_counts_all_runs() -> None:
+    told: list[int] = []
+    report([watched([entry(), entry("rpf")]), watched([entry()])], tell=told.append)
+    assert told == [1, 2, 3]
+
+
+def test_a_page_knows_its_own(tmp_path) -> None:
+    path = tmp_path / "page.html"
+    path.write_text(report([watched([entry()])]).html)
+    assert is_report(path)
+    path.write_text("<!doctype html><title>mine</title>")
+    assert not is_report(path) and not is_report(tmp_path / "none.html")
+
+
+def test_marks_are_those_of_the_plots() -> None:
+    from robocov_app.plot_curves import curve_styles
+
+    used = {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", "a", "b", "c"]).values()}
+    assert used == MARKS.keys()
+    for mark in used - {"o"}:  # all but the round one are shapes of their own in the replay, too
+        assert f'"{mark}"' in asset("chart.js") or f"{mark}:" in asset("chart.js")

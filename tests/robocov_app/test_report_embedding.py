@@ -1,0 +1,169 @@
+"""Runs as small JSON: what the browser gets is what was recorded, to within what nobody sees."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_run import HALL, ROOMS
+from hypothesis import given
+from hypothesis import strategies as st
+from reported_results import HOSTILE, falling, walk
+
+from robocov.environment import Environment
+from robocov_app.plot_curves import curve_styles
+from robocov_app.report.embedding import (
+    NONE,
+    RATE,
+    ReplayRun,
+    embedded,
+    embedded_map,
+    embedded_run,
+    even_times,
+    has_path,
+    quantised,
+    script_json,
+)
+
+STYLE = curve_styles(["rapf"])["rapf"]
+
+
+def read_back(text: str, low: float, high: float) -> np.ndarray:
+    """Return what `quantised` was given: an implementation of its own."""
+    words = np.frombuffer(base64.b64decode(text), dtype="<u2").astype(float)
+    return np.where(words == NONE, np.nan, low + words / (NONE - 1) * (high - low))
+
+
+def run_of(seconds: float = 6.0, **walking) -> ReplayRun:
+    record = walk(seconds=seconds, **walking)
+    return ReplayRun(record, falling(record, 2.0), "a run")
+
+
+def places_of(data: dict, record, name: str = "positions") -> np.ndarray:
+    low_x, low_y, high_x, high_y = record.environment.region.bounds
+    flat = read_back(data[name], 0.0, 1.0).reshape(data["count"], -1, 2)
+    return np.array([low_x, low_y]) + flat * np.array([high_x - low_x, high_y - low_y])
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=50))
+def test_numbers_come_back_to_within_half_a_step(values) -> None:
+    array = np.array(values)
+    low, high = float(array.min()), float(array.max())
+    back = read_back(quantised(array, low, high), low, high)
+    assert np.abs(back - array).max() <= 0.51 * (high - low) / (NONE - 1) + 1e-12
+
+
+def test_what_is_not_there_stays_so() -> None:
+    back = read_back(quantised(np.array([0.0, np.nan, np.inf, 1.0]), 0.0, 1.0), 0.0, 1.0)
+    assert np.isnan(back).tolist() == [False, True, True, False]
+
+
+@given(st.floats(0.0, 500.0), st.sampled_from([0.05, 1.0, 1.25, 2.5, 5.0]))
+def test_even_times_begin_at_zero_and_end_at_the_end(end, rate) -> None:
+    times = even_times(end, rate)
+    assert times[0] == 0.0 and times[-1] == pytest.approx(end, abs=1e-8)
+    steps = np.diff(times)
+    assert (steps > 0.0).all() and (steps <= 1.0 / rate + 1e-9).all()
+    assert np.allclose(steps[:-1], 1.0 / rate)
+
+
+@pytest.mark.parametrize("hz", [60.0, 5.0, 3.0])
+@pytest.mark.parametrize("seconds", [6.0, 4.35])
+def test_positions_are_those_of_the_record(hz, seconds) -> None:
+    run = run_of(seconds, hz=hz)
+    data = embedded_run(run, 0, STYLE, RATE, goals=True)
+    record = run.record
+    times = np.minimum(np.arange(data["count"]) * data["step"], data["end"])
+    wanted = np.stack(
+        [
+            np.column_stack([np.interp(times, record.time, record.positions[:, i, k]) for k in (0, 1)])
+            for i in range(len(record.team))
+        ],
+        axis=1,
+    )
+    assert data["end"] == pytest.approx(record.time[-1])
+    assert np.abs(places_of(data, record) - wanted).max() < 1e-3
+    assert np.abs(places_of(data, record, "goals") - record.goals[0]).max() < 1e-3
+
+
+def test_costs_are_those_of_the_history_and_the_last_is_exact() -> None:
+    run = run_of()
+    cost = embedded_run(run, 0, STYLE, RATE, goals=True)["cost"]
+    assert run.history is not None
+    times = np.minimum(np.arange(cost["count"]) * cost["step"], 6.0)
+    wanted = np.interp(times, run.history.time, run.history.mean_distance)
+    assert read_back(cost["values"], cost["low"], cost["high"]) == pytest.approx(wanted, abs=1e-3)
+    assert cost["last"] == run.history.mean_distance[-1]
+
+
+def test_a_run_without_goals_cost_or_path() -> None:
+    record = walk(controller="rpf")
+    data = embedded_run(ReplayRun(record, None, "x"), 0, STYLE, RATE, goals=True)
+    assert data["goals"] is None and data["cost"] is None and data["path"]
+    ends = replace(
+        record, **{name: getattr(record, name)[[0, -1]] for name in ("time", "positions", "goals")}
+    )
+    assert not has_path(ends)
+    data = embedded_run(ReplayRun(ends, falling(record, 2.0), "x"), 0, STYLE, RATE, goals=True)
+    assert data["count"] == 2 and not data["path"]
+    assert data["cost"]["count"] > 20  # of the cost there is more
+    assert np.abs(places_of(data, record) - record.positions[[0, -1]]).max() < 1e-3
+
+
+def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
+    record = walk(hz=5.0)
+    record.goals[:10] = np.nan
+    run = ReplayRun(record, None, "x")
+    data = embedded_run(run, 0, STYLE, RATE, goals=True)
+    gone = np.isnan(places_of(data, record, "goals")).all(axis=(1, 2))
+    assert gone.tolist() == [k < 10 for k in range(data["count"])]
+
+
+def test_a_run_of_a_single_moment() -> None:
+    record = walk(seconds=0.0)
+    data = embedded_run(ReplayRun(record, falling(record, 2.0), "x"), 0, STYLE, RATE, goals=True)
+    assert data["end"] == 0.0 and data["count"] == 1
+    json.dumps(data, allow_nan=False)
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
+def test_maps_are_rounded_to_millimetres(environment) -> None:
+    data = embedded_map(environment)
+    assert data["unit"] == 1e-3
+    ring = np.array(data["region"]).reshape(-1, 2) * data["unit"]
+    assert np.abs(ring - environment.region.vertices).max() <= 0.51e-3
+    assert len(data["blocked"]) == len(environment.blocked.geoms)
+    assert sum(len(rings) for rings in data["blocked"]) > len(data["blocked"]) or environment is HALL
+
+
+def test_tiny_maps_are_rounded_less() -> None:
+    tiny = Environment("tiny", ((0, 0), (0.05, 0), (0.05, 0.02), (0, 0.02)))
+    data = embedded_map(tiny)
+    assert np.array(data["bounds"]) * data["unit"] == pytest.approx([0, 0, 0.05, 0.02], abs=1e-5)
+
+
+def test_runs_of_one_map_share_it() -> None:
+    runs = [run_of(), run_of(seed=1), run_of(environment=HALL)]
+    data = embedded(runs, [STYLE] * 3, [0, 2])
+    assert [each["map"] for each in data["runs"]] == [0, 0, 1]
+    assert data["panes"] == [0, 2] and len(data["maps"]) == 2 and data["rate"] == RATE
+
+
+def test_what_is_too_much_is_thinned() -> None:
+    runs = [run_of(60.0) for _ in range(4)]
+    sizes = []
+    for budget in (1_000_000, 60_000, 20_000, 4_000, 500):
+        data = embedded(runs, [STYLE] * 4, [0], budget)
+        sizes.append(len(json.dumps(data["runs"])))
+        assert sizes[-1] < budget + 4 * 450  # names and numbers come on top
+        assert data["runs"][0]["end"] == 60.0
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_no_name_ends_its_script_element() -> None:
+    text = script_json({"name": HOSTILE, "more": "\u2029<&>"})
+    assert not set(text) & set("<>&\u2028\u2029")
+    assert json.loads(text)["name"] == HOSTILE

@@ -1,0 +1,98 @@
+"""Small pictures of maps and runs."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from drawn_run import HALL, ROOMS
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from reported_results import HOSTILE, falling, walk
+
+from robocov_app.report.pictures import MOST_ROBOTS, Frame, _path, map_picture, run_picture
+
+
+def drawn(svg: str) -> ElementTree.Element:
+    return ElementTree.fromstring(svg)
+
+
+def of_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    return [each for each in root if name in each.get("class", "").split()]
+
+
+@given(arrays(float, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(-500, 500)))
+def test_relative_steps_of_a_path_add_up(points) -> None:
+    words = re.findall(r"-?[\d.]+(?:e-?\d+)?", _path([points]))
+    numbers = np.array([float(word) for word in words])
+    if "h0" in _path([points]):
+        numbers = numbers[:-1]
+    walked = np.cumsum(numbers.reshape(-1, 2), axis=0)
+    assert np.abs(walked[0] - points[0]).max() <= 0.051
+    assert np.abs(walked[-1] - points[-1]).max() <= 0.051 + 1e-6
+
+
+def test_a_run_has_its_robots_where_they_ended() -> None:
+    record = walk(robots=5)
+    root = drawn(run_picture(record, falling(record, 2.0), 400, 300, numbers=True))
+    frame = Frame(ROOMS, 400, 300)
+    places = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "robot")])
+    assert places == pytest.approx(frame.at(record.positions[-1]), abs=0.06)
+    starts = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in of_class(root, "start")])
+    assert starts == pytest.approx(frame.at(record.positions[0]), abs=0.06)
+    assert [each.text for each in root if each.tag == "text"] == ["1", "2", "3", "4", "5"]
+    assert len(of_class(root, "cell")) == 5
+    assert of_class(root, "way")[0].get("d").count("M") == 5
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda each: each.name)
+@pytest.mark.parametrize("room", [(300.0, 200.0), (200.0, 300.0)])
+def test_a_map_fits_into_its_picture(environment, room) -> None:
+    frame = Frame(environment, *room)
+    points = frame.at(environment.region.vertices)
+    assert (points >= 2.9).all() and (points <= np.array([frame.width, frame.height]) - 2.9).all()
+    assert frame.width == pytest.approx(room[0], abs=0.1) or frame.height == pytest.approx(room[1], abs=0.1)
+    root = drawn(map_picture(environment, *room))
+    assert root.get("viewBox") == f"0 0 {frame.width:g} {frame.height:g}"
+    assert of_class(root, "blocked") and of_class(root, "region")
+
+
+def test_every_picture_says_what_it_shows() -> None:
+    record = walk()
+    said = drawn(run_picture(record, falling(record, 2.345))).get("aria-label")
+    assert said == (
+        "RAPF on map rooms: trajectories of 4 robots from start spread over 6 s. "
+        "The mean distance to the nearest robot falls from 6.000 m to 2.345 m."
+    )
+    assert "cost" not in drawn(run_picture(record, None)).get("aria-label")
+    assert drawn(map_picture(HALL)).get("aria-label") == (
+        "Map hall: 14 m by 11 m without obstacles, 98 m² free, 22 % of the known region blocked."
+    )
+    hidden = drawn(run_picture(record, None, hidden=True))
+    assert hidden.get("aria-hidden") == "true" and hidden.get("aria-label") is None
+
+
+def test_names_are_words() -> None:
+    record = walk(replace(ROOMS, name=HOSTILE), label=HOSTILE)
+    root = drawn(run_picture(record, None))  # is XML in spite of them
+    assert HOSTILE in root.get("aria-label")
+    assert not [each for each in root.iter() if each.tag in ("img", "script")]
+
+
+def test_a_record_without_a_path_has_no_lines() -> None:
+    record = walk()
+    names = ("time", "positions", "goals")
+    ends = replace(record, **{name: getattr(record, name)[[0, -1]] for name in names})
+    root = drawn(run_picture(ends, None))
+    assert not of_class(root, "way") and of_class(root, "robot")
+
+
+def test_a_very_large_team_makes_no_very_large_picture() -> None:
+    record = walk(robots=MOST_ROBOTS + 1, hz=2.0)
+    root = drawn(run_picture(record, None))
+    assert not of_class(root, "cell") and not of_class(root, "way")
+    assert len(of_class(root, "robot")) == MOST_ROBOTS + 1

@@ -1,0 +1,88 @@
+"""The replay as HTML, without a browser: what is in it, and what is not."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+from drawn_run import ROOMS
+from reported_results import HOSTILE, Page, falling, walk
+
+from robocov.errors import ParameterError
+from robocov_app.plot_curves import curve_styles
+from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
+
+
+def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
+    records = [walk(seed=seed, controller=("rapf", "rpf", "lloyd")[seed % 3]) for seed in range(count)]
+    return [
+        ReplayRun(record, falling(record, 2.0), f"{name} {k}", "It went well.")
+        for k, record in enumerate(records)
+    ]
+
+
+def data_of(html: str) -> dict:
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+
+
+def test_a_fragment_brings_all_that_it_needs() -> None:
+    html = replay_html(runs_of(), standalone=False)
+    page = Page(html)
+    assert [attributes for name, attributes in page.elements if "id" in attributes] == []
+    assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
+    assert len(page.all("style")) == 1 and len(page.all("script")) == 2
+    assert not page.all("html")
+    data = data_of(html)
+    assert [run["title"] for run in data["runs"]] == ["run 0", "run 1"]
+    assert [run["style"] for run in data["runs"]] == ["rapf", "rpf"]
+
+
+def test_a_page_is_a_page() -> None:
+    html = replay_html(runs_of(), standalone=True)
+    page = Page(html)
+    assert html.startswith("<!doctype html>")
+    assert page.all("html") == [{"lang": "en"}]
+    assert [len(page.all(tag)) for tag in ("title", "main", "body")] == [1, 1, 1]
+
+
+def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
+    page = Page(replay_part(runs_of(6), curve_styles(["rapf", "rpf", "lloyd"])))
+    pictures = page.all("svg")
+    assert len(pictures) == MOST_PANES
+    assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)
+    assert not page.all("style")
+
+
+def test_no_name_gets_out_of_its_place() -> None:
+    record = replace(walk(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
+    html = replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)], standalone=True)
+    page = Page(html)
+    assert len(page.all("script")) == 2 and not page.all("img")
+    data = data_of(html)
+    assert data["runs"][0]["title"] == data["runs"][0]["facts"] == data["maps"][0]["name"] == HOSTILE
+
+
+def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
+    assert data_of(replay_html(runs_of(6), standalone=False))["panes"] == [0, 1, 2, 3]
+    assert data_of(replay_html(runs_of(6), standalone=False, panes=[5, 2]))["panes"] == [5, 2]
+    with pytest.raises(ParameterError, match="no runs were given"):
+        replay_html([], standalone=False)
+
+
+def test_the_same_runs_give_the_same_bytes() -> None:
+    assert replay_html(runs_of(), standalone=False) == replay_html(runs_of(), standalone=False)
+
+
+def test_style_and_script_meet_nothing_else() -> None:
+    css = replay_css()
+    for selector in re.findall(r"([^{}]+)\{", re.sub(r"@[^{]+\{", "", css)):
+        for part in re.sub(r":is\([^)]*\)", "", selector).split(","):
+            assert part.strip().startswith((".robocov-replay", ".robocov-picture")), part
+    html = replay_html(runs_of(1), standalone=False)
+    script = html[html.rindex("<script>") : html.rindex("</script>")]
+    assert script.startswith('<script>(() => {\n"use strict";') and script.rstrip().endswith("})();")
+    assert "window." not in replay_js().replace("window.devicePixelRatio", "").replace(
+        "window.innerHeight", ""
+    )

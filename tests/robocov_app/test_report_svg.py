@@ -1,0 +1,84 @@
+"""matplotlib's figures as parts of a page."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from reported_results import HOSTILE
+
+from robocov_app.plot_gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.plot_results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.report.svg import inline_svg
+from robocov_app.report.theme_css import named_colours
+from robocov_app.view.theme import LIGHT
+
+RNG = np.random.default_rng(5)
+TIME = np.linspace(0.0, 10.0, 40)
+FIGURES = {
+    "bands": lambda name="RAPF": plot_cost_bands(
+        [Band(name, "rapf", TIME, RNG.uniform(1, 2, (5, 40))), Band("RPF", "rpf", TIME, np.ones((1, 40)))],
+        size=(420, 290),
+    ),
+    "boxes": lambda name="RAPF": plot_final_costs(
+        [("", [Sample(name, "rapf", RNG.normal(2, 0.1, 300)), Sample("x", "mine", np.ones(2))])]
+    ),
+    "gains": lambda name="RAPF": plot_gains(
+        [Dependence(name, "lloyd", np.array([1.0, 2.0, np.nan] * 9), np.ones(27))], name
+    ),
+    "grid": lambda name="RAPF": plot_gain_grid([1.0, 2.0], [1.0], np.array([[1.0, 2.0]]), (name, "b")),
+}
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_all_colours_are_the_pages(kind) -> None:
+    svg = inline_svg(FIGURES[kind](), "k", "what it shows")
+    assert not re.findall(r"#[0-9a-fA-F]{3,6}\b|rgb\(", svg.replace("#k-", "="))
+    used = set(re.findall(r"var\(--rc-([\w-]+)\)", svg))
+    assert used and used <= named_colours(LIGHT).keys()
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_ids_begin_with_the_key_and_all_that_is_referred_to_is_there(kind) -> None:
+    svg = inline_svg(FIGURES[kind](), "f7", "what it shows")
+    root = ElementTree.fromstring(svg)
+    ids = [each.get("id") for each in root.iter() if each.get("id")]
+    assert len(ids) == len(set(ids)) and all(name.startswith("f7-") for name in ids)
+    referred = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', svg))
+    assert {name for pair in referred for name in pair if name} <= set(ids)
+    assert "http" not in svg and "DejaVu" not in svg
+
+
+def test_texts_stay_texts_whatever_they_are() -> None:
+    for kind, figure in FIGURES.items():
+        root = ElementTree.fromstring(inline_svg(figure(HOSTILE), "k", HOSTILE))
+        assert root.get("aria-label") == HOSTILE and root.get("role") == "img"
+        said = " ".join(each.text or "" for each in root.iter("text"))
+        assert "</script>" in said, kind
+        assert not [each for each in root.iter() if each.tag in ("script", "img")]
+
+
+def test_many_dots_are_one_path_at_the_same_places() -> None:
+    figure = FIGURES["boxes"]()
+    axes = figure.axes[0]
+    points = axes.lines[0]
+    wanted = axes.transData.transform(np.column_stack(points.get_data()))
+    root = ElementTree.fromstring(inline_svg(figure, "k", "x"))
+    dots = [each for each in root.iter("path") if "h0" in (each.get("d") or "")]
+    assert len(dots) == 1
+    places = np.array(re.findall(r"M([\d.]+) ([\d.]+)h0", dots[0].get("d")), dtype=float)
+    height = float(root.get("viewBox").split()[3])
+    pixels = places * figure.dpi / 72
+    assert pixels[:, 0] == pytest.approx(wanted[:, 0], abs=0.1)
+    assert height * figure.dpi / 72 - pixels[:, 1] == pytest.approx(wanted[:, 1], abs=0.2)
+    assert "stroke-width:3.6" in dots[0].get("style")
+
+
+def test_the_same_figure_gives_the_same_bytes() -> None:
+    once, again = (
+        inline_svg(plot_cost_bands([Band("RAPF", "rapf", TIME, np.outer([1, 2, 3], TIME))]), "k", "x")
+        for _ in range(2)
+    )
+    assert once == again

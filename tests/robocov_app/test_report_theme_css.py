@@ -1,0 +1,72 @@
+"""The project's colours as CSS variables: the same names in light and dark, and readable in both."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from robocov.errors import ParameterError
+from robocov_app.plot_gains import HEAT_LEVELS
+from robocov_app.report.theme_css import hex_code, named_colours, theme_rules, variables
+from robocov_app.view.theme import DARK, LIGHT, contrast, rgb
+
+THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+
+
+def declared(css: str) -> dict[str, str]:
+    return dict(re.findall(r"--rc-([\w-]+):(#[0-9a-f]{6});", css))
+
+
+def test_both_themes_have_the_same_names() -> None:
+    assert list(named_colours(LIGHT)) == list(named_colours(DARK))
+    assert declared(variables(DARK)).keys() == named_colours(DARK).keys()
+    assert declared(variables(DARK))["ink"] == hex_code(DARK.ink)
+    assert rgb(hex_code((1, 171, 255))[1:]) == (1, 171, 255)
+
+
+@THEMES
+@pytest.mark.parametrize("ground", ["background", "panel"])
+def test_all_that_is_written_can_be_read(theme, ground) -> None:
+    colours = named_colours(theme)
+    curves = [*theme.controllers, *(f"other-{k}" for k in range(len(theme.others)))]
+    for name in ("ink", "faint", "accent", *curves):
+        assert contrast(colours[name], colours[ground]) >= 4.5, (theme.name, name, ground)
+    for name in ("warning", "final", "trajectory", "start", "boundary"):
+        assert contrast(colours[name], colours[ground]) >= 3.0, (theme.name, name, ground)
+
+
+@THEMES
+def test_what_is_written_on_colours_can_be_read(theme) -> None:
+    colours = named_colours(theme)
+    assert contrast(colours["on-accent"], colours["accent"]) >= 4.5
+    assert contrast(colours["on-final"], colours["final"]) >= 4.5
+    for k in range(HEAT_LEVELS):
+        assert contrast(colours["ink"], colours[f"heat-{k}"]) >= 4.5
+    for k in range(len(theme.robots)):
+        assert contrast(colours["trajectory"], colours[f"cell-{k}"]) >= 3.0
+
+
+def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:
+    css = theme_rules(":root", "dark")
+    screen, _, paper = css.partition("@media print")
+    assert declared(screen)["background"] == hex_code(DARK.background)
+    assert declared(paper)["background"] == hex_code(LIGHT.background)
+    assert "prefers-color-scheme" not in css
+
+
+def test_auto_follows_the_reader_and_the_notebook() -> None:
+    css = theme_rules(".scope")
+    for words in (
+        "prefers-color-scheme:dark",
+        'data-jp-theme-light="false"',
+        'data-vscode-theme-kind$="dark"',
+    ):
+        assert words in css
+    assert css.count("{") == css.count("}")
+    assert css.index("@media print") == css.rindex("@media")
+
+
+def test_another_theme_is_an_error() -> None:
+    with pytest.raises(ParameterError, match="unknown theme 'sepia'"):
+        theme_rules(":root", "sepia")

@@ -1,0 +1,147 @@
+"""The same tasks on a Dask cluster: the same table, byte for byte."""
+
+from __future__ import annotations
+
+import builtins
+import importlib.util
+import logging
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from swept import controller, small_study, tables
+
+from robocov.errors import InputError, OutputError
+from robocov_app.cli import main
+from robocov_app.sweep import cluster as cluster_module
+from robocov_app.sweep.cluster import Cluster
+from robocov_app.sweep.performing import perform
+from robocov_app.sweep.sweeping import Totals, sweep
+from robocov_app.sweep.task import tasks_of
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = pytest.mark.xdist_group("cluster")
+
+
+@contextmanager
+def a_cluster(*, processes: bool) -> Iterator[Any]:
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=2,
+        processes=processes,
+        dashboard_address=":0",
+        silence_logs=logging.CRITICAL,
+    ) as cluster:
+        yield cluster
+
+
+def test_a_cluster_makes_the_same_table(tmp_path: Path) -> None:
+    study = small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
+    expected = Totals(12, 12, 0, False)
+    assert sweep(study, tmp_path / "here", workers=1, quiet=True) == expected
+    with a_cluster(processes=False) as cluster:
+        address = cluster.scheduler_address
+        assert sweep(study, tmp_path / "there", scheduler=address, quiet=True) == expected
+        with Cluster(address) as crew:
+            assert (crew.threads, crew.most) == (2, 4)
+    assert tables(tmp_path / "there") == tables(tmp_path / "here")
+
+
+def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
+    """Dask blames all tasks that were with a worker when it ended; only one of them is at fault."""
+    dask = pytest.importorskip("dask")
+    name = controller(tmp_path, "        os._exit(3)\n")
+    study = small_study(controllers=("rapf", name), seeds=range(2))
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}), a_cluster(processes=True) as cluster:
+        assert sweep(study, tmp_path / "out", scheduler=cluster.scheduler_address, quiet=True) == Totals(
+            2, 2, 0, False
+        )
+    lines = (tmp_path / "out" / "results.csv").read_text().splitlines()[1:]
+    ends = [line.rpartition(",")[2] for line in lines]
+    assert ends == ["", "the process of its worker ended"] * 2
+
+
+def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:
+    name = controller(tmp_path, "        time.sleep(0.02)\n")
+    study = small_study(controllers=(name,), seeds=range(12))
+    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as crew:
+        for task in tasks_of(study):
+            crew.submit(task)
+        while crew.next(0.1) is None:
+            pass
+        cluster.close()
+        with pytest.raises(OutputError, match=r"--scheduler: inproc://.*: the runs cannot go on: "):
+            while crew.busy:
+                crew.next(0.1)
+
+
+def test_nobody_at_the_address_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    study = tmp_path / "study.toml"
+    study.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        for address, reason in (
+            (f"tcp://127.0.0.1:{silent.getsockname()[1]}", "no answer in 0.5 s"),
+            ("tcp://127.0.0.1:9", "Timed out"),
+            ("nonsense", "missing port number"),
+            ("pigeon://home:1", "unknown address scheme"),
+        ):
+            words = ["sweep", str(study), "--out", str(tmp_path / "out"), "--scheduler", address]
+            began = time.monotonic()
+            assert main(words) == 2
+            assert time.monotonic() - began < 10.0
+            (line,) = (line for line in capsys.readouterr().err.splitlines() if "error" in line)
+            assert line.startswith(f"robocov: error: --scheduler: {address}: cannot be reached: ")
+            assert reason in line or "no answer" in line
+    assert list((tmp_path / "out" / "runs").iterdir()) == []
+
+
+def test_without_dask_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(
+        InputError, match=r'--scheduler: Dask is not installed; pip install "robocov\[dask\]"'
+    ):
+        Cluster("tcp://127.0.0.1:9")
+
+
+def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(task: object) -> None:
+        raise ModuleNotFoundError("No module named 'robocov_app'")
+
+    task = next(tasks_of(small_study()))
+    monkeypatch.setattr(cluster_module, "perform", unknown)
+    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as crew:
+        crew.submit(task)
+        with pytest.raises(OutputError, match="ModuleNotFoundError: No module named 'robocov_app'"):
+            while crew.busy:
+                crew.next(0.1)
+
+
+def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    tasks = list(tasks_of(small_study(seeds=range(8))))
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(perform, tasks)) == [perform(task) for task in tasks]
+
+
+def test_nothing_of_dask_is_loaded_without_a_scheduler(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    imported = builtins.__import__
+
+    def watched(name: str, *rest: Any, **more: Any) -> Any:
+        assert name.partition(".")[0] not in ("dask", "distributed")
+        return imported(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", watched)
+    assert sweep(small_study(seeds=(0,)), tmp_path, workers=1, quiet=True).done == 2

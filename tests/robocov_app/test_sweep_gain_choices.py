@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.controllers import Rapf, Rpf
+from robocov.errors import ParameterError
+from robocov_app.sweep.gain_choices import Gains, Method, Range, Sampling
+
+METHODS = ("sobol", "halton", "latin-hypercube")
+
+
+@dataclass(frozen=True)
+class Still:
+    name = "still"
+
+
+def test_without_a_word_a_controller_has_its_defaults() -> None:
+    assert Gains.of(Rpf, {}, None).choices == ({"k_rep": 3.0, "rho_0": 4.0},)
+    assert Gains.of(Still, {}, None).choices == ({},)
+
+
+def test_lists_are_combined_in_order() -> None:
+    gains = Gains.of(Rapf, {"k_rep": [0.1, 1], "attraction_limit": [2.0, None], "k_att": 3}, None)
+    tried = [(choice["k_rep"], choice["attraction_limit"]) for choice in gains.choices]
+    assert tried == [(0.1, 2.0), (0.1, None), (1.0, 2.0), (1.0, None)]
+    assert all(choice["k_att"] == 3.0 and choice["rho_0"] == Rapf().rho_0 for choice in gains.choices)
+    assert all(list(choice) == ["k_rep", "rho_0", "k_att", "attraction_limit"] for choice in gains.choices)
+
+
+def test_sets_of_gains_are_taken_one_by_one() -> None:
+    paper = {"k_rep": 1, "rho_0": 2, "k_att": 3, "attraction_limit": None}
+    gains = Gains.of(Rapf, [paper, {}], None)
+    assert gains.choices == (paper, {"k_rep": 0.3, "rho_0": 2.0, "k_att": 30.0, "attraction_limit": 2.0})
+    assert Gains.of(Rapf, gains, None) == gains
+
+
+@pytest.mark.parametrize("word", ["null", float("inf")])
+def test_no_limit_has_words_where_a_file_has_none(word: object) -> None:
+    (choice,) = Gains.of(Rapf, {"attraction_limit": word}, None).choices
+    assert choice["attraction_limit"] is None
+
+
+@given(
+    low=st.floats(1e-3, 10.0),
+    factor=st.floats(1.5, 1e4),
+    scale=st.sampled_from(["linear", "log"]),
+    method=st.sampled_from(METHODS),
+    samples=st.integers(1, 70),
+    seed=st.integers(0, 10**6),
+)
+def test_samples_are_inside_their_ranges_and_always_the_same(
+    low: float, factor: float, scale: str, method: Method, samples: int, seed: int
+) -> None:
+    wanted = {"k_rep": Range(low, low * factor, scale), "rho_0": Range(0.5, 4.0)}
+    gains = Gains.of(Rpf, wanted, Sampling(method, samples, seed))
+    assert gains == Gains.of(Rpf, wanted, Sampling(method, samples, seed))
+    assert gains.ranges == wanted
+    assert len(gains.choices) == samples
+    for name, each in wanted.items():
+        values = [choice[name] for choice in gains.choices]
+        assert all(each.low <= value <= each.high for value in values)
+        assert len(set(values)) == samples
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_samples_fill_a_range_evenly_on_its_scale(method: Method) -> None:
+    wanted = {"k_rep": Range(0.01, 100.0, "log"), "rho_0": Range(1.0, 3.0)}
+    gains = Gains.of(Rpf, wanted, Sampling(method, 64, 3))
+    decades = np.log10([choice["k_rep"] for choice in gains.choices])
+    assert np.histogram(decades, bins=4, range=(-2, 2))[0] == pytest.approx(16, abs=2)
+    reach = [choice["rho_0"] for choice in gains.choices]
+    assert np.histogram(reach, bins=4, range=(1, 3))[0] == pytest.approx(16, abs=2)
+
+
+@pytest.mark.parametrize(("method", "grows"), [("sobol", True), ("halton", True), ("latin-hypercube", False)])
+def test_more_samples_keep_the_first_ones(method: Method, grows: bool) -> None:
+    wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
+    few = Gains.of(Rpf, wanted, Sampling(method, 5)).choices
+    many = Gains.of(Rpf, wanted, Sampling(method, 40)).choices
+    assert (many[:5] == few) is grows
+
+
+def test_controllers_with_the_same_ranges_get_the_same_samples() -> None:
+    wanted, sampling = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}, Sampling(samples=7, seed=2)
+    tried = [
+        [(choice["k_rep"], choice["rho_0"]) for choice in Gains.of(kind, wanted, sampling).choices]
+        for kind in (Rapf, Rpf)
+    ]
+    assert tried[0] == tried[1]
+
+
+def test_lists_are_combined_with_every_sample() -> None:
+    gains = Gains.of(Rapf, {"k_att": [3, 30], "k_rep": Range(0.1, 10.0)}, Sampling(samples=4))
+    assert [choice["k_att"] for choice in gains.choices] == [3.0] * 4 + [30.0] * 4
+    assert [choice["k_rep"] for choice in gains.choices[:4]] == [c["k_rep"] for c in gains.choices[4:]]
+
+
+@dataclass(frozen=True)
+class Picky:
+    k: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.k == 2.0:
+            raise ValueError("not two")
+
+
+WRONG = [
+    (Rapf, {"k_rap": 1}, "gains.x: unknown gain 'k_rap': did you mean 'k_rep'? (known: "),
+    (Rapf, {"k_rep": -1}, "gains.x.k_rep: -1, but a number from 0 to 1e+06 N m³ was wanted"),
+    (Rapf, {"k_rep": [1, "big"]}, "gains.x.k_rep[1]: 'big', but a number from "),
+    (Rapf, {"k_rep": [1, 2, 1.0]}, "gains.x.k_rep[2]: 1.0 is given already at gains.x.k_rep[0]; "),
+    (Rapf, {"k_rep": []}, "gains.x.k_rep: none, but at least one value was wanted"),
+    (Rapf, {"k_rep": None}, "gains.x.k_rep: None, but a number from "),
+    (Rapf, [], "gains.x: none, but at least one set of gains was wanted"),
+    (Rapf, [{"k_rep": 1}, {"k_rep": 1}], "gains.x[1]: {'k_rep': 1.0, "),
+    (Rapf, [{"k_rep": -1}], "gains.x[0].k_rep: -1, but "),
+    (Rapf, {"k_rep": Range(2, 1)}, "gains.x.k_rep.high: 1, but a number above 2 was wanted"),
+    (Rapf, {"k_rep": Range(-1, 1)}, "gains.x.k_rep.low: -1, but a number from 0 to "),
+    (Rapf, {"k_rep": Range(0, 1, "log")}, "gains.x.k_rep.low: 0, but a number above 0, "),
+    (Rapf, {"k_rep": Range(0, 1, "lag")}, "gains.x.k_rep.scale: unknown scale 'lag': did you mean 'log'?"),
+    (
+        Rapf,
+        {"attraction_limit": Range(1, None)},
+        "gains.x.attraction_limit.high: None, but a number was wanted",
+    ),
+    (Rapf, {"k_rep": Range(1.0, 1.0000001)}, "gains.x.samples[1]: {'k_rep': 1.0, "),
+    (Picky, {"k": [1, 2]}, "gains.x: ValueError: not two"),
+    (object, {"k": 1}, "gains.x: 'k', but the controller has no gains"),
+]
+
+
+@pytest.mark.parametrize(("kind", "wanted", "message"), WRONG)
+def test_what_cannot_be_tried_is_named_with_its_place(kind: type, wanted: object, message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Gains.of(kind, wanted, Sampling(samples=8), ("gains", "x"))
+    assert str(caught.value).startswith(message)
+
+
+def test_a_range_needs_a_way_to_sample_it() -> None:
+    with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: a range, but sampling says neither"):
+        Gains.of(Rpf, {"k_rep": Range(1, 2)}, None, ("gains", "rpf"))
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"method": "sobool"}, "sampling.method: unknown method 'sobool': did you mean 'sobol'?"),
+        ({"samples": 0}, "sampling.samples: 0, but a whole number from 1 to 100000 was wanted"),
+        ({"samples": 2.0}, "sampling.samples: 2.0, but a whole number"),
+        ({"seed": -1}, "sampling.seed: -1, but a whole number"),
+    ],
+)
+def test_sampling_is_checked(said: dict, message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Sampling(**said)
+    assert str(caught.value).startswith(message)

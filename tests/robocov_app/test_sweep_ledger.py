@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from swept import run_folders, small_study
+
+from robocov.errors import InputError, OutputError
+from robocov_app.sweep import ledger as ledger_module
+from robocov_app.sweep.ledger import Entry, is_sweep, opened
+from robocov_app.sweep.performing import Outcome
+from robocov_app.sweep.task import Task, tasks_of
+
+STUDY = small_study().to_json()
+DONE = Outcome(
+    {"run.json": b"{}", "cost.csv": b"time_s\n"}, {"mean_distance_m": 0.1 + 0.2, "stuck_robots": None}
+)
+FAILED = Outcome({"error.json": b"{}"}, {}, "it broke")
+
+
+@pytest.fixture
+def task() -> Task:
+    return next(tasks_of(small_study()))
+
+
+def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:
+    with opened(tmp_path / "deep" / "out", STUDY) as ledger:
+        assert ledger.entry(task) is None
+        assert ledger.keep(task, DONE) == Entry(DONE.figures, None)
+    with opened(tmp_path / "deep" / "out", STUDY) as ledger:
+        assert ledger.entry(task) == Entry(DONE.figures, None)
+    folder = tmp_path / "deep" / "out" / "runs" / task.name
+    assert sorted(path.name for path in folder.iterdir()) == ["cost.csv", "row.json", "run.json"]
+
+
+def test_a_run_takes_the_place_of_an_earlier_one(tmp_path: Path, task: Task) -> None:
+    with opened(tmp_path, STUDY) as ledger:
+        ledger.keep(task, FAILED)
+        assert ledger.entry(task) == Entry({}, "it broke")
+        ledger.keep(task, DONE)
+        assert ledger.entry(task) == Entry(DONE.figures, None)
+    assert not (tmp_path / "runs" / task.name / "error.json").exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[]",
+        "{}",
+        '{"format": "robocov-row", "digest": "another", "figures": {}, "error": null}',
+        '{"format": "else", "digest": "DIGEST", "figures": {}, "error": null}',
+        '{"format": "robocov-row", "digest": "DIGEST", "figures": 3, "error": null}',
+        "[" * 100_000,
+    ],
+)
+def test_what_cannot_be_read_is_not_done(tmp_path: Path, task: Task, content: str) -> None:
+    with opened(tmp_path, STUDY) as ledger:
+        ledger.keep(task, DONE)
+        (tmp_path / "runs" / task.name / "row.json").write_text(content.replace("DIGEST", task.digest))
+        assert ledger.entry(task) is None
+        ledger.keep(task, DONE)
+        assert ledger.entry(task) is not None
+
+
+def test_a_full_disk_leaves_nothing_of_a_run(
+    tmp_path: Path, task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> int:
+        if path.name == "row.json":
+            written(path, content[:3])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return written(path, content)
+
+    with opened(tmp_path, STUDY) as ledger:
+        monkeypatch.setattr(Path, "write_bytes", full)
+        with pytest.raises(OutputError, match=f"{task.name}: cannot be written: No space left"):
+            ledger.keep(task, DONE)
+        assert run_folders(tmp_path) == []
+        monkeypatch.undo()
+        ledger.keep(task, DONE)
+    assert run_folders(tmp_path) == [task.name]
+
+
+def test_what_was_left_half_written_goes(tmp_path: Path, task: Task) -> None:
+    with opened(tmp_path, STUDY) as ledger:
+        ledger.keep(task, DONE)
+    half = tmp_path / "runs" / ".another.part"
+    half.mkdir()
+    (half / "run.json").write_text("{")
+    (tmp_path / ".results.123.part.parquet").write_text("PAR1")
+    with opened(tmp_path, STUDY):
+        assert run_folders(tmp_path) == [task.name]
+        assert not list(tmp_path.glob(".*.part.*"))
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with (
+        pytest.raises(InputError, match="the folder is not empty, and what is in it is no sweep"),
+        opened(tmp_path, STUDY),
+    ):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+    (tmp_path / "study.json").write_text('{"format": "robocov-map"}')
+    assert not is_sweep(tmp_path)
+    with (
+        pytest.raises(OutputError, match="cannot be used for results"),
+        opened(tmp_path / "notes.txt", STUDY),
+    ):
+        pass
+
+
+def test_the_study_of_an_earlier_sweep_is_replaced(tmp_path: Path) -> None:
+    with opened(tmp_path, STUDY):
+        assert is_sweep(tmp_path)
+    with opened(tmp_path, small_study(seeds=(5,)).to_json()):
+        pass
+    assert json.loads((tmp_path / "study.json").read_text())["seeds"] == [5]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_to_is_said_so(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="Permission denied"), opened(tmp_path, STUDY):
+        pass
+
+
+def test_one_process_is_at_work_in_a_folder(tmp_path: Path) -> None:
+    busy = pytest.raises(OutputError, match="another process is at work")
+    with opened(tmp_path, STUDY), busy, opened(tmp_path, STUDY):
+        pass
+    with opened(tmp_path, STUDY):
+        pass
+
+
+def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
+    script = (
+        "import sys, time\nfrom pathlib import Path\nfrom robocov_app.sweep.lock import locked\n"
+        "with locked(Path(sys.argv[1])):\n    print('locked', flush=True)\n    time.sleep(60)\n"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "locked\n"
+        with pytest.raises(OutputError, match="another process is at work"), opened(tmp_path, STUDY):
+            pass
+        process.kill()
+        process.wait()
+    with opened(tmp_path, STUDY):
+        pass
+
+
+def test_where_files_know_no_locks_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl")
+
+    def unknown(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", unknown)
+    with opened(tmp_path, STUDY):
+        pass
+
+
+def test_a_study_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Path, *_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(ledger_module.Path, "write_text", full)
+    with (
+        pytest.raises(OutputError, match=r"study.json: cannot be written: No space left"),
+        opened(tmp_path, STUDY),
+    ):
+        pass

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from swept import HEAD, ROOM, controller, small_study
+
+from robocov.cost import CoverageCost
+from robocov.metrics import cost_history, summarise
+from robocov.record import ARRAYS, Record
+from robocov.results import read_history
+from robocov_app.sweep.performing import FIGURES, Outcome, perform, prepared, simulated
+from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.task import Task, tasks_of
+
+
+def first(study: Study) -> Task:
+    return next(tasks_of(study))
+
+
+def kept(outcome: Outcome, folder: Path) -> Record:
+    for name, content in outcome.files.items():
+        (folder / name).write_bytes(content)
+    return Record.load(folder)
+
+
+def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
+    task = first(small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
+    whole = simulated(task, ROOM)
+    outcome = perform(task)
+    assert outcome.error is None
+    assert list(outcome.files) == ["run.json", "record.npz", "cost.csv"]
+    record = kept(outcome, tmp_path)
+    rows = np.searchsorted(whole.time, record.time)
+    assert np.array_equal(whole.time[rows], record.time)
+    assert rows[0] == 0 and rows[-1] == len(whole) - 1
+    assert len(record) == 6 * 4 + 1
+    for name in ARRAYS:
+        assert np.array_equal(getattr(record, name), getattr(whole, name)[rows], equal_nan=True)
+    assert record.dt == task.dt
+
+    history = read_history(tmp_path / "cost.csv")
+    expected = cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
+    assert np.array_equal(history.mean_distance, expected.mean_distance)
+    assert len(history.time) == 6 * 2 + 1
+
+
+def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
+    task = first(small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
+    whole = simulated(task, ROOM)
+    history = cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
+    summary = summarise(whole, history)
+    outcome = perform(task)
+    assert tuple(outcome.figures) == FIGURES
+    assert outcome.figures == {
+        **{name: summary[name] for name in FIGURES},
+        "path_length_m": sum(summary["path_length_m"]) / 5,
+    }
+    record = kept(outcome, tmp_path)
+    assert record.time.tolist() == [0.0, whole.time[-1]]
+    content = json.loads(outcome.files["run.json"])
+    assert content["summary"] == summary
+    assert (content["record_hz"], content["cost_hz"], content["lattice"]) == (0.0, 2.0, 8)
+
+
+def test_the_same_task_gives_the_same_bytes() -> None:
+    for task in tasks_of(small_study()):
+        assert perform(task) == perform(task)
+
+
+def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
+    task = first(small_study(controllers=("mine.py:Mine",), folder=Path(controller(tmp_path, "")).parent))
+    content = json.loads(perform(task).files["run.json"])
+    assert content["controller"]["name"] == "mine.py:Mine"
+    assert content["controller"]["source"] == task.source
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (
+            "        1 / 0\n",
+            "controller 'Mine': ZeroDivisionError: division by zero (mine.py, line 11) at 0.000 s",
+        ),
+        ("        raise SystemExit(3)\n", "controller 'Mine': SystemExit: 3 (mine.py, line 11) at 0.000 s"),
+        (
+            "        raise ValueError('a\\nb\\udcff')\n",
+            "controller 'Mine': ValueError: a b? (mine.py, line 11)",
+        ),
+        ("        return [float('nan'), 0]\n", "controller 'Mine': force [nan, 0.0] on robot 1 at 0.000 s"),
+        ("        pass\n\n1 / 0\n", "controller 'mine.py:Mine': mine.py cannot be run: ZeroDivisionError: "),
+    ],
+)
+def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -> None:
+    controller(tmp_path, "")
+    task = first(small_study(controllers=("mine.py:Mine",), folder=tmp_path))
+    # the file is well when the study is made
+    task = replace(task, source=HEAD + law)
+    outcome = perform(task)
+    assert outcome.error is not None and outcome.error.startswith(message), outcome.error
+    assert not outcome.figures
+    assert list(outcome.files) == ["error.json"]
+    content = json.loads(outcome.files["error.json"])
+    assert content["error"] == outcome.error
+    assert "Traceback" in content["traceback"]
+
+
+def test_a_start_without_room_is_an_outcome() -> None:
+    outcome = perform(first(small_study(robots=(500,))))
+    assert outcome.error is not None and outcome.error.startswith("start 'corner': room for about")
+
+
+def test_costs_of_the_last_maps_are_remembered() -> None:
+    maps = [StudyMap(f"room {k}", replace(ROOM, name=f"room {k}")) for k in range(6)]
+    tasks = list(tasks_of(small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
+    costs = [prepared(task)[1] for task in tasks]
+    assert prepared(tasks[-1])[1] is costs[-1]
+    assert prepared(tasks[0])[1] is not costs[0], "memory does not grow with the number of maps"
+    again = replace(tasks[-1], seed=5)
+    assert prepared(again)[1] is costs[-1]
+
+
+def test_runs_without_a_moment_but_the_first() -> None:
+    outcome = perform(first(small_study(duration=0.0)))
+    assert outcome.error is None
+    with np.load(io.BytesIO(outcome.files["record.npz"])) as arrays:
+        assert arrays["time"].tolist() == [0.0]
+    assert outcome.figures["mean_distance_over_run_m"] == outcome.figures["mean_distance_m"]
+    assert outcome.figures["settled_at_s"] is None
+    assert outcome.figures["stuck_robots"] is None

@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import os
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from swept import controller, small_study
+
+from robocov.errors import OutputError
+from robocov_app.sweep import pool as pool_module
+from robocov_app.sweep.crew import Crew, Lost, Returned
+from robocov_app.sweep.performing import Outcome, perform
+from robocov_app.sweep.pool import LocalPool, processors
+from robocov_app.sweep.task import Task, tasks_of
+
+PATIENCE = 60.0
+
+FINE = Outcome({}, {"contacts": 0})
+
+KILLED = Lost("its process ended (signal 9)", "", blamed=False)
+CRASHED = Lost("its process ended (exit status 3)", "Fatal", blamed=True)
+
+
+def done_by(crew: Crew, tasks: list[Task]) -> dict[str, Outcome]:
+    """Let a crew do tasks; return what came of them by name."""
+    outcomes: dict[str, Outcome] = {}
+    end = time.monotonic() + PATIENCE
+    for task in tasks:
+        crew.submit(task)
+    while crew.busy:
+        assert time.monotonic() < end
+        back = crew.next(0.1)
+        if back is not None:
+            outcomes[back[0].name] = back[1]
+    return outcomes
+
+
+class Scripted(Crew):
+    """Returns what it is told to, first in, first out; remembers what was out at the same time."""
+
+    def __init__(self, most: int, script: dict[str, list[Outcome | Lost]]) -> None:
+        super().__init__()
+        self._most, self._script = most, script
+        self._queue: list[Task] = []
+        self.together: list[tuple[str, int]] = []
+
+    def __exit__(self, *exception: object) -> None: ...
+
+    @property
+    def most(self) -> int:
+        return self._most
+
+    def _hand_out(self, task: Task) -> None:
+        self._queue.append(task)
+
+    def _returned(self, timeout: float) -> Returned | None:
+        if not self._queue:
+            return None
+        self.together.append((self._queue[0].name, len(self._queue)))
+        task = self._queue.pop(0)
+        came = self._script.get(task.name)
+        return task, came.pop(0) if came else FINE
+
+
+@pytest.fixture
+def tasks() -> list[Task]:
+    return list(tasks_of(small_study(seeds=range(3))))
+
+
+def test_no_more_is_handed_out_than_is_wanted(tasks: list[Task]) -> None:
+    with Scripted(2, {}) as crew:
+        assert not crew.full
+        for task in tasks[:2]:
+            crew.submit(task)
+        assert crew.full
+        assert done_by(crew, tasks[2:]) == {task.name: FINE for task in tasks}
+        assert max(count for _, count in crew.together) == 2
+
+
+def test_a_task_that_is_not_to_blame_is_done_alone_and_does_not_fail_for_others(tasks: list[Task]) -> None:
+    name = tasks[1].name
+    with Scripted(3, {name: [KILLED, KILLED, FINE]}) as crew:
+        assert done_by(crew, tasks) == {task.name: FINE for task in tasks}
+    assert [count for other, count in crew.together if other == name][1:] == [1, 1]
+
+
+def test_a_task_that_ends_its_worker_alone_twice_has_failed(tasks: list[Task]) -> None:
+    name = tasks[1].name
+    with Scripted(3, {name: [KILLED, KILLED, KILLED]}) as crew:
+        outcomes = done_by(crew, tasks)
+    assert outcomes.pop(name).error == "its process ended (signal 9)"
+    assert outcomes == {task.name: FINE for task in tasks if task.name != name}
+
+
+def test_a_task_that_is_to_blame_holds_nobody_up(tasks: list[Task]) -> None:
+    name = tasks[1].name
+    with Scripted(3, {name: [CRASHED, CRASHED]}) as crew:
+        outcomes = done_by(crew, tasks)
+    assert outcomes[name].error == "its process ended (exit status 3)"
+    assert [count for other, count in crew.together if other == name] == [3, 3]
+    assert len(outcomes) == len(tasks)
+
+
+def test_processes_do_what_this_one_does(tasks: list[Task]) -> None:
+    with LocalPool(2) as pool:
+        assert done_by(pool, tasks) == {task.name: perform(task) for task in tasks}
+
+
+def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
+    """Both kinds of ends, what is said and read in a controller, and a process that is killed once."""
+    flag = tmp_path / "killed"
+    laws = {
+        "exits.py": "        os._exit(3)\n",
+        "kills.py": "        os.kill(os.getpid(), signal.SIGKILL)\n",
+        "once.py": f"        if not Path({str(flag)!r}).exists():\n"
+        f"            Path({str(flag)!r}).touch()\n"
+        f"            os.kill(os.getpid(), signal.SIGKILL)\n",
+        "talks.py": "        print('x' * 100_000)\n        assert not __import__('sys').stdin.read()\n",
+        "crashes.py": "        import faulthandler; faulthandler._sigsegv()\n",
+    }
+    names = {file: controller(tmp_path, law, file) for file, law in laws.items()}
+    study = small_study(controllers=("rapf", *names.values()), seeds=(0,))
+    with LocalPool(2) as pool:
+        outcomes = done_by(pool, list(tasks_of(study)))
+    errors = {
+        task.controller.rpartition(":")[0].rpartition("/")[2]: outcomes[task.name].error
+        for task in tasks_of(study)
+    }
+    assert errors == {
+        "": None,
+        "exits.py": "its process ended (exit status 3)",
+        "kills.py": "its process ended (signal 9)",
+        "once.py": None,
+        "talks.py": None,
+        "crashes.py": "its process ended (signal 11)",
+    }
+    (crashed,) = (task.name for task in tasks_of(study) if "crashes.py" in task.controller)
+    assert b"crashes.py" in outcomes[crashed].files["error.json"], "its last words say where"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="looks at processes as Linux shows them")
+def test_nothing_is_left_of_a_pool(tmp_path: Path) -> None:
+    name = controller(tmp_path, "        time.sleep(60)\n")
+    with LocalPool(2) as pool:
+        for task in tasks_of(small_study(controllers=(name,))):
+            pool.submit(task)
+        end = time.monotonic() + PATIENCE
+        while len(children()) < 2 and time.monotonic() < end:
+            pool.next(0.05)
+        assert len(children()) == 2
+        began = time.monotonic()
+    assert time.monotonic() - began < 5.0, "nobody waits for what nobody wants any more"
+    assert not children()
+
+
+def children() -> list[int]:
+    """Return the processes that this one has started."""
+    found = []
+    for path in Path("/proc/self/task").glob("*/children"):
+        with suppress(OSError):
+            found += [int(pid) for pid in path.read_text().split()]
+    return found
+
+
+def test_where_no_process_can_begin_it_is_said_why(
+    tasks: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = pool_module.started
+    monkeypatch.setattr(
+        pool_module, "started", lambda _, **said: started("robocov_app.sweep.nothing", **said)
+    )
+    with (
+        LocalPool(1) as pool,
+        pytest.raises(OutputError, match=r"no process for the runs can be started: .*nothing"),
+    ):
+        done_by(pool, tasks[:1])
+
+
+def test_the_number_of_processors_is_what_this_process_may_use() -> None:
+    assert 1 <= processors() <= (os.cpu_count() or 1)
+    if sys.platform == "linux":
+        assert processors() == len(os.sched_getaffinity(0))

@@ -1,0 +1,144 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from swept import HALL, ROOM, controller, small_study
+
+from robocov.errors import InputError, ParameterError
+from robocov_app.sweep.gain_choices import Range, Sampling
+from robocov_app.sweep.study import Study, StudyMap, team_of
+
+MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
+
+
+def test_a_study_takes_lists_and_single_values() -> None:
+    study = small_study(robots=[1, 2], max_speed=[0.5, 1], radius=0.2, communication_range="null")
+    assert study.robots == (1, 2)
+    assert [team["max_speed"] for team in study.teams] == [0.5, 1.0]
+    assert all(team["radius"] == 0.2 and team["communication_range"] is None for team in study.teams)
+    assert study.swept == ("max_speed",)
+    assert len(study) == 2 * 2 * 2 * 2
+
+
+def test_the_number_of_runs_counts_starts_and_gains() -> None:
+    study = small_study(maps=MAPS, starts="*", gains={"rapf": {"k_rep": [1, 2, 3]}}, seeds=range(5))
+    assert [study.starts_on(each) for each in study.maps] == [("corner", "spread"), ("door",)]
+    assert len(study) == 3 * 5 * (3 + 1)
+
+
+def test_by_default_the_first_start_of_each_map_is_taken() -> None:
+    study = small_study(maps=MAPS)
+    assert [study.starts_on(each) for each in study.maps] == [("corner",), ("door",)]
+    bare = StudyMap("bare", replace(ROOM, starts={}))
+    for starts in ((), ("*",)):
+        assert small_study(maps=(bare,), starts=starts).starts_on(bare) == ("uniform",)
+    assert small_study(maps=MAPS, starts=("uniform",)).starts_on(MAPS[1]) == ("uniform",)
+
+
+def test_a_team_is_what_the_study_says() -> None:
+    (said,) = small_study(sensing_range=float("inf"), communication_range=2).teams
+    team = team_of(3, said)
+    assert len(team) == 3
+    assert team.sensing_range.tolist() == [float("inf")] * 3
+    assert team.communication_range.tolist() == [2.0] * 3
+
+
+def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path) -> None:
+    controller(tmp_path, "")
+    study = small_study(
+        controllers=("mine.py:Mine",), folder=tmp_path, gains={"mine.py:Mine": {"pull": [1, 2]}}
+    )
+    source = study.sources["mine.py:Mine"]
+    assert source.text == (tmp_path / "mine.py").read_text()
+    (tmp_path / "mine.py").unlink()
+    assert study.kind("mine.py:Mine")().pull == 1.0
+    assert len(study) == 4
+
+
+def test_the_study_is_written_whole(tmp_path: Path) -> None:
+    name = controller(tmp_path, "")
+    study = small_study(
+        controllers=("rpf", name),
+        gains={"rpf": {"k_rep": Range(1, 2, "log")}},
+        sampling=Sampling(samples=3),
+        sensing_range=float("inf"),
+    )
+    content = json.loads(json.dumps(study.to_json(), allow_nan=False))
+    assert content["format"] == "robocov-study"
+    assert content["runs"] == len(study) == 2 * 4
+    assert content["maps"][0]["map"]["name"] == "A room"
+    assert content["controllers"][1]["source"] == (tmp_path / "mine.py").read_text()
+    assert content["gains"]["rpf"]["ranges"] == {"k_rep": {"low": 1.0, "high": 2.0, "scale": "log"}}
+    assert len(content["gains"]["rpf"]["choices"]) == 3
+    assert content["sampling"] == {"method": "sobol", "samples": 3, "seed": 0}
+    assert content["teams"][0]["sensing_range"] is None
+
+
+WRONG = [
+    ({"maps": ()}, "maps: none, but at least one was wanted"),
+    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: 'room' is given already at maps[0]; each once was wanted"),
+    (
+        {"maps": (StudyMap("a\nb", ROOM),)},
+        "maps[0]: name 'a\\nb', but a text of 1 to 100 characters on one line",
+    ),
+    ({"controllers": ()}, "controllers: none, "),
+    ({"controllers": ("rapf", "rapff")}, "controllers[1]: unknown controller 'rapff': did you mean 'rapf'?"),
+    ({"controllers": ("rapf", "rapf")}, "controllers[1]: 'rapf' is given already at controllers[0]"),
+    ({"controllers": (3,)}, "controllers[0]: 3, but a text was wanted"),
+    ({"controllers": ("none.py:Mine",)}, "controllers[0]: 'none.py:Mine': "),
+    ({"controllers": ("none.py",)}, "controllers[0]: controller 'none.py': a file and a class, "),
+    ({"robots": (6, 0)}, "robots[1]: 0, but a whole number from 1 to 10000 was wanted"),
+    ({"robots": (True,)}, "robots[0]: True, but a whole number"),
+    ({"robots": ()}, "robots: none, "),
+    ({"seeds": (1, -2)}, "seeds[1]: -2, but a whole number from 0 to "),
+    ({"seeds": (1, 2, 1)}, "seeds[2]: 1 is given already at seeds[0]"),
+    (
+        {"starts": ("corner", "conrer")},
+        "starts[1]: map 'A room': unknown start 'conrer': did you mean 'corner'?",
+    ),
+    ({"starts": ("corner", "*")}, "starts[1]: '*' is all of them, "),
+    ({"starts": ("corner", "corner")}, "starts[1]: 'corner' is given already at starts[0]"),
+    ({"duration": -1}, "duration: -1, but a number from 0 to 1e+06 was wanted"),
+    ({"duration": float("nan")}, "duration: nan, but a number"),
+    (
+        {"duration": 1e6, "dt": 1e-3},
+        "duration: 1e+06 s of 2 robots at 0.001 s are 2e+09 rows of a record, but at most",
+    ),
+    ({"dt": 0.0}, "dt: 0.0 s, but a number from 0.0001 to 1 s was wanted"),
+    ({"lattice": 1}, "lattice: 1, but a whole number from 2 to 2048 was wanted"),
+    ({"cost_hz": -1}, "cost_hz: -1, but a number from 0 to 10000 was wanted"),
+    ({"record_hz": "often"}, "record_hz: 'often', but a number"),
+    ({"max_speed": -1}, "team.max_speed: -1.0 m/s, but a number from 1e-06 to 1000 was wanted"),
+    ({"max_speed": (1, -1)}, "team.max_speed[1]: -1.0 m/s, but a number"),
+    ({"max_speed": (1, 1.0)}, "team.max_speed[1]: 1.0 is given already at team.max_speed[0]"),
+    ({"max_speed": None}, "team.max_speed: None, but a number was wanted"),
+    ({"max_speed": 10**400}, "team.max_speed: 1000"),
+    ({"radius": ()}, "team.radius: none, but at least one value was wanted"),
+    ({"gains": {"rapff": {}}}, "gains.rapff: unknown controller of the study 'rapff': did you mean 'rapf'?"),
+    ({"gains": {"rapf": {"k_rep": -1}}}, "gains.rapf.k_rep: -1, but a number from "),
+    ({"sampling": Sampling()}, "sampling: no gain has a range {low, high}, but at least one was wanted"),
+    ({"seeds": range(1_000_000), "robots": (1, 2)}, "runs: 4e+06, but at most 1e+06 were wanted"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), WRONG)
+def test_what_cannot_be_run_is_named_with_its_place(changes: dict, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        small_study(**changes)
+    assert str(caught.value).startswith(message)
+
+
+def test_a_file_of_a_controller_must_be_text(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_bytes(b"\xff\xfe")
+    with pytest.raises(ParameterError, match=r"controllers\[0\]: 'mine.py:Mine': .*mine.py: not UTF-8"):
+        small_study(controllers=("mine.py:Mine",), folder=tmp_path)
+
+
+def test_a_study_cannot_be_changed() -> None:
+    study = small_study()
+    with pytest.raises(AttributeError):
+        study.seeds = (1,)
+    assert isinstance(study, Study)

@@ -1,0 +1,299 @@
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from swept import HALL, controller
+
+from robocov.errors import InputError
+from robocov.mapfile import bundled_maps, save_map
+from robocov_app.sweep.study_file import read_study
+
+STUDY = """
+maps = ["rooms", "plans/hall.json"]
+controllers = ["rapf", "rpf", "mine.py:Mine"]
+robots = [3, 6]
+starts = "*"
+seeds = 4
+duration = 5.0
+dt = 0.02
+lattice = 32
+cost_hz = 1
+record_hz = 0
+
+[team]
+radius = 0.15
+max_speed = [0.5, 1]
+communication_range = [4.0, inf]
+sensing_range = "null"
+
+[gains.rapf]
+k_rep = {low = 0.1, high = 10.0, scale = "log"}
+rho_0 = {low = 1, high = 3}
+attraction_limit = [2.0, "null"]
+k_att = 3
+
+[gains."mine.py:Mine"]
+pull = [1, 2]
+
+[sampling]
+method = "halton"
+samples = 5
+seed = 9
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "plans").mkdir()
+    save_map(HALL, tmp_path / "plans" / "hall.json")
+    controller(tmp_path, "")
+    return tmp_path
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_study_file_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(folder, STUDY)
+    monkeypatch.chdir(folder.parent)  # paths begin at the file, not here
+    study = read_study(path)
+    assert [each.name for each in study.maps] == ["rooms", "hall"]
+    assert study.maps[1].environment == HALL
+    assert study.seeds == (0, 1, 2, 3)
+    assert study.robots == (3, 6)
+    assert (study.duration, study.dt, study.lattice, study.cost_hz, study.record_hz) == (
+        5.0,
+        0.02,
+        32,
+        1.0,
+        0.0,
+    )
+    assert len(study.teams) == 4
+    assert [team["communication_range"] for team in study.teams] == [4.0, None, 4.0, None]
+    assert all(team["sensing_range"] is None and team["radius"] == 0.15 for team in study.teams)
+    tried = study.gains_of("rapf").choices
+    assert len(tried) == 2 * 5
+    assert {choice["attraction_limit"] for choice in tried} == {2.0, None}
+    assert {choice["k_att"] for choice in tried} == {3.0}
+    assert len(study.gains_of("rpf").choices) == 1
+    assert [choice["pull"] for choice in study.gains_of("mine.py:Mine").choices] == [1.0, 2.0]
+    starts = sum(len(study.starts_on(each)) for each in study.maps)
+    assert len(study) == starts * 2 * 4 * 4 * (10 + 1 + 2)
+
+
+def test_little_needs_to_be_said(folder: Path) -> None:
+    study = read_study(written(folder, 'maps = "square"\ncontrollers = "rapf"\n'))
+    assert len(study) == 1
+    assert (study.robots, study.seeds, study.duration, study.lattice) == ((6,), (0,), 60.0, 64)
+    assert study.maps[0].environment.name == "Square"
+
+
+def test_all_bundled_maps(folder: Path) -> None:
+    study = read_study(written(folder, 'maps = "*"\ncontrollers = ["rapf"]\nseeds = [3]\n'))
+    assert [each.name for each in study.maps] == list(bundled_maps())
+    assert study.seeds == (3,)
+
+
+KNOWN = (
+    "controllers, cost_hz, dt, duration, gains, lattice, maps, "
+    "record_hz, robots, sampling, seeds, starts, team"
+)
+WRONG = [
+    # in the file, instead, the complaint
+    ("robots = [3, 6]", "robot = [3]", f"unknown key 'robot': did you mean 'robots'? (known: {KNOWN})"),
+    (
+        "robots = [3, 6]",
+        "robots = [3, 3]",
+        "robots[1]: 3 is given already at robots[0]; each once was wanted",
+    ),
+    ("robots = [3, 6]", "robots = [0]", "robots[0]: 0, but a whole number from 1 to 10000 was wanted"),
+    ("robots = [3, 6]", "robots = [1.5]", "robots[0]: 1.5, but a whole number was wanted"),
+    (
+        "robots = [3, 6]",
+        "robots = true",
+        "robots: True, but a whole number, or a list of whole numbers, was wanted",
+    ),
+    (
+        "robots = [3, 6]",
+        'robots = "6"',
+        "robots: '6', but a whole number, or a list of whole numbers, was wanted",
+    ),
+    ("robots = [3, 6]", "robots = []", "robots: none, but at least one was wanted"),
+    ("robots = [3, 6]", "robots = 6\ngains = 3", "Cannot overwrite"),
+    (
+        'starts = "*"',
+        'starts = ["corridor"]',
+        "starts[0]: map 'A hall': unknown start 'corridor': did you mean 'door'?",
+    ),
+    (
+        'starts = "*"',
+        'starts = ["*", "door"]',
+        "starts[0]: '*' is all of them, so nothing beside it was wanted",
+    ),
+    ('starts = "*"', "starts = 3", "starts: 3, but a text, or a list of texts, was wanted"),
+    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; each once was wanted"),
+    ("seeds = 4", "seeds = 0", "seeds: 0, but a whole number from 1 to 1000000 was wanted"),
+    ("seeds = 4", "seeds = [-1]", "seeds[0]: -1, but a whole number from 0 to "),
+    ("seeds = 4", "seeds = 1e3", "seeds: 1000.0, but how many seeds, or a list of seeds, was wanted"),
+    ("duration = 5.0", "duration = nan", "duration: nan, but a number from 0 to 1e+06 was wanted"),
+    ("duration = 5.0", "duration = [5]", "duration: [5], but a number was wanted"),
+    (
+        "duration = 5.0",
+        "duration = 1979-05-27",
+        "duration: datetime.date(1979, 5, 27), but a number was wanted",
+    ),
+    ("dt = 0.02", "dt = 2", "dt: 2.0, but a number from 0 to 1 was wanted"),
+    ("lattice = 32", "lattice = 1", "lattice: 1, but a whole number from 2 to 2048 was wanted"),
+    ("lattice = 32", "lattice = 32.0", "lattice: 32.0, but a whole number was wanted"),
+    ("record_hz = 0", "record_hz = -1", "record_hz: -1.0, but a number from 0 to 10000 was wanted"),
+    (
+        "max_speed = [0.5, 1]",
+        "max_sped = 1",
+        "team: unknown key 'max_sped': did you mean 'max_speed'? (known: ",
+    ),
+    (
+        "max_speed = [0.5, 1]",
+        'max_speed = "fast"',
+        "team.max_speed: 'fast', but a number, or a list of numbers, ",
+    ),
+    (
+        "max_speed = [0.5, 1]",
+        "max_speed = [0.5, -1]",
+        "team.max_speed[1]: -1.0 m/s, but a number from 1e-06 to 1000",
+    ),
+    ("max_speed = [0.5, 1]", 'max_speed = "null"', "team.max_speed: 'null', but a number was wanted"),
+    (
+        "max_speed = [0.5, 1]",
+        "max_speed = [1, 1.0]",
+        "team.max_speed[1]: 1.0 is given already at team.max_speed[0]",
+    ),
+    (
+        "low = 0.1",
+        "lo = 0.1",
+        "gains.rapf.k_rep: unknown key 'lo': did you mean 'low'? (known: high, low, scale)",
+    ),
+    ("low = 0.1, ", "", "gains.rapf.k_rep.low: missing, but a number was wanted"),
+    ("low = 0.1", "low = true", "gains.rapf.k_rep.low: True, but a number was wanted"),
+    (
+        "low = 0.1",
+        "low = 0",
+        "gains.rapf.k_rep.low: 0, but a number above 0, as the scale is that of logarithms, ",
+    ),
+    ("low = 0.1", "low = 10", "gains.rapf.k_rep.high: 10, but a number above 10 was wanted"),
+    (
+        "high = 10.0",
+        "high = 1e9",
+        "gains.rapf.k_rep.high: 1000000000.0, but a number from 0 to 1e+06 N m³ was wanted",
+    ),
+    ('"log"', '"lag"', 'gains.rapf.k_rep.scale: \'lag\', but "linear" or "log" was wanted'),
+    ("k_rep =", "krep =", "gains.rapf: unknown gain 'krep': did you mean 'k_rep'? (known: "),
+    ("k_att = 3", "k_att = []", "gains.rapf.k_att: none, but at least one value was wanted"),
+    (
+        "k_att = 3",
+        "k_att = [[3]]",
+        'gains.rapf.k_att[0]: [3], but a number, or "null" for no limit, was wanted',
+    ),
+    ("k_att = 3", "k_att = [3, 3.0]", "gains.rapf.k_att[1]: 3.0 is given already at gains.rapf.k_att[0]"),
+    ("k_att = 3", 'k_att = "null"', "gains.rapf.k_att: 'null', but a number from "),
+    ("k_att = 3", "k_att = inf", "gains.rapf.k_att: inf, but a number from "),
+    (
+        '"null"]\nk_att',
+        '"nul"]\nk_att',
+        "gains.rapf.attraction_limit[1]: 'nul', but a number, or \"null\" for no limit, ",
+    ),
+    ("[gains.rapf]", "[gains.raf]", "gains.raf: unknown controller of the study 'raf': did you mean 'rapf'?"),
+    ("[gains.rapf]", "[gain.rapf]", "unknown key 'gain': did you mean 'gains'? (known: "),
+    ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: {}, but a number, or '),
+    ("pull = [1, 2]", "push = 1", "gains[\"mine.py:Mine\"]: unknown gain 'push': did you mean 'pull'?"),
+    ("samples = 5", "samples = 0", "sampling.samples: 0, but a whole number from 1 to 100000 was wanted"),
+    ("samples = 5", "", "sampling.samples: missing, but a whole number was wanted"),
+    (
+        '"halton"',
+        '"halten"',
+        'sampling.method: \'halten\', but "sobol", "latin-hypercube" or "halton" was wanted',
+    ),
+    (
+        "seed = 9",
+        "seeds = 9",
+        "sampling: unknown key 'seeds': did you mean 'seed'? (known: method, samples, seed)",
+    ),
+    (
+        '["rooms", "plans/hall.json"]',
+        '["roms"]',
+        "maps[0]: unknown map 'roms': did you mean 'rooms'? (known: ",
+    ),
+    ('["rooms", "plans/hall.json"]', '["rooms", "rooms"]', "maps[1]: 'rooms' is given already at maps[0]"),
+    ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: 3, but a text was wanted"),
+    ('["rooms", "plans/hall.json"]', "[]", "maps: none, but at least one was wanted"),
+    (
+        'maps = ["rooms", "plans/hall.json"]',
+        "",
+        "maps: missing, but a list of names of maps, or of paths beside ",
+    ),
+    (
+        '"mine.py:Mine"]',
+        '"mine.py:Yours"]',
+        "controllers[2]: controller mine.py: unknown class 'Yours' (known: Mine)",
+    ),
+    ('"mine.py:Mine"]', '"yours.py:Mine"]', "controllers[2]: 'yours.py:Mine': "),
+    ('"rpf", ', '"rfp", ', "controllers[1]: unknown controller 'rfp': did you mean 'rpf'?"),
+    ("[sampling]", "[sampling", "not TOML: expected ']' at the end of a table declaration (at line "),
+]
+
+
+@pytest.mark.parametrize(("part", "instead", "message"), WRONG)
+def test_mistakes_are_named_with_file_and_key(folder: Path, part: str, instead: str, message: str) -> None:
+    assert part in STUDY
+    path = written(folder, STUDY.replace(part, instead))
+    with pytest.raises(InputError) as caught:
+        read_study(path)
+    said = str(caught.value)
+    assert "\n" not in said
+    if message == "Cannot overwrite":
+        assert said.startswith(f"{path}: not TOML: cannot overwrite a value")
+    else:
+        assert said.startswith(f"{path}: {message}"), said
+
+
+def test_only_the_first_mistake_is_told_and_how_many_more_there_are(folder: Path) -> None:
+    text = STUDY.replace("seeds = 4", "seeds = 4.5").replace("robots = [3, 6]", 'robot = "six"')
+    with pytest.raises(InputError, match=r"unknown key 'robot'.*\(and 1 more\)$"):
+        read_study(written(folder, text))
+
+
+def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
+    save_map(HALL, folder / "rooms.json")
+    text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'
+    with pytest.raises(
+        InputError, match=r"maps\[1\]: 'rooms.json', but maps whose names differ, and there is a"
+    ):
+        read_study(written(folder, text))
+
+
+def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
+    (folder / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "bad"}')
+    with pytest.raises(InputError, match=r"study.toml: maps\[0\]: .*bad.json: boundary: missing, but "):
+        read_study(written(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
+
+
+def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"none.toml: no such file"):
+        read_study(folder / "none.toml")
+    with pytest.raises(InputError, match=r": is a folder, but a file was wanted"):
+        read_study(folder)
+    path = folder / "bytes.toml"
+    path.write_bytes(b"maps = '\xff'")
+    with pytest.raises(InputError, match=r"bytes.toml: byte at offset 8: not UTF-8, but TOML was wanted"):
+        read_study(path)
+    path.write_text("a = " + "[" * 100_000)
+    with pytest.raises(InputError, match=r"bytes.toml: "):
+        read_study(path)
+
+
+def test_the_readme_way_of_writing_it_is_toml() -> None:
+    assert tomllib.loads(STUDY)["gains"]["mine.py:Mine"] == {"pull": [1, 2]}

@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import csv
+import errno
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from swept import small_study, tables
+
+from robocov.errors import OutputError
+from robocov_app.sweep import table as table_module
+from robocov_app.sweep.ledger import Entry
+from robocov_app.sweep.performing import FIGURES
+from robocov_app.sweep.study import Study
+from robocov_app.sweep.table import Table, columns_of, gain_column, row_of
+from robocov_app.sweep.task import tasks_of
+
+FIGURED = Entry(
+    {
+        **dict.fromkeys(FIGURES, 0.1 + 0.2),
+        "contacts": 3,
+        "stuck_robots": None,
+        "settled_at_s": None,
+        "cost_m3": 1e-320,
+        "path_length_m": math.pi,
+    },
+    None,
+)
+FAILED = Entry({}, 'a "start", and no room')
+
+
+def written(folder: Path, study: Study, entries: list[Entry]) -> None:
+    with Table(folder, columns_of(study)) as table:
+        for task, entry in zip(tasks_of(study), entries, strict=True):
+            table.add(row_of(task, entry))
+
+
+def test_the_columns_are_those_of_the_study() -> None:
+    study = small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
+    assert [column.name for column in columns_of(study)] == [
+        *("map", "controller", "robots", "start", "seed"),
+        *("k_rep", "rho_0", "k_att", "attraction_limit"),
+        "max_speed_m_s",
+        "duration_s",
+        *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
+        *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
+        *("run", "error"),
+    ]
+    assert "max_speed_m_s" not in [column.name for column in columns_of(small_study())]
+
+
+def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> None:
+    assert gain_column("k_rep") == "k_rep"
+    assert gain_column("seed") == "gain_seed"
+    assert gain_column("radius_m") == "gain_radius_m"
+
+
+def test_csv_and_parquet_hold_the_same_exactly(tmp_path: Path) -> None:
+    study = small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
+    entries = [FIGURED, FAILED, FIGURED, FIGURED]
+    written(tmp_path, study, entries)
+    table = pq.read_table(tmp_path / "results.parquet")
+    rows = table.to_pylist()
+    with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    assert len(rows) == len(lines) == 4
+    for row, line, task in zip(rows, lines, tasks_of(study), strict=True):
+        assert list(row) == list(line)
+        for name, value in row.items():
+            if value is None:
+                assert line[name] == ""
+            else:
+                assert type(value)(line[name]) == value
+        assert row["run"] == task.name
+        assert row["max_speed_m_s"] == task.team["max_speed"]
+        assert row["seed"] == 2**63 - 1
+    assert rows[0]["mean_distance_m"] == 0.1 + 0.2
+    assert rows[0]["cost_m3"] == 1e-320
+    assert rows[1]["error"] == 'a "start", and no room'
+    assert rows[1]["mean_distance_m"] is None
+    assert rows[0]["attraction_limit"] == 2.0
+    assert rows[1]["attraction_limit"] is None, "repulsion alone has none"
+
+
+def test_columns_say_what_they_are(tmp_path: Path) -> None:
+    study = small_study()
+    written(tmp_path, study, [FIGURED] * len(study))
+    schema = pq.read_schema(tmp_path / "results.parquet")
+    assert schema.metadata[b"format"] == b"robocov-results"
+    for field in schema:
+        assert field.metadata[b"meaning"]
+    assert schema.field("mean_distance_m").metadata[b"unit"] == b"m"
+    assert schema.field("k_rep").metadata == {
+        b"unit": "N m³".encode(),
+        b"meaning": b"strength of the repulsion, (24)",
+    }
+    assert str(schema.field("contacts").type) == "int64"
+
+
+def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_module, "ROW_GROUP", 3)
+    study = small_study(seeds=range(5))
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name, study, [FIGURED] * len(study))
+    assert tables(tmp_path / "one") == tables(tmp_path / "two")
+    groups = pq.ParquetFile(tmp_path / "one" / "results.parquet").metadata
+    assert [groups.row_group(k).num_rows for k in range(groups.num_row_groups)] == [3, 3, 3, 1]
+
+
+def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
+    with Table(tmp_path, columns_of(small_study())):
+        pass
+    assert pq.read_table(tmp_path / "results.parquet").num_rows == 0
+
+
+def test_parquet_appears_at_the_end_and_csv_grows(tmp_path: Path) -> None:
+    study = small_study()
+    tasks = list(tasks_of(study))
+    (tmp_path / "results.parquet").write_text("an earlier one")
+    with Table(tmp_path, columns_of(study)) as table:
+        assert not (tmp_path / "results.parquet").exists()
+        for k, task in enumerate(tasks):
+            table.add(row_of(task, FIGURED))
+            assert len((tmp_path / "results.csv").read_text().splitlines()) == k + 2
+            assert not (tmp_path / "results.parquet").exists()
+    assert pq.read_table(tmp_path / "results.parquet").num_rows == len(tasks)
+
+
+def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
+    study = small_study()
+    with pytest.raises(ZeroDivisionError), Table(tmp_path, columns_of(study)) as table:
+        table.add(row_of(next(tasks_of(study)), FIGURED))
+        raise ZeroDivisionError
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+class Full:
+    """A file on a disk with room for a few more bytes."""
+
+    def __init__(self, file: Any, room: int) -> None:
+        self._file, self._room = file, room
+
+    def write(self, data: bytes) -> int:
+        if not self._room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        count = self._file.write(data[: self._room])
+        self._room -= count
+        return count
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+
+def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
+    study = small_study()
+    row = row_of(next(tasks_of(study)), FIGURED)
+    full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
+    with full, Table(tmp_path, columns_of(study)) as table:
+        table.add(row)
+        table._csv._file = Full(table._csv._file, 40)
+        table.add(row)
+    lines = (tmp_path / "results.csv").read_text().splitlines()
+    assert len(lines) == 2
+    assert len(lines[0].split(",")) == len(lines[1].split(","))
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+@pytest.mark.parametrize("broken", ["write_table", "close"])
+def test_a_full_disk_leaves_no_half_of_parquet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    study = small_study()
+    monkeypatch.setattr(table_module, "ROW_GROUP", 1)
+    told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
+    with told, Table(tmp_path, columns_of(study)) as table:
+        monkeypatch.setattr(pq.ParquetWriter, broken, full)
+        table.add(row_of(next(tasks_of(study)), FIGURED))
+    monkeypatch.undo()
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+def test_no_table_can_be_made_where_there_is_no_folder(tmp_path: Path) -> None:
+    told = pytest.raises(OutputError, match=r"results.csv: cannot be written")
+    with told, Table(tmp_path / "none", columns_of(small_study())):
+        pass
+
+
+def test_columns_have_different_names_whatever_gains_are_called(tmp_path: Path) -> None:
+    (tmp_path / "odd.py").write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Odd:\n"
+        "    seed: float = 1.0\n"
+        "    k_rep: float = 2.0\n"
+        "    def force(self, own):\n"
+        "        return own.centroid - own.position\n"
+    )
+    study = small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
+    names = [column.name for column in columns_of(study)]
+    assert len(set(names)) == len(names)
+    rows = [row_of(task, FIGURED) for task in tasks_of(study) if task.seed == 1]
+    assert [(row["seed"], row.get("gain_seed")) for row in rows] == [(1, None)] * 3 + [(1, 1.0)]
+    assert rows[-1]["k_rep"] == 2.0

@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import pickle
+from dataclasses import fields, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from swept import HALL, ROOM, controller, small_study
+
+from robocov.mapfile import load_map
+from robocov_app.sweep.performing import simulated
+from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.task import Task, tasks_of
+
+MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
+
+
+@given(
+    maps=st.integers(1, 2),
+    robots=st.lists(st.integers(1, 9), min_size=1, max_size=3, unique=True),
+    speeds=st.lists(st.floats(0.1, 2.0), min_size=1, max_size=2, unique=True),
+    starts=st.sampled_from([(), ("*",), ("uniform",)]),
+    seeds=st.lists(st.integers(0, 99), min_size=1, max_size=3, unique=True),
+    k_rep=st.lists(st.floats(0.0, 5.0), min_size=1, max_size=3, unique=True),
+    controllers=st.permutations(["rapf", "rpf", "lloyd"]),
+)
+def test_tasks_come_in_the_order_of_the_table(
+    maps: int,
+    robots: list[int],
+    speeds: list[float],
+    starts: tuple[str, ...],
+    seeds: list[int],
+    k_rep: list[float],
+    controllers: list[str],
+) -> None:
+    study = small_study(
+        maps=MAPS[:maps],
+        robots=robots,
+        max_speed=speeds,
+        starts=starts,
+        seeds=seeds,
+        controllers=controllers,
+        gains={"rpf": {"k_rep": k_rep}},
+    )
+    laws = [(name, k) for name in controllers for k in (k_rep if name == "rpf" else [None])]
+    expected = [
+        (each.name, n, speed, start, seed, *law)
+        for each in MAPS[:maps]
+        for n, speed, start, seed, law in product(robots, speeds, study.starts_on(each), seeds, laws)
+    ]
+    found = [
+        (
+            task.map,
+            task.robots,
+            task.team["max_speed"],
+            task.start,
+            task.seed,
+            task.controller,
+            task.gains["k_rep"] if task.controller == "rpf" else None,
+        )
+        for task in tasks_of(study)
+    ]
+    assert found == expected
+    assert len(study) == len(found)
+    assert len({task.name for task in tasks_of(study)}) == len(found)
+
+
+def test_every_controller_begins_in_the_same_places() -> None:
+    study = small_study(
+        controllers=("rapf", "rpf", "lloyd"), gains={"rapf": {"k_rep": [0.1, 1.0]}}, duration=0.0
+    )
+    starts: dict[int, set[bytes]] = {}
+    for task in tasks_of(study):
+        record = simulated(task, ROOM)
+        starts.setdefault(task.seed, set()).add(record.positions[0].tobytes())
+        assert np.array_equal(record.positions[0], ROOM.start("corner").sample(2, seed=task.seed))
+    assert [len(places) for places in starts.values()] == [1, 1]
+    assert starts[0] != starts[1]
+
+
+def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
+    study = small_study(controllers=(controller(tmp_path, ""),))
+    (tmp_path / "mine.py").unlink()
+    task = next(tasks_of(study))
+    assert pickle.loads(pickle.dumps(task)) == task
+    assert task.source is not None and "class Mine" in task.source
+    assert len(simulated(task, ROOM)) == 11
+
+
+def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) -> None:
+    tasks = {task.name: task for task in tasks_of(small_study())}
+    assert set(tasks) == {task.name for task in tasks_of(small_study())}
+    for changes in (
+        {"maps": (StudyMap("room", replace(ROOM, description="another")),)},
+        {"duration": 0.6},
+        {"dt": 0.04},
+        {"lattice": 9},
+        {"cost_hz": 3},
+        {"record_hz": 3},
+        {"viscosity": 3},
+        {"communication_range": 3},
+        {"seeds": (7, 8)},
+        {"robots": (1,)},
+        {"starts": ("spread",)},
+        {"gains": {"rapf": {"k_rep": 1.5}, "rpf": {"k_rep": 1.5}}},
+    ):
+        others = {task.name for task in tasks_of(small_study(**changes))}
+        assert not others & set(tasks), changes
+    assert {"digest", "path"} <= {field.name for field in fields(Task)}
+
+
+def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path) -> None:
+    names = []
+    for folder, law in (("a", ""), ("b", ""), ("c", "        # another one\n")):
+        (tmp_path / folder).mkdir()
+        controller(tmp_path / folder, law)
+        study = small_study(controllers=("mine.py:Mine",), folder=tmp_path / folder)
+        names.append([task.name for task in tasks_of(study)])
+    assert names[0] == names[1]
+    assert not set(names[0]) & set(names[2])
+
+
+def test_a_default_that_is_stated_is_the_same_run() -> None:
+    said = small_study(gains={"rapf": {"k_rep": 0.3}})
+    assert [task.name for task in tasks_of(said)] == [task.name for task in tasks_of(small_study())]
+
+
+def test_names_of_folders_are_fit_for_any_system() -> None:
+    odd = StudyMap("Büro/2: *?<>|" + "x" * 60, ROOM)
+    for task in tasks_of(small_study(maps=(odd,))):
+        assert task.name.isascii()
+        assert not set(task.name) & set('/\\:*?"<>| ')
+        assert len(task.name) < 120
+        assert task.name.endswith(task.digest[:10])
+
+
+def test_a_bundled_map_is_carried_whole() -> None:
+    rooms = load_map("rooms")
+    (task, *_) = tasks_of(small_study(maps=(StudyMap("rooms", rooms),)))
+    assert '"corridor"' in task.document

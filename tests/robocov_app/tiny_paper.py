@@ -1,0 +1,54 @@
+"""A study of the paper that is as small as it can be: everything is run, nothing is learnt."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from robocov.errors import OutputError
+from robocov_app.interruption import Interruption
+from robocov_app.paper.plan import Plan
+from robocov_app.paper.studying import Means
+from robocov_app.sweep.lock import locked
+
+TINY = Plan(
+    name="quick",
+    duration=6.0,
+    bundled=("blocks-a",),
+    generated=(1,),
+    seeds=(0,),
+    tuning=(101, 102),
+    tuning_starts=("corner", "uniform"),
+    k_rep=(0.3, 3.0),
+    rho_0=(2.0,),
+    k_att=(3.0,),
+    convex_generated=(0,),
+    convex_seeds=(0,),
+    restarts=2,
+    lattice=16,
+)
+
+
+def means(workers: int = 2) -> Means:
+    return Means(workers=workers, scheduler=None, quiet=True, stop=Interruption())
+
+
+@contextmanager
+def shared(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
+    """Give a folder that all workers of a test session have in common, to one of them at a time."""
+    base = factory.getbasetemp()
+    folder = (base.parent if base.name.startswith("popen-") else base) / name
+    folder.mkdir(exist_ok=True)
+    while True:
+        try:
+            with locked(folder):
+                yield folder
+            return
+        except OutputError as error:
+            if "another process" not in str(error):
+                raise
+            time.sleep(0.2)
