@@ -30,6 +30,7 @@ COMMANDS = {
     "maps": ("maps", "list the bundled maps"),
     "controllers": ("controllers", "list the controllers and their gains"),
     "cost": ("cost", "the exact coverage cost (22) of given positions"),
+    "optimum": ("optimum", "the best positions with the whole map known: a reference for the cost"),
     "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
     "import": ("import_map", "turn a foreign map file into a map JSON"),
     "schema": ("schema", "print the JSON Schema of map files"),

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from robocov.cost import CoverageCost, CoverageResult
     from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
+    from robocov.generator import GENERATORS, generated_map
     from robocov.mapcheck import check_map
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
     from robocov.metrics import cost_history, settled_at, summarise
@@ -61,6 +62,7 @@ _HOME = {
     "Decision": "observation",
     "DiscStart": "starts",
     "Environment": "environment",
+    "GENERATORS": "generator",
     "IndividualController": "controllers",
     "Individually": "controllers",
     "InputError": "errors",
@@ -93,6 +95,7 @@ _HOME = {
     "check_map": "mapcheck",
     "cost_history": "metrics",
     "gain": "controllers.gains",
+    "generated_map": "generator",
     "load_map": "mapfile",
     "make_controller": "controllers",
     "map_schema": "mapfile",
@@ -105,6 +108,7 @@ _HOME = {
 
 __all__ = [
     "CONTROLLERS",
+    "GENERATORS",
     "ArrayCache",
     "CircleObstacle",
     "Controller",
@@ -145,6 +149,7 @@ __all__ = [
     "check_map",
     "cost_history",
     "gain",
+    "generated_map",
     "load_map",
     "make_controller",
     "map_schema",

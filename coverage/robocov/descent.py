@@ -23,8 +23,14 @@ if TYPE_CHECKING:
 _SEGMENTS = 32
 """Edges of a quarter circle around corners of walls: they cut 3e-4 of the radius off it, less than `GAP`."""
 
-_PUSHES = 40
+_PUSHES = 60
 """Times that overlapping robots are pushed apart before the place counts as too narrow for them."""
+
+_FARTHER = 1.005
+"""They are pushed a little too far, else they would never quite arrive."""
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The golden angle: its multiples are spread evenly."""
 
 _MEMORY = 8
 """Steps from which the curvature is learnt."""
@@ -86,9 +92,12 @@ class Room:
         one, other = pairs.T
         between = positions[other] - positions[one]
         apart = np.hypot(between[:, 0], between[:, 1])
-        # two robots in one place have no direction apart: a fixed one
-        between[apart == 0.0] = 1.0, 0.0
-        push = between * ((self.spacing - apart) / 2.0 / np.where(apart > 0.0, apart, 1.0))[:, None]
+        # two robots in one place have no direction apart: a fixed one, another for each pair
+        same = apart == 0.0
+        angle = _GOLDEN * (one[same] + other[same] * len(positions))
+        between[same] = np.column_stack([np.cos(angle), np.sin(angle)])
+        part = (_FARTHER * self.spacing - apart) / 2.0 / np.where(same, 1.0, apart)
+        push = between * part[:, None]
         positions = positions.copy()
         np.subtract.at(positions, one, push)
         np.add.at(positions, other, push)

@@ -116,7 +116,7 @@ def test_starts_have_room_for_a_team(kind):
         corner = environment.starts["corner"]
         assert environment.free.contains(shapely.Point(corner.center).buffer(corner.radius))
         off = np.abs(np.array(corner.center) - [[0, 0], [10, 0], [0, 10], [10, 10]]).max(axis=1)
-        assert off.min() <= 1.3
+        assert corner.radius < off.min() <= 1.3
         middle = np.hypot(*(np.array(environment.starts["centre"].center) - 5.0))
         assert middle <= 3.0 * np.sqrt(2.0) + 0.01
         for name in environment.starts:
@@ -132,7 +132,9 @@ def test_the_same_seed_gives_the_same_map_and_another_seed_another():
 
 def test_maps_do_not_depend_on_the_process():
     script = (
-        "import sys\nfrom robocov.generator import GENERATORS, generated_map\nfrom robocov.mapfile import dump_map\n"
+        "import sys\n"
+        "from robocov.generator import GENERATORS, generated_map\n"
+        "from robocov.mapfile import dump_map\n"
         "sys.stdout.write(''.join(dump_map(generated_map(5, kind=kind)) for kind in GENERATORS))"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -167,9 +169,7 @@ def test_rooms_have_walls_doors_and_furniture():
     furniture = [obstacle for obstacle in environment.obstacles if not isinstance(obstacle, WallObstacle)]
     assert {obstacle.name for obstacle in furniture} <= {"cabinet", "table", "round table"}
     assert len(furniture) >= 7
-    # without doors the rooms would be apart
-    closed = shapely.union_all([wall.polygon.buffer(1.0, cap_style="flat") for wall in walls])
-    assert len(walls) > 6 and closed.area > 0.0
+    assert len(walls) >= 6
     for circle in furniture:
         if isinstance(circle, CircleObstacle):
             assert min(circle.polygon.distance(wall.polygon) for wall in walls) >= 0.6
@@ -228,26 +228,28 @@ def square(x, y, side=1.0):
 
 
 @pytest.mark.parametrize(
-    ("layout", "good"),
+    ("layout", "area", "good"),
     [
-        ([square(3, 3), square(4.6, 3)], True),
-        ([square(3, 3), square(4.5, 3)], False),  # a narrow gap
-        ([square(3, 3), square(6, 3, 1.4)], False),  # too much
-        ([square(3, 3)], False),  # too little
-        ([square(3, 3), square(3.5, 3), square(3, 3.5)], False),  # the area of a union counts
-        ([WallObstacle(((4.9, 0), (4.9, 10)), 0.2)], False),  # two components
-        ([WallObstacle(((4.8, 0), (4.8, 5), (4.8, 9.39)), 0.2)], True),
-        (None, False),
+        ([square(3, 3), square(4.6, 3)], 0.02, True),
+        ([square(3, 3), square(4.5, 3)], 0.02, False),  # a narrow gap
+        ([square(3, 3), square(6, 3, 1.3)], 0.02, False),  # too much
+        ([square(3, 3), square(6, 3, 0.5)], 0.02, False),  # too little
+        ([square(3, 3), square(3.5, 3), square(3, 3.5)], 0.03, False),  # overlaps do not count twice
+        ([square(3, 3), square(3.5, 3), square(3, 3.5)], 0.0175, True),
+        ([square(3, 3), PolygonObstacle(((6, 6), (7, 7), (7, 6), (6, 7)))], 0.015, False),  # not valid
+        ([WallObstacle(((4.8, 0), (4.8, 10)), 0.2)], 0.02, False),  # two components
+        ([WallObstacle(((4.8, 0), (4.8, 9.41)), 0.2)], 0.02, False),
+        ([WallObstacle(((4.8, 0), (4.8, 9.39)), 0.2)], 0.02, True),
+        (None, 0.02, False),
     ],
 )
-def test_kinds_are_a_registry_and_no_layout_gets_through_unchecked(layout, good, monkeypatch):
+def test_kinds_are_a_registry_and_no_layout_gets_through_unchecked(layout, area, good, monkeypatch):
     drawn = []
 
     def of_mine(request, corner, rng):
         drawn.append(rng.random())
         return layout
 
-    area = 0.02 if layout is None or len(layout) > 1 or layout == [square(3, 3)] else 0.019
     mine = replace(GENERATORS["polygons"], layout=of_mine, counted="things")
     monkeypatch.setitem(generator.GENERATORS, "mine", mine)
     if good:

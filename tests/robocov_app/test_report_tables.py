@@ -70,6 +70,12 @@ def test_a_single_run_is_told_as_it_is() -> None:
     assert runs_table(result, styles(result)) is None
 
 
+def test_what_is_zero_but_for_rounding_has_no_sign() -> None:
+    result = result_of([entry(min_clearance_m=-0.0004)])
+    (table,) = summary_tables(result, styles(result))
+    assert column(table, "Clearance, m") == ["0.000"]
+
+
 def test_every_map_has_a_table_and_metres_of_different_maps_no_common_median() -> None:
     result = result_of([*FIVE, *(entry("rapf", k, 9.0, map_name="museum") for k in range(5))])
     tables = summary_tables(result, styles(result))

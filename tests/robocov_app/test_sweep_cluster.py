@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from called import answer
 from swept import controller, small_study, tables
 
 from robocov.errors import InputError, OutputError
@@ -40,7 +41,7 @@ def a_cluster(*, processes: bool) -> Iterator[Any]:
         yield cluster
 
 
-def test_a_cluster_makes_the_same_table(tmp_path: Path) -> None:
+def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study = small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
     expected = Totals(12, 12, 0, False)
     assert sweep(study, tmp_path / "here", workers=1, quiet=True) == expected
@@ -49,6 +50,10 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path) -> None:
         assert sweep(study, tmp_path / "there", scheduler=address, quiet=True) == expected
         with Cluster(address) as crew:
             assert (crew.threads, crew.most) == (2, 4)
+        file = tmp_path / "study.toml"
+        file.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
+        words = ("sweep", str(file), "--dry-run", "--scheduler", address)
+        assert answer(capsys, *words)["workers"] == 2
     assert tables(tmp_path / "there") == tables(tmp_path / "here")
 
 

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import gc
 import io
 import json
+import weakref
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pymunk
 import pytest
 from swept import HEAD, ROOM, controller, small_study
 
@@ -122,6 +126,43 @@ def test_costs_of_the_last_maps_are_remembered() -> None:
     assert prepared(tasks[0])[1] is not costs[0], "memory does not grow with the number of maps"
     again = replace(tasks[-1], seed=5)
     assert prepared(again)[1] is costs[-1]
+
+
+@pytest.mark.parametrize("law", ["", "        1 / 0\n"])
+def test_nothing_of_the_physics_outlives_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, law: str
+) -> None:
+    """Another thread that came upon it would free it in the midst of the next run's steps."""
+    alive: list[weakref.ref[object]] = []
+
+    def watched(kind: type[Any]) -> None:
+        begin = kind.__init__
+
+        def init(self: object, *arguments: Any, **more: Any) -> None:
+            begin(self, *arguments, **more)
+            alive.append(weakref.ref(self))
+
+        monkeypatch.setattr(kind, "__init__", init)
+
+    for kind in (pymunk.Space, pymunk.Body, pymunk.Poly, pymunk.Circle):
+        watched(kind)
+    perform(first(small_study(controllers=(controller(tmp_path, law),))))
+    assert len(alive) > 8
+    assert not [thing for thing in alive if thing() is not None]
+    assert gc.isenabled()
+
+
+def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
+    law = "        ring = []\n        ring.append(ring)\n"
+    task = first(small_study(controllers=(controller(tmp_path, law),), duration=100.0, robots=(2,)))
+    seen: list[int] = []
+    gc.callbacks.append(lambda phase, said: seen.append(said["collected"]) if phase == "stop" else None)
+    try:
+        assert perform(task).error is None
+    finally:
+        gc.callbacks.pop()
+    assert sum(seen) > 2 * 2000
+    assert len(seen) == 2 + 1
 
 
 def test_runs_without_a_moment_but_the_first() -> None:

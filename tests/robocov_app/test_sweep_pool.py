@@ -144,24 +144,25 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="looks at processes as Linux shows them")
 def test_nothing_is_left_of_a_pool(tmp_path: Path) -> None:
     name = controller(tmp_path, "        time.sleep(60)\n")
+    others = children()  # of tests before this one
     with LocalPool(2) as pool:
         for task in tasks_of(small_study(controllers=(name,))):
             pool.submit(task)
         end = time.monotonic() + PATIENCE
-        while len(children()) < 2 and time.monotonic() < end:
+        while len(children() - others) < 2 and time.monotonic() < end:
             pool.next(0.05)
-        assert len(children()) == 2
+        assert len(children() - others) == 2
         began = time.monotonic()
     assert time.monotonic() - began < 5.0, "nobody waits for what nobody wants any more"
-    assert not children()
+    assert not children() - others
 
 
-def children() -> list[int]:
+def children() -> set[int]:
     """Return the processes that this one has started."""
-    found = []
+    found: set[int] = set()
     for path in Path("/proc/self/task").glob("*/children"):
         with suppress(OSError):
-            found += [int(pid) for pid in path.read_text().split()]
+            found |= {int(pid) for pid in path.read_text().split()}
     return found
 
 

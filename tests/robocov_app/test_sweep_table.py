@@ -162,8 +162,12 @@ def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
     with full, Table(tmp_path, columns_of(study)) as table:
         table.add(row)
-        table._csv._file = Full(table._csv._file, 40)
-        table.add(row)
+        whole = table._csv._file
+        table._csv._file = Full(whole, 40)
+        with pytest.raises(OutputError):
+            table.add(row)
+        table._csv._file = whole
+        table.add(row)  # one is missing now
     lines = (tmp_path / "results.csv").read_text().splitlines()
     assert len(lines) == 2
     assert len(lines[0].split(",")) == len(lines[1].split(","))

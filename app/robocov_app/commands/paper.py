@@ -142,12 +142,11 @@ def _announce(forecast: Forecast, name: str, means: Means) -> None:
             else ""
         )
         each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
-        where = "on a Dask cluster" if means.scheduler else f"on {means.workers} processes"
-        words = (
-            f"{forecast.runs:,} runs{there}, about {duration(forecast.seconds)} {where} (measured: {each} "
-            f"a run); "
-            f"Ctrl-C keeps what is done"
-        )
+        if means.scheduler:
+            long = f"about {duration(forecast.seconds * means.workers)} of computing, on a Dask cluster"
+        else:
+            long = f"about {duration(forecast.seconds)} on {means.workers} processes"
+        words = f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"
     sys.stderr.write(f"paper ({name}): {words}\n")
     sys.stderr.flush()
 

@@ -36,7 +36,7 @@ NONE = 65535
 """Stands for a number that is not there."""
 
 SPARSE = 1.5
-"""Seconds between moments of a record from which on it tells no path."""
+"""Seconds between the first moment and the last, if there are no others, above which they tell no path."""
 
 _VERTICES = 4000
 """Vertices of a map's obstacles above which they are simplified."""
@@ -89,8 +89,8 @@ def quantised(values: Array, low: float, high: float) -> str:
 
 
 def has_path(record: Record) -> bool:
-    """Return whether the moments lie close enough together to tell where the robots went."""
-    return len(record) > 1 and float(np.diff(record.time).max()) <= SPARSE
+    """Return whether there is more than the first moment and the last, to tell where the robots went."""
+    return len(record) > 2 or (len(record) == 2 and float(record.time[1] - record.time[0]) <= SPARSE)
 
 
 def embedded_map(environment: Environment) -> dict[str, Any]:

@@ -278,8 +278,8 @@ def _interval(interval: Interval) -> str:
 
 
 def _signed(number: str) -> str:
-    """Return a number with a minus that is as wide as a digit."""
-    return number.replace("-", "\u2212")
+    """Return a number with a minus that is as wide as a digit, and none before nothing but zeros."""
+    return number.replace("-", "\u2212" if number.strip("-0.") else "")
 
 
 def _percent(interval: Interval) -> str:

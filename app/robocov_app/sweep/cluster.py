@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
+import logging
 import math
 import queue
 import time
@@ -63,12 +64,17 @@ class Cluster(Crew):
             reason = " ".join(str(error).split()) or f"no answer in {PATIENCE:g} s"
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
         self._most, self._asked = _LEAST, -math.inf
+        # what it has to say of a scheduler that goes is said here, in one line
+        self._talk = logging.getLogger("distributed.client")
+        self._level = self._talk.level
+        self._talk.setLevel(logging.CRITICAL)
 
     def __exit__(self, *exception: object) -> None:
         with suppress(Exception):  # the scheduler may be gone
             self._client.cancel(list(self._tasks))
         with suppress(Exception):
             self._client.close()
+        self._talk.setLevel(self._level)
 
     @property
     def most(self) -> int:

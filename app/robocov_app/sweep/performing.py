@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import threading
 import traceback
 from collections import OrderedDict
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +27,7 @@ from robocov_app.run import COST_COLUMNS, cost_rows
 from robocov_app.sweep.study import team_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
 
 _REMEMBERED = 4
 """Maps whose costs a worker keeps; tasks come map by map."""
+
+_TIDY = 1000
+"""Steps after which garbage is collected in a long run."""
 
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
@@ -63,6 +68,11 @@ class Outcome:
 
 def perform(task: Task) -> Outcome:
     """Do a run; what goes wrong in it is a part of the outcome."""
+    with _undisturbed():
+        return _caught(task)
+
+
+def _caught(task: Task) -> Outcome:
     try:
         return _performed(task)
     except (Exception, SystemExit) as error:
@@ -89,27 +99,47 @@ def simulated(task: Task, environment: Environment) -> Record:
     recorder = Recorder(
         environment, team, controller, task.dt, name=task.controller, start=task.start, seed=task.seed
     )
-    for snapshot in simulation.snapshots(task.duration):
+    for step, snapshot in enumerate(simulation.snapshots(task.duration), start=1):
         recorder.add(snapshot)
+        if step % _TIDY == 0:
+            gc.collect(0)
     return recorder.record()
 
 
 def prepared(task: Task) -> tuple[Environment, CoverageCost]:
     """Return the map of a task and its cost, those of the last few maps as they were."""
-    # the threads of one worker must not share what a cost computes with
-    known: OrderedDict[Any, tuple[Environment, CoverageCost]]
-    known = _KNOWN.__dict__.setdefault("costs", OrderedDict())
     key = task.document, task.lattice
-    if key not in known:
+    if key not in _KNOWN:
         environment = from_json(json.loads(task.document), task.map)
-        known[key] = environment, CoverageCost(environment, task.lattice, cache=ArrayCache.of_user())
-        if len(known) > _REMEMBERED:
-            known.popitem(last=False)
-    known.move_to_end(key)
-    return known[key]
+        _KNOWN[key] = environment, CoverageCost(environment, task.lattice, cache=ArrayCache.of_user())
+        if len(_KNOWN) > _REMEMBERED:
+            _KNOWN.popitem(last=False)
+    _KNOWN.move_to_end(key)
+    return _KNOWN[key]
 
 
-_KNOWN = threading.local()
+_KNOWN: OrderedDict[tuple[str, int], tuple[Environment, CoverageCost]] = OrderedDict()
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let no other thread of this process near the physics: pymunk is not made for that.
+
+    Runs come one after the other; they are Python for the most part, and threads would not make them faster.
+    What they leave behind is collected here as well: when another thread came upon it, as those of
+    a Dask worker do, it would free bodies in the midst of the next run's steps.
+    """
+    with _ONE_AT_A_TIME:
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            gc.collect(1)  # what is older than the run is none of its garbage
+            if enabled:
+                gc.enable()
 
 
 def _performed(task: Task) -> Outcome:

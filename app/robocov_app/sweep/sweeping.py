@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import deque
 from contextlib import ExitStack
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, RobocovError, shown
 from robocov_app.interruption import Interruption
 from robocov_app.sweep.ledger import opened
 from robocov_app.sweep.pool import LocalPool, processors
@@ -17,7 +18,6 @@ from robocov_app.sweep.telling import Count, told
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     from robocov_app.sweep.crew import Crew
     from robocov_app.sweep.ledger import Entry, Ledger
@@ -51,7 +51,7 @@ class Totals(NamedTuple):
 
 def sweep(
     study: Study,
-    folder: Path,
+    folder: Path | str,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -67,7 +67,7 @@ def sweep(
     Parameters
     ----------
     study : Study
-    folder : Path
+    folder : path
         For ``study.json``, ``results.csv``, ``results.parquet`` and ``runs/``. What an earlier sweep has
         done there is used as far as it belongs to the study.
     workers : int or None
@@ -94,6 +94,7 @@ def sweep(
         raise ParameterError(
             f"workers: {shown(workers)}, but a whole number from 1 to {MOST_WORKERS} was wanted"
         )
+    folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop
         ledger = stack.enter_context(opened(folder, study.to_json()))
@@ -111,10 +112,16 @@ def sweep(
             return stack.enter_context(Cluster(scheduler))
 
         tasks = tasks_of(study)
-        for _ in _worked_off(tasks, rows, hired, count, stopped, retry_failed=retry_failed):
-            tell(count)
-        if stopped.requested:
+        failure: RobocovError | None = None
+        try:
+            for _ in _worked_off(tasks, rows, hired, count, stopped, retry_failed=retry_failed):
+                tell(count)
+        except RobocovError as error:  # what is done belongs into the table all the same
+            failure = error
+        if stopped.requested or failure is not None:
             rows.rest(tasks)
+    if failure is not None:
+        raise failure
     interrupted = count.done + count.failed + count.reused < count.total
     return Totals(count.done, count.failed, count.reused, interrupted)
 
@@ -183,12 +190,11 @@ class _Rows:
         if task is not self._line[0]:
             self._finished.add(task.name)
             return
-        self._line.popleft()
         self._table.add(row_of(task, entry))
+        self._line.popleft()
         while self._line and self._line[0].name in self._finished:
-            following = self._line.popleft()
-            self._finished.remove(following.name)
-            self._write(following)
+            self._write(self._line[0])
+            self._finished.remove(self._line.popleft().name)
 
     def rest(self, tasks: Iterator[Task]) -> None:
         """Write the rows of all that is finished, in the line and of these tasks behind it."""

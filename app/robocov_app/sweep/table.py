@@ -139,10 +139,11 @@ class Table:
     Raises
     ------
     OutputError
-        When something cannot be written; no half of a row is left then.
+        When something cannot be written; no half of a row is left then, and no other row is taken.
     """
 
     def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+        self._broken: OutputError | None = None
         self._folder, self._columns = folder, columns
         self._names = [column.name for column in columns]
         self._rows: list[dict[str, Any]] = []
@@ -174,11 +175,17 @@ class Table:
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Append a row; what it does not hold is null."""
+        if self._broken is not None:
+            raise self._broken
         values = {name: row.get(name) for name in self._names}
-        self._csv.write(_csv_line(values.values()))
-        self._rows.append(values)
-        if len(self._rows) == ROW_GROUP:
-            self._flush()
+        try:
+            self._csv.write(_csv_line(values.values()))
+            self._rows.append(values)
+            if len(self._rows) == ROW_GROUP:
+                self._flush()
+        except OutputError as error:
+            self._broken = error
+            raise
 
     def _flush(self) -> None:
         import pyarrow as pa

@@ -53,7 +53,8 @@ class Count:
         words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
         words += [f"{self.reused} were there"] * (self.reused > 0)
-        words += [f"{self.rate:.2g} a second"] * (self.rate > 0)
+        if self.rate > 0:
+            words.append(f"{self.rate:.0f} a second" if self.rate >= 10 else f"{self.rate:.2g} a second")
         return ", ".join(words)
 
 
@@ -122,7 +123,7 @@ def duration(seconds: float) -> str:
     """Return a time for people.
 
     >>> duration(8.2), duration(95), duration(4000), duration(200000)
-    ('8 s', '1 min 35 s', '1 h 7 min', '2 d 8 h')
+    ('8 s', '1 min 35 s', '1 h 6 min', '2 d 7 h')
     """
     whole = round(seconds)
     if whole < 60:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -16,7 +16,7 @@ from robocov.generator.request import SIDES, Request, checked
 from robocov.generator.rooms import building
 from robocov.maprules import check_rules
 from robocov.passages import narrowest_gap
-from robocov.starts import DiscStart, UniformStart
+from robocov.starts import DiscStart, StartSpec, UniformStart
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -146,9 +146,12 @@ def generated_map(
         layout = of_kind.layout(request, corner, rng)
         if layout is None:
             continue
-        environment = _environment(int(seed), kind, request, corner, layout)
-        if environment is not None and _fulfils(environment, request):
-            return environment
+        environment = _environment(int(seed), kind, request, layout)
+        if _fulfils(environment, request):
+            starts = _starts(environment, request, corner)
+            environment = replace(environment, starts=starts)
+            if starts and _is_valid(environment):
+                return environment
     raise ParameterError(
         f"area: {request.area:g}, but no layout of {request.obstacles} {of_kind.counted} was found that "
         f"blocks it on {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m; "
@@ -173,25 +176,17 @@ def _corner(request: Request, rng: np.random.Generator) -> DiscStart:
     return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
 
 
-def _environment(
-    seed: int, kind: str, request: Request, corner: DiscStart, layout: list[Obstacle]
-) -> Environment | None:
-    """Return the map with its starts, None where there is no room for these."""
+def _environment(seed: int, kind: str, request: Request, layout: list[Obstacle]) -> Environment:
+    """Return the map without its starts."""
     width, height = float(request.width), float(request.height)
-    boundary = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
-    plain = Environment(kind, boundary, tuple(layout))
-    within, centre = _within(plain, request, corner), _centre(plain, request)
-    if within is None or centre is None:
-        return None
     counted = GENERATORS[kind].counted
     return Environment(
         f"{kind} {seed}",
-        boundary,
+        ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         tuple(layout),
-        {"corner": within, "centre": centre, "uniform": UniformStart()},
-        f"Generated with seed {seed}: {request.obstacles} {counted}, {request.area:.3g} of the area blocked, "
-        f"every passage at least {request.gap:g} m wide.",
-        {
+        description=f"Generated with seed {seed}: {request.obstacles} {counted}, {request.area:.3g} of the "
+        f"area blocked, every passage at least {request.gap:g} m wide.",
+        extra={
             "generator": {
                 "kind": kind,
                 "seed": seed,
@@ -203,6 +198,14 @@ def _environment(
             }
         },
     )
+
+
+def _starts(environment: Environment, request: Request, corner: DiscStart) -> dict[str, StartSpec]:
+    """Return the starts, none if there is no room for one of them."""
+    within, centre = _within(environment, request, corner), _centre(environment, request)
+    if within is None or centre is None:
+        return {}
+    return {"corner": within, "centre": centre, "uniform": UniformStart()}
 
 
 def _within(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
@@ -236,10 +239,8 @@ def _centre(environment: Environment, request: Request) -> DiscStart | None:
 
 
 def _fulfils(environment: Environment, request: Request) -> bool:
-    """Return whether a map is valid, and as it was asked for."""
-    try:
-        check_rules(environment, environment.name)
-    except MapError:
+    """Return whether a map without starts is valid, and as it was asked for."""
+    if not _is_valid(environment):
         return False
     share = 1.0 - environment.free_area / environment.area
     if abs(share - request.area) > AREA_TOLERANCE or len(environment.free.geoms) != 1:
@@ -249,3 +250,11 @@ def _fulfils(environment: Environment, request: Request) -> bool:
         return False
     narrowest = narrowest_gap(environment.free)
     return narrowest is None or narrowest.width >= request.gap - 1e-6
+
+
+def _is_valid(environment: Environment) -> bool:
+    try:
+        check_rules(environment, environment.name)
+    except MapError:
+        return False
+    return True

@@ -125,7 +125,7 @@ def _piece(
     size = np.array([long, deep] if rng.random() < 0.5 else [deep, long])
     if kind == "round table":
         size = np.full(2, 2.0 * math.sqrt(area / math.pi))
-    size = np.maximum(request.rounded(size), 2.0 * request.step)
+    size = np.maximum(request.rounded(size), 4.0 * request.step)
     space = np.array(room.sides) - size
     if (space < 0.0).any():
         return None
@@ -137,12 +137,14 @@ def _piece(
             off[side] = space[side] * rng.integers(0, 2)
         low = request.rounded(off + room[:2])
         free = np.array([*(low - room[:2]), *(np.array(room[2:]) - low - size)])
-        if ((free > request.step / 2.0) & (free < request.gap)).any():
+        # what is round would touch a wall in a point
+        against = (free < request.step / 2.0) & (kind != "round table")
+        if not (against | (free >= request.gap)).all():
             continue
         piece: CircleObstacle | PolygonObstacle
         if kind == "round table":
             x, y = request.rounded(low + size / 2.0).tolist()
-            piece = CircleObstacle((x, y), request.floor(size[0] / 2.0), kind)
+            piece = CircleObstacle((x, y), request.floor(size[0] / 2.0 - request.step / 2.0), kind)
         else:
             (x, y), (right, top) = low.tolist(), request.rounded(low + size).tolist()
             piece = PolygonObstacle(((x, y), (right, y), (right, top), (x, top)), name=kind)

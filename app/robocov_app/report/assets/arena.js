@@ -7,6 +7,7 @@ const COLOURS = [
 ];
 const ONE_HUE_EACH = 9;
 const MAP_COLOURS = 6;
+const MOST_CELLS = 400; // of more, a picture takes too long to move
 const FONT = "system-ui, sans-serif";
 
 function lookOf(element) {
@@ -108,7 +109,7 @@ function drawArena(canvas, run, time, look, show) {
   context.lineJoin = "round";
   context.fillStyle = look.background;
   context.fill(region);
-  if (show.cells) drawCells(context, run, places, frame, look);
+  if (show.cells && run.robots <= MOST_CELLS) drawCells(context, run, places, frame, look);
   context.lineWidth = 1;
   context.fillStyle = look.obstacle;
   context.strokeStyle = look["obstacle-edge"];

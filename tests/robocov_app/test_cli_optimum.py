@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import COMMAND, SHORT, answer, complaint
+from PIL import Image
+
+from robocov.environment import Environment, WallObstacle
+from robocov.mapfile import save_map
+from robocov.optimum import optimum
+from robocov.starts import DiscStart
+from robocov_app.cli import main
+
+FAST = ("--lattice", "24", "--restarts", "3")
+
+
+def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "best.json"
+    row = answer(capsys, "optimum", "trap", *FAST, "--robots", "3", "--seed", "2", "--positions", str(file))
+    from robocov.mapfile import load_map
+
+    best = optimum(load_map("trap"), 3, lattice=24, restarts=3, seed=2)
+    assert row["mean_distance_m"] == best.mean_distance
+    assert row["positions_m"] == best.positions.tolist() == json.loads(file.read_bytes())
+    assert row["restart_mean_distances_m"] == best.costs.tolist()
+    assert row["undescended_mean_distances_m"] == best.undescended.tolist()
+    assert row["robots"] == row["restarts"] == 3
+    assert row["runs"] == []
+    assert row["agreement"] == {
+        "0.001": best.agreement(0.001),
+        "0.005": best.agreement(),
+        "0.02": best.agreement(0.02),
+    }
+    cost = answer(capsys, "cost", "trap", "--positions", str(file), "--lattice", "24")
+    assert cost["mean_distance_m"] == pytest.approx(best.mean_distance, rel=1e-12)
+    assert cost["cost_m3"] == pytest.approx(row["cost_m3"], rel=1e-12)
+    # one robot a line
+    assert len(file.read_text().splitlines()) == 3
+
+
+def test_it_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["optimum", "square", "--lattice", "16", "--restarts", "5", "--robots", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "mean distance   3.82" in said
+    assert "1 robot, 5 restarts in" in said
+    assert "within 0.5% of the best     5" in said
+    assert "[5.000, 5.000]" in said
+
+
+def test_how_far_a_run_is_above(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    assert main(["run", "trap", *SHORT, "--robots", "4", "--out", str(out)]) == 0
+    capsys.readouterr()
+    row = answer(capsys, "optimum", "--run", str(out), "--lattice", "16", "--restarts", "3")
+    end = json.loads((out / "run.json").read_bytes())["summary"]["mean_distance_m"]
+    (run,) = row["runs"]
+    assert row["robots"] == 4
+    assert run["run"] == "run"
+    assert run["mean_distance_m"] == pytest.approx(end, rel=1e-9)
+    assert run["gap"] == pytest.approx(end / row["mean_distance_m"] - 1.0)
+    assert run["gap"] > 0.0
+    assert main(["optimum", "--run", str(out), "--lattice", "16", "--restarts", "3"]) == 0
+    assert f"{run['gap']:.1%} above the best" in capsys.readouterr().out
+
+
+def test_a_comparison_has_a_gap_for_each_controller(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "both"
+    assert main(["compare", "trap", *SHORT, "--controllers", "rapf", "rpf", "--out", str(out)]) == 0
+    capsys.readouterr()
+    row = answer(capsys, "optimum", "--run", str(out), *FAST)
+    assert [run["run"] for run in row["runs"]] == ["rapf", "rpf"]
+    assert all(run["gap"] > 0.0 for run in row["runs"])
+
+
+def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    halves = Environment(
+        "halves",
+        ((0, 0), (8, 0), (8, 4), (0, 4)),
+        (WallObstacle(((3, 0), (3, 4)), 0.1),),
+        {"left": DiscStart((1.5, 2.0), 1.0)},
+    )
+    save_map(halves, tmp_path / "halves.json")
+    out = tmp_path / "run"
+    assert main(["run", str(tmp_path / "halves.json"), *SHORT, "--robots", "2", "--out", str(out)]) == 0
+    capsys.readouterr()
+    row = answer(capsys, "optimum", "--run", str(out), *FAST)
+    assert row["uncovered_area_m2"] == 0.0
+    assert row["runs"][0]["gap"] is None
+    assert main(["optimum", "--run", str(out), *FAST]) == 0
+    assert "other rooms than the best covers" in capsys.readouterr().out
+
+
+def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    light, dark = tmp_path / "light.png", tmp_path / "dark.png"
+    assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
+    assert main(["optimum", "trap", *FAST, "--plot", str(dark), "--theme", "dark"]) == 0
+    again = light.read_bytes()
+    assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
+    assert light.read_bytes() == again
+    capsys.readouterr()
+    assert np.array(Image.open(light))[0, 0, :3].min() == 255
+    assert np.array(Image.open(dark))[0, 0, :3].max() < 50
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        ((), "MAP or --run DIR: one of the two was wanted"),
+        (("rooms", "--run", "x"), "MAP or --run DIR: one of the two was wanted"),
+        (("roms",), "unknown map 'roms': did you mean 'rooms'?"),
+        (("rooms", "--robots", "0"), "--robots: 0, but a whole number from 1 to 500 was wanted"),
+        (("rooms", "--robots", "many"), "--robots: "),
+        (("rooms", "--restarts", "0"), "--restarts: 0, but a whole number from 1 to 100000 was wanted"),
+        (("rooms", "--lattice", "1"), "--lattice: 1, but a whole number from 2 to 2048 was wanted"),
+        (("rooms", "--seed", "-1"), "--seed: -1, but"),
+        (("rooms", "--radius", "-1"), "radius: -1.0 m, but a number above 0 was wanted"),
+        (("square", "--radius", "6"), "there is no room for any in map 'Square'"),
+        (("rooms", "--plot", "a.jpg"), "'.jpg'"),
+        (("--run", "nowhere"), "nowhere: not the folder of a run"),
+        (("--run", "x", "--robots", "3"), "--robots: 3, but with --run it is that of the run"),
+        (("--run", "x", "--radius", "0.2"), "--radius: 0.2, but with --run"),
+        (("rooms", "--positions", "."), "--positions: '.', but the name of a file was wanted"),
+    ],
+)
+def test_mistakes_are_named(words: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert part in complaint(capsys, "optimum", *words)
+
+
+def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text("[[1, 1]]")
+    words = ("optimum", "trap", *FAST, "--positions", str(file))
+    assert "exists already" in complaint(capsys, *words)
+    assert file.read_text() == "[[1, 1]]"
+    assert main([*words, "--overwrite"]) == 0
+    assert len(json.loads(file.read_bytes())) == 6
+
+
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+    file = tmp_path / "best.json"
+    words = ("optimum", "museum", "--restarts", "100000", "--robots", "20", "--positions", str(file))
+    process = subprocess.Popen([*COMMAND, *words], stderr=subprocess.PIPE, text=True)
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
