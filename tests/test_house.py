@@ -105,6 +105,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("studying writing words".split(), "test_paper_studying"),
     **dict.fromkeys("bars told".split(), "test_paper_telling"),
     "reading": "test_paper_reading",
+    "paper_tables": "test_paper_studying",
     "paper": "test_paper_command",
 }
 """Modules without a test file of their own, and the one that tests them."""

@@ -233,7 +233,7 @@ def _centre(environment: Environment, request: Request) -> DiscStart | None:
     room = shapely.distance(environment.free.boundary, shapely.points(place))
     largest = 0.8 * _radius(request)
     score = np.minimum(room, largest) - 0.2 * np.hypot(offset[:, 0], offset[:, 1])
-    best = int(score.argmax())
+    best = int(np.round(score, 9).argmax())
     radius = request.floor(min(max(float(room[best]), _LEAST * largest), largest))
     return DiscStart((float(place[best, 0]), float(place[best, 1])), radius)
 

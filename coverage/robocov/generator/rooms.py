@@ -35,6 +35,12 @@ _PIECES = 2.2
 _TRIES = 32
 """Places that are tried for one piece, and pieces in a row that find none before that is given up."""
 
+_SHRINKING, _SHRUNK = 0.92, 0.2
+"""Each piece that finds no place makes the next smaller by this factor, down to the smallest."""
+
+_DENSEST = 0.35
+"""Part of the rooms that furniture fills at most: more finds no place."""
+
 _ENOUGH = 0.001
 """What is left to be blocked, as a part of the map, which is too little for a piece."""
 
@@ -83,13 +89,16 @@ def _furniture(
     kept: list[list[shapely.Polygon]] = [
         [door.box(thickness) for door in plan.doors if k in door.rooms] for k in range(len(inner))
     ]
+    if area > _DENSEST * sizes.sum():
+        return None
     # pieces are as large as a few of them for each room must be
     usual = area / (_PIECES * len(inner))
     furniture: list[Obstacle] = []
     missed = 0
     while area > enough:
         room = int(rng.choice(len(inner), p=sizes / sizes.sum()))
-        piece = _piece(request, inner[room], kept[room], clear, min(area, usual * rng.uniform(0.5, 1.5)), rng)
+        wanted = min(area, usual * rng.uniform(0.5, 1.5) * max(_SHRUNK, _SHRINKING**missed))
+        piece = _piece(request, inner[room], kept[room], clear, wanted, rng)
         if piece is None:
             missed += 1
             if missed == _TRIES:
@@ -129,26 +138,27 @@ def _piece(
     space = np.array(room.sides) - size
     if (space < 0.0).any():
         return None
-    for _ in range(_TRIES):
-        off = rng.random(2) * space
-        if kind == "cabinet":
-            # with its back to the wall
-            side = int(size[0] > size[1])
-            off[side] = space[side] * rng.integers(0, 2)
-        low = request.rounded(off + room[:2])
-        free = np.array([*(low - room[:2]), *(np.array(room[2:]) - low - size)])
-        # what is round would touch a wall in a point
-        against = (free < request.step / 2.0) & (kind != "round table")
-        if not (against | (free >= request.gap)).all():
-            continue
-        piece: CircleObstacle | PolygonObstacle
-        if kind == "round table":
-            x, y = request.rounded(low + size / 2.0).tolist()
-            piece = CircleObstacle((x, y), request.floor(size[0] / 2.0 - request.step / 2.0), kind)
-        else:
-            (x, y), (right, top) = low.tolist(), request.rounded(low + size).tolist()
-            piece = PolygonObstacle(((x, y), (right, y), (right, top), (x, top)), name=kind)
-        shape = piece.polygon
-        if shape.disjoint(clear) and all(shape.distance(other) >= request.gap for other in others):
-            return piece
-    return None
+    off = rng.random((_TRIES, 2)) * space
+    if kind == "cabinet":
+        # with its back to the wall
+        side = int(size[0] > size[1])
+        off[:, side] = space[side] * rng.integers(0, 2, _TRIES)
+    low = request.rounded(off + room[:2])
+    free = np.column_stack([low - room[:2], np.array(room[2:]) - low - size])
+    # what is round would touch a wall in a point
+    against = (free < request.step / 2.0) & (kind != "round table")
+    low = low[(against | (free >= request.gap)).all(axis=1)]
+    high, middle = request.rounded(low + size), request.rounded(low + size / 2.0)
+    radius = request.floor(size[0] / 2.0 - request.step / 2.0) if kind == "round table" else 0.0
+    shapes = shapely.points(middle) if radius else shapely.box(*low.T, *high.T)
+    good = shapely.distance(shapes, clear) > radius
+    if others:
+        good &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius
+    if not good.any():
+        return None
+    first = int(good.argmax())
+    if radius:
+        x, y = middle[first].tolist()
+        return CircleObstacle((x, y), radius, kind)
+    (left, bottom), (right, top) = low[first].tolist(), high[first].tolist()
+    return PolygonObstacle(((left, bottom), (right, bottom), (right, top), (left, top)), name=kind)
