@@ -242,9 +242,11 @@ class _Search:
         side = max(1, math.ceil(math.sqrt(np.count_nonzero(wanted) / _TARGETS)))
         row, column = np.divmod(cost.cells, cost.lattice)
         square = (row // side * cost.lattice + column // side) * len(self.room.parts) + site_component
-        off = np.hypot(row % side - (side - 1) / 2, column % side - (side - 1) / 2)
+        # in whole numbers: of two by two cells all are as near to the middle, and chance decides
+        off = (2 * (row % side) - side + 1) ** 2 + (2 * (column % side) - side + 1) ** 2
+        chance = np.random.default_rng(0).random(len(square))
         site = np.nonzero(wanted)[0]
-        site = site[np.lexsort((site, off[site], square[site]))]
+        site = site[np.lexsort((chance[site], off[site], square[site]))]
         _, first, count = np.unique(square[site], return_index=True, return_counts=True)
         table = cost.geodesics.distances(self.places, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHED * cost.geodesics.size

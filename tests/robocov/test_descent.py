@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import pytest
 import shapely
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
 from robocov.cost import CoverageCost
-from robocov.descent import Room, descended
+from robocov.descent import Room, _direction, descended
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 
 OFFICE = Environment(
@@ -128,3 +130,26 @@ def test_where_nothing_can_be_gained_robots_stay():
     np.testing.assert_array_equal(result.positions[0], begin[0])
     only = descended(cost, room, begin[:1], np.array([1]))
     assert np.isnan(only.mean_distance)
+
+
+def test_what_was_learnt_of_a_quadratic_leads_to_its_minimum():
+    rng = np.random.default_rng(4)
+    half = rng.normal(size=(4, 4))
+    bowl = half @ half.T + np.eye(4)
+    steps = np.linalg.eigh(bowl)[1].T.reshape(4, 2, 2)
+    learnt = deque()
+    for step in steps:
+        bend = (bowl @ step.ravel()).reshape(2, 2)
+        learnt.append((step, bend, 1.0 / np.vdot(step, bend)))
+    slope = rng.normal(size=(2, 2))
+    way = _direction(slope, np.ones((2, 1)), learnt)
+    np.testing.assert_allclose(bowl @ way.ravel(), -slope.ravel(), atol=1e-12)
+
+
+def test_some_tens_of_steps_are_enough():
+    steps = []
+    for seed in range(6):
+        before = len(steps)
+        descended(COST, ROOM, starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
+        assert len(steps) - before < 60
+    assert len(steps) / 6 < 35

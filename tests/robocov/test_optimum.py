@@ -190,6 +190,45 @@ def test_the_largest_components_are_covered_first():
     np.testing.assert_allclose(one.positions, [[3.5, 2.0]], atol=0.02)
 
 
+def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
+    halves = room(12, 4, box(9, 0, 9.2, 4), name="halves")
+
+    def all_in_the_small_one(table, count, rng):
+        # what is far from most is there
+        return np.argsort(table.sum(axis=1))[::-1][:count]
+
+    monkeypatch.setattr("robocov.optimum.seeded", all_in_the_small_one)
+    search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
+    drawn = search.places[all_in_the_small_one(search.table, 3, None)]
+    best = optimum(halves, 3, lattice=32, restarts=1)
+    assert (drawn[:, 0] > 9.2).all()
+    assert search.cost(drawn).mean_distance < best.mean_distance
+    assert best.uncovered_area == 0.0
+
+
+@pytest.mark.parametrize("name", ["museum", "trap"])
+def test_the_table_holds_about_the_exact_sums_over_all_sites(name):
+    where = load_map(name)
+    search = _Search(where, CoverageCost(where, 64), 6, 0.1)
+    assert 300 < search.table.shape[1] < 1100 < len(search.cost.points)
+    some = np.random.default_rng(0).choice(len(search.places), 40, replace=False)
+    exact = [search.cost(search.places[k][None]).mean_distance for k in some]
+    means = search.table[some].sum(axis=1) / len(search.cost.points)
+    np.testing.assert_allclose(means, exact, rtol=0.01)
+
+
+def test_places_for_robots_fill_the_room():
+    where = load_map("museum")
+    search = _Search(where, CoverageCost(where, 32), 6, 0.1)
+    assert 500 < len(search.places) < 900
+    (part,) = search.room.parts
+    assert shapely.covers(part, shapely.points(search.places)).all()
+    apart = pdist(search.places).min()
+    assert apart >= search.room.spacing
+    # no place of the room is farther from all of them than they are from each other
+    assert part.difference(shapely.MultiPoint(search.places).buffer(1.5 * apart)).area < 1e-6 * part.area
+
+
 def test_pockets_where_no_robot_fits_or_without_a_site_are_left_alone():
     pocket = room(6, 4, box(0.15, 0, 0.25, 4), name="pocket")  # 0.15 m wide: no robot fits
     best = optimum(pocket, 2, lattice=32, restarts=3)
