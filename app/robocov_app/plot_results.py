@@ -188,6 +188,7 @@ def plot_final_costs(
     scale: float | None = None,
     styles: Sequence[CurveStyle] | None = None,
     label: str = DISTANCE,
+    origin: float = 0.0,
 ) -> Figure:
     """Plot samples as boxes on their side, every value as a point, in groups such as maps.
 
@@ -211,6 +212,8 @@ def plot_final_costs(
         For the samples of each row in turn; by default `styles_of` the row's controllers.
     label : str
         What the values are.
+    origin : float
+        The least value there can be: the axis begins there unless all values are far from it.
 
     Returns
     -------
@@ -240,7 +243,7 @@ def plot_final_costs(
             draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
         values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
         row_frame(axes, places, names, total, theme, label)
-        value_limits(axes, values)
+        value_limits(axes, values, origin)
         for (name, _), head in zip(rows, heads, strict=True):
             if name:
                 draw_heading(axes, name, head, theme)

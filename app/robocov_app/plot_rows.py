@@ -125,13 +125,14 @@ def draw_heading(axes: Axes, name: str, height: float, theme: Theme) -> None:
     )
 
 
-def value_limits(axes: Axes, values: Array) -> None:
-    """Give the axis room for all values, from zero where they come near it."""
+def value_limits(axes: Axes, values: Array, origin: float = 0.0) -> None:
+    """Give the axis room for all values, from `origin` where they come near it."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = float(values.min()), float(values.max())
     room = 0.06 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
-    axes.set_xlim(0.0 if 0.0 <= low < _FROM_ZERO * high else low - room, high + room)
+    near = 0.0 <= low - origin < _FROM_ZERO * (high - origin)
+    axes.set_xlim(origin if near else low - room, high + room)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter("{x:g}")
 

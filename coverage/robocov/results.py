@@ -194,7 +194,7 @@ class Results:
         if count > len(head):
             caption += f"; the first {len(head)}"
         return (
-            f'<div style="overflow-x: auto"><table><caption>{caption}</caption>'
+            f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
             f"<thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table></div>"
         )
 

@@ -75,6 +75,13 @@ def test_the_axis_begins_at_zero_where_values_come_near_it(values, begin) -> Non
     assert low == pytest.approx(begin) and low < values[0] + 1e-9 and high > values[1]
 
 
+@pytest.mark.parametrize(("values", "begin"), [((1.01, 1.2), 1.0), ((0.98, 1.2), 0.9668), ((3.0, 4.0), 2.94)])
+def test_the_axis_may_begin_elsewhere(values, begin) -> None:
+    axes = axes_of()
+    value_limits(axes, np.array(values), 1.0)
+    assert axes.get_xlim()[0] == pytest.approx(begin)
+
+
 @given(st.lists(st.floats(1e-3, 1e4), min_size=1, max_size=8))
 def test_an_axis_of_ratios_shows_all_of_them_and_one(ratios) -> None:
     axes = axes_of()

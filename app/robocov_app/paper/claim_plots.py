@@ -167,4 +167,4 @@ def _paired(pairs: Sequence[Pairs], label: str, theme: Theme | str) -> Callable[
 def _boxes(
     rows: Sequence[tuple[str, Sequence[Sample]]], label: str, theme: Theme | str
 ) -> Callable[[], Figure]:
-    return lambda: plot_final_costs(rows, theme=theme, size=(WIDE, None), scale=DOTS, label=label)
+    return lambda: plot_final_costs(rows, theme=theme, size=(WIDE, None), scale=DOTS, label=label, origin=1.0)
