@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +13,10 @@ from robocov.starts import DiscStart, UniformStart
 
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""
+
+# what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
