@@ -10,10 +10,17 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import signal
 import sys
+import threading
 import traceback
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -71,10 +78,12 @@ def _guarded(name: str, rest: list[str]) -> int:
     try:
         # pygame greets on stdout, which belongs to answers
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-        from robocov_app.arguments import parsed
+        with _stopping_at_once():
+            module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
+            from robocov_app.arguments import parsed
 
-        status = module.command(parsed(module.Arguments, name, rest))
+            options = parsed(module.Arguments, name, rest)
+        status = module.command(options)
         sys.stdout.flush()
     except RobocovError as error:
         return _complain(str(error))
@@ -96,6 +105,28 @@ def _guarded(name: str, rest: list[str]) -> int:
         print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
         return FAILED
     return int(status or OK)
+
+
+@contextmanager
+def _stopping_at_once() -> Iterator[None]:
+    """End the process at Ctrl-C while modules are loaded, when there is nothing to lose.
+
+    Python now and then swallows an interruption there, and would go on as if nobody had wanted to stop.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def stop(number: int, frame: object) -> None:
+        os.write(2, b"robocov: stopped\n")
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _prepare_output() -> None:
