@@ -2,7 +2,7 @@
 
     RobocovError
     ├── InputError            what a user gave cannot be used (exit status 2)
-    │   ├── MapError          a map file, with the JSON path of the place
+    │   ├── MapError          a map file, with line, column and JSON path of the place
     │   ├── StartError        a start without room for the team
     │   └── ParameterError    a gain, a limit, a name of a controller
     └── OutputError           a result cannot be written (exit status 2)
@@ -19,6 +19,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from robocov.mistakes import Mistake
+
+
+_LONGEST_KNOWN = 60
+"""Names that are known are told up to so many characters."""
+
 
 class RobocovError(Exception):
     """Base class of every error that robocov raises on purpose."""
@@ -29,7 +35,32 @@ class InputError(RobocovError):
 
 
 class MapError(InputError):
-    """A map cannot be used; the message names the file, the JSON path, the value and what was wanted."""
+    """A map cannot be used; the message names the file, the place in it, the value and what was wanted.
+
+    Attributes
+    ----------
+    mistakes : tuple of Mistake
+        What is wrong in it, where that is more than a word about the file as a whole; the message tells
+        of the first.
+    unlisted : int
+        How many there are beside these.
+    where : str
+        What the message calls the file.
+    """
+
+    mistakes: tuple[Mistake, ...] = ()
+    unlisted: int = 0
+    where: str = ""
+
+    @property
+    def line(self) -> int | None:
+        """Line of the first mistake, counted from 1; None where there is no text."""
+        return self.mistakes[0].line if self.mistakes else None
+
+    @property
+    def column(self) -> int | None:
+        """Column of the first mistake, counted from 1; None where there is no text."""
+        return self.mistakes[0].column if self.mistakes else None
 
 
 class StartError(InputError):
@@ -71,5 +102,11 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    hint = f": did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(names)})"
+    hint = f": did you mean {shown(near[0])}?" if near else ""
+    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(map(_told, names))})"
+
+
+def _told(name: str) -> str:
+    """Return a known name for people: on one line, and not too long."""
+    name = name if name.isprintable() else ascii(name)[1:-1]
+    return name if len(name) <= _LONGEST_KNOWN else f"{name[: _LONGEST_KNOWN - 3]}..."

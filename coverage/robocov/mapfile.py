@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +25,15 @@ from robocov.mapmodels import (
 )
 from robocov.maprules import check_rules
 from robocov.starts import DiscStart, PointsStart, StartSpec, UniformStart
-from robocov.strictjson import one_line, parse, read_bytes, require_json
+from robocov.strictjson import located, one_line, parse, read_bytes, require_json
 
 __all__ = [
     "bundled_maps",
+    "dump_document",
     "dump_map",
     "from_json",
     "load_map",
+    "map_file",
     "map_schema",
     "parse_map",
     "save_map",
@@ -37,7 +41,19 @@ __all__ = [
 ]
 
 _LINE = 100
-"""Objects that fit in so many characters stand on one line of a dumped map."""
+"""Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
+
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+_DIGITS = 9
+"""Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
+
+_NOISE = 16
+"""What a few sums and a rotation miss a decimal by at most, in units of the last place (of 1 m at least)."""
+
+
+_TINY = 1e-100
+"""Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
 
 
 def load_map(source: str | Path) -> Environment:
@@ -51,25 +67,34 @@ def load_map(source: str | Path) -> Environment:
     Raises
     ------
     MapError
-        One line: the file, the JSON path, the value and what was wanted; for an unknown
-        name the nearest one.
+        One line: the file with line and column, the JSON path, the value and what was wanted; for an
+        unknown name the nearest one.
 
     Examples
     --------
     >>> load_map("square").area
     100.0
     """
-    if isinstance(source, str) and _is_name(source):
-        known = bundled_maps()
-        if source in known:
-            path = known[source]
-        elif _is_file(source):
-            path = Path(source)
-        else:
-            raise MapError(unknown_name("map", source, known))
-    else:
-        path = Path(source)
+    path = map_file(source)
     return parse_map(read_bytes(path), str(path))
+
+
+def map_file(source: str | Path) -> Path:
+    """Return the file of the map that `load_map` returns for the same source; it need not be there.
+
+    Raises
+    ------
+    MapError
+        For an unknown name.
+    """
+    if not isinstance(source, str) or not _is_name(source):
+        return Path(source)
+    known = bundled_maps()
+    if source in known:
+        return known[source]
+    if _is_file(source):
+        return Path(source)
+    raise MapError(unknown_name("map", source, known))
 
 
 def parse_map(text: str | bytes, where: str) -> Environment:
@@ -80,7 +105,11 @@ def parse_map(text: str | bytes, where: str) -> Environment:
     MapError
         As `load_map`.
     """
-    return _environment(parse(text, where), one_line(where))
+    document = parse(text, where)
+    try:
+        return _environment(document, one_line(where))
+    except MapError as error:
+        raise located(error, text, where) from None
 
 
 def from_json(document: dict[str, Any], where: str = "map") -> Environment:
@@ -114,8 +143,43 @@ def to_json(environment: Environment) -> dict[str, Any]:
 
 
 def dump_map(environment: Environment) -> str:
-    """Return the text of a map file: keys in a fixed order, one list of vertices on a line."""
+    """Return the text of a map file: keys in a fixed order, one list of vertices on a line.
+
+    Numbers are the shortest that stand for the same place. What is the result of a sum, as
+    0.30000000000000004, is written as the decimal that it misses by rounding errors alone, 0.3. What was
+    written by hand stays as it is.
+    """
+    return dump_document(_file_document(environment))
+
+
+def _file_document(environment: Environment) -> dict[str, Any]:
+    """Return what stands in a map file."""
     document = to_json(environment)
+    return document | {key: _short(document[key]) for key in ("boundary", "obstacles", "starts")}
+
+
+def _short(value: Any) -> Any:
+    """Return a JSON value with numbers as `dump_map` writes them."""
+    if isinstance(value, float):
+        decimal = round(value, _DIGITS)
+        noise = _NOISE * math.ulp(max(abs(value), 1.0))
+        return _number(decimal if abs(decimal - value) <= noise else value)
+    if isinstance(value, list):
+        return [_short(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    return value
+
+
+def dump_document(document: dict[str, Any]) -> str:
+    """Return the text of a map file with this document, which may be a draft that no map can be made of.
+
+    How it is broken into lines does not depend on the lengths of its numbers: in the next version of a
+    file, a vertex that has moved changes one line.
+    """
+    document = document | {
+        key: _short(document[key]) for key in ("boundary", "obstacles", "starts") if key in document
+    }
     lines = []
     for key, value in document.items():
         if key in ("obstacles", "starts"):
@@ -137,8 +201,9 @@ def save_map(environment: Environment, path: str | Path) -> None:
         When the file cannot be written; a file that was there before is then untouched.
     """
     target = Path(path)
-    from_json(to_json(environment), str(path))
-    text = dump_map(environment).encode()
+    document = _file_document(environment)
+    from_json(document, str(path))
+    text = dump_document(document).encode()
     try:
         # through a link, the file that it points to is replaced, not the link
         target = target.resolve()
@@ -196,6 +261,8 @@ def _environment(document: object, where: str) -> Environment:
 
 
 def _ring(vertices: list[list[float]]) -> Ring:
+    if any(value and -_TINY < value < _TINY for point in vertices for value in point):
+        vertices = [[value if abs(value) >= _TINY else 0.0 for value in point] for point in vertices]
     return tuple((x, y) for x, y in vertices)
 
 
@@ -203,13 +270,13 @@ def _obstacle(model: ObstacleModel) -> Obstacle:
     if isinstance(model, PolygonModel):
         return PolygonObstacle(_ring(model.vertices), tuple(_ring(hole) for hole in model.holes), model.name)
     if isinstance(model, CircleModel):
-        return CircleObstacle((model.center[0], model.center[1]), model.radius, model.name)
+        return CircleObstacle(_ring([model.center])[0], model.radius, model.name)
     return WallObstacle(_ring(model.points), model.width, model.name)
 
 
 def _start(model: StartModel) -> StartSpec:
     if isinstance(model, DiscModel):
-        return DiscStart((model.center[0], model.center[1]), model.radius)
+        return DiscStart(_ring([model.center])[0], model.radius)
     if isinstance(model, PointsModel):
         return PointsStart(_ring(model.positions))
     return UniformStart()
@@ -225,7 +292,8 @@ def _plain(value: Any) -> Any:
 
 
 def _number(value: float) -> int | float:
-    return int(value) if float(value).is_integer() else float(value)
+    # beyond that, floats are whole without being meant so, and JSON gets long
+    return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
 
 
 def _points(points: Ring) -> list[list[int | float]]:
@@ -268,7 +336,7 @@ def _is_ring(value: object) -> bool:
 def _text(value: object, indent: str, used: int) -> str:
     """Return `value` on one line where it fits or is a list of points, else one item on a line."""
     line = _compact(value)
-    if used + len(line) <= _LINE or not isinstance(value, (dict, list)):
+    if used + len(_NUMBER.sub("00", line)) <= _LINE or not isinstance(value, (dict, list)):
         return line
     if isinstance(value, list) and all(isinstance(item, list) and not _is_ring(item) for item in value):
         return line

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from robocov.errors import MapError, unknown_name
-from robocov.strictjson import place, shown_json
+from robocov.errors import unknown_name
+from robocov.mistakes import MOST_LISTED, Mistake, place, refusal
+from robocov.strictjson import shown_json
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -34,6 +35,11 @@ VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3)]
 Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_LABEL, pattern=_NAME)]
 
 
+def _kind(name: str) -> Any:
+    """Return the field that says which kind of obstacle or start an object is."""
+    return Field(description="Which kind it is; the other keys follow from it", examples=[name])
+
+
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=False)
 
@@ -41,28 +47,32 @@ class _Model(BaseModel):
 class PolygonModel(_Model, title="polygon"):
     """A solid polygon, with holes where given."""
 
-    kind: Literal["polygon"]
+    kind: Literal["polygon"] = _kind("polygon")
     name: Label | None = Field(None, description="What it is, for people", examples=["desk"])
     vertices: VertexRing = Field(
         description="Corners in order, either way round, the first not repeated",
         examples=[[[1, 1], [2, 1], [2, 3]]],
     )
-    holes: list[VertexRing] = Field([], description="Rings inside that are free, such as courtyards")
+    holes: list[VertexRing] = Field(
+        [],
+        description="Rings inside that are free, such as courtyards",
+        examples=[[[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]],
+    )
 
 
 class CircleModel(_Model, title="circle"):
     """A round pillar."""
 
-    kind: Literal["circle"]
+    kind: Literal["circle"] = _kind("circle")
     name: Label | None = Field(None, description="What it is, for people", examples=["pillar"])
-    center: Vertex = Field(description="Its centre [x, y] in metres")
+    center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
     radius: Size = Field(description="Its radius in metres", examples=[0.5])
 
 
 class WallModel(_Model, title="wall"):
     """A poly-line of some width, with flat ends."""
 
-    kind: Literal["wall"]
+    kind: Literal["wall"] = _kind("wall")
     name: Label | None = Field(None, description="What it is, for people", examples=["west wall"])
     points: list[Vertex] = Field(
         min_length=2, description="The middle line, from end to end", examples=[[[5, 0], [5, 2.4]]]
@@ -73,21 +83,21 @@ class WallModel(_Model, title="wall"):
 class DiscModel(_Model, title="disc start"):
     """The robots start somewhere in a disc."""
 
-    kind: Literal["disc"]
-    center: Vertex = Field(description="The disc's centre [x, y] in metres")
+    kind: Literal["disc"] = _kind("disc")
+    center: Vertex = Field(description="The disc's centre [x, y] in metres", examples=[[1, 1]])
     radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
 
 
 class UniformModel(_Model, title="uniform start"):
     """The robots start anywhere in the free space."""
 
-    kind: Literal["uniform"]
+    kind: Literal["uniform"] = _kind("uniform")
 
 
 class PointsModel(_Model, title="points start"):
     """The robots start at given positions."""
 
-    kind: Literal["points"]
+    kind: Literal["points"] = _kind("points")
     positions: list[Vertex] = Field(
         min_length=1, description="One [x, y] a robot, in metres", examples=[[[1, 1], [1.5, 1]]]
     )
@@ -105,27 +115,31 @@ class MapModel(_Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
 
     schema_: Annotated[str, Field(strict=True)] | None = Field(
-        None, alias="$schema", description="Where this schema is, for editors"
+        None, alias="$schema", description="Where this schema is, for editors", examples=["./map.schema.json"]
     )
-    format: Literal["robocov-map"] = Field(description="Says what this file is")
-    version: Literal[1] = Field(description="Version of the format")
+    format: Literal["robocov-map"] = Field(description="Says what this file is", examples=[FORMAT])
+    version: Literal[1] = Field(description="Version of the format", examples=[VERSION])
     name: Label = Field(description="The map's name, for people", examples=["Two rooms"])
     description: Annotated[str, Field(strict=True, max_length=10_000)] = Field(
-        "", description="A sentence about it"
+        "", description="A sentence about it", examples=["A wall with one door."]
     )
     boundary: VertexRing = Field(
         description="The outer boundary, convex or not, either way round; the robots know its convex hull",
         examples=[[[0, 0], [10, 0], [10, 6], [0, 6]]],
     )
     obstacles: list[ObstacleModel] = Field(
-        [], description="They may overlap, touch, and stick out of the boundary"
+        [],
+        description="They may overlap, touch, and stick out of the boundary",
+        examples=[[{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}]],
     )
     starts: dict[Label, StartModel] = Field(
         {},
         description="Named starts; the first is the default",
         examples=[{"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}],
     )
-    extra: dict[str, Any] = Field({}, description="Free keys of yours; kept untouched")
+    extra: dict[str, Any] = Field(
+        {}, description="Free keys of yours; kept untouched", examples=[{"author": "Ada"}]
+    )
 
 
 def map_schema() -> dict[str, Any]:
@@ -152,31 +166,37 @@ def validate(document: object, where: str) -> MapModel:
     MapError
         One line with the first structural error, and how many more there are.
     """
-    _check_header(document, where)
+    check_header(document, where)
     try:
         return MapModel.model_validate(document)
     except ValidationError as error:
         details = error.errors(include_url=False, include_context=False)
     # a misspelt key is also a missing one: naming the key that is there helps more
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
-    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
-    raise MapError(f"{where}: {_message(details[0], document)}{more}")
+    listed = [_mistake(detail) for detail in details[:MOST_LISTED]]
+    raise refusal(where, listed, len(details) - len(listed))
 
 
-def _check_header(document: object, where: str) -> None:
-    """Reject what is not a map, or is one of another version, before its content is looked at."""
+def check_header(document: object, where: str) -> None:
+    """Refuse what is not a map, or is one of another version, before its content is looked at.
+
+    Raises
+    ------
+    MapError
+    """
     if not isinstance(document, dict):
-        raise MapError(f"{where}: {shown_json(document)}, but a JSON object with a map was wanted")
+        what = f"{shown_json(document)}, but a JSON object with a map was wanted"
+        raise refusal(where, [Mistake.at((), what)])
     found = document.get("format")
     if found != FORMAT:
         state = shown_json(found) if "format" in document else "missing"
-        raise MapError(f'{where}: format: {state}, but "{FORMAT}" was wanted')
+        raise refusal(where, [Mistake.at(("format",), f'{state}, but "{FORMAT}" was wanted')])
     version = document.get("version")
     if type(version) is not int or version != VERSION:
         state = shown_json(version) if "version" in document else "missing"
         newer = type(version) is int and version > VERSION
         advice = "; it needs a newer robocov" if newer else ""
-        raise MapError(f"{where}: version: {state}, but {VERSION} was wanted{advice}")
+        raise refusal(where, [Mistake.at(("version",), f"{state}, but {VERSION} was wanted{advice}")])
 
 
 _CHOICES: dict[str, dict[str, type[_Model]]] = {
@@ -208,36 +228,38 @@ _WANTED: dict[str, tuple[str, ...]] = {
 }
 
 
-def _message(detail: ErrorDetails, document: object) -> str:
+def _mistake(detail: ErrorDetails) -> Mistake:
     """Return one structural error in the project's words: place, value, what was wanted."""
     loc, value = list(detail["loc"]), detail["input"]
     group = _CHOICES.get(str(loc[0]))
     model: type[_Model] = MapModel
     if group is not None and len(loc) > 2:
         if loc[-1] == "[key]":
-            return f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
+            text = f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
+            return Mistake(tuple(loc[:-1]), text, at_key=True)
         # pydantic names the chosen kind as a step of the path
         model = group[str(loc.pop(2))]
     elif group is not None and len(loc) == 2:
-        return _kind_message(place(loc), value, list(group))
+        return _kind_mistake(tuple(loc), value, list(group))
     if detail["type"] == "extra_forbidden":
         *parent, key = loc
         known = [field.alias or name for name, field in model.model_fields.items()]
         at = f"{place(parent)}: " if parent else ""
-        return f"{at}{unknown_name('key', str(key), known)}"
+        return Mistake(tuple(loc), f"{at}{unknown_name('key', str(key), known)}", at_key=True)
     found = "missing" if detail["type"] == "missing" else shown_json(value)
     steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
     wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
-    return f"{place(loc)}: {found}, but {wanted} was wanted"
+    return Mistake.at(tuple(loc), f"{found}, but {wanted} was wanted")
 
 
-def _kind_message(at: str, value: object, kinds: list[str]) -> str:
-    """Return the message for an obstacle or a start whose kind is not known."""
+def _kind_mistake(path: tuple[str | int, ...], value: object, kinds: list[str]) -> Mistake:
+    """Return what is wrong with an obstacle or a start whose kind is not known."""
     wanted = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
-        return f"{at}: {shown_json(value)}, but an object whose kind is {wanted} was wanted"
+        return Mistake.at(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
+    path = (*path, "kind")
     if "kind" not in value:
-        return f"{at}.kind: missing, but {wanted} was wanted"
+        return Mistake.at(path, f"missing, but {wanted} was wanted")
     near = get_close_matches(str(value["kind"]).lower(), kinds, n=1, cutoff=0.5)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    return f"{at}.kind: {shown_json(value['kind'])}, but {wanted} was wanted{hint}"
+    return Mistake.at(path, f"{shown_json(value['kind'])}, but {wanted} was wanted{hint}")

@@ -21,6 +21,8 @@ from robocov.environment import GRID, SAGITTA
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array, BoolArray, IntArray
@@ -103,33 +105,86 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     >>> narrowest_gap(shapely.MultiPolygon([room])).width
     0.8
     """
-    free = _without_cracks(free)
-    if free.is_empty:
+    search = _Search.of(free)
+    if search is None:
         return None
-    walls = _walls(free)
-    # boxes: the index needs no more, and they are made in one call
-    low, high = np.minimum(walls.start, walls.end), np.maximum(walls.start, walls.end)
-    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
-    boundary = free.boundary
-    shapely.prepare(boundary)
-    shapely.prepare(free)
-    low_x, low_y, high_x, high_y = free.bounds
+    low_x, low_y, high_x, high_y = search.free.bounds
     largest = math.hypot(high_x - low_x, high_y - low_y)
-    chunks = (
-        np.array_split(walls.jutting, math.ceil(len(walls.jutting) / _CHUNK)) if len(walls.jutting) else []
-    )
     best: Gap | None = None
     below, reach = _CRACK / 2, largest / 4096
     # most maps have a gap far narrower than the map is wide: look near first
-    while len(walls.jutting) and best is None and below < largest:
-        for corners in chunks:
-            limit = reach if best is None else best.width
-            at = walls.start[corners]
-            corner, edge = tree.query(shapely.box(*(at - limit).T, *(at + limit).T))
-            found = _narrowest(walls, corners[corner], edge, below, limit, boundary, free)
+    while best is None and below < largest:
+        for corners in search.chunks():
+            found = next(search.gaps(corners, below, reach if best is None else best.width), None)
             best = found or best
         below, reach = reach, 2 * reach
     return best
+
+
+def gaps_narrower(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
+    """Return all passages of `free` that are narrower than a width in metres, the narrowest first.
+
+    The first is as wide as `narrowest_gap`. One passage may be found several times, as at all corners of a
+    door.
+
+    Examples
+    --------
+    >>> room = shapely.box(0, 0, 6, 3) - shapely.box(2.9, 1, 3.1, 2.2)
+    >>> {gap.width for gap in gaps_narrower(shapely.MultiPolygon([room]), 1.5)}
+    {0.8, 1.0}
+    """
+    search = _Search.of(free)
+    if search is None:
+        return ()
+    found = {gap for corners in search.chunks() for gap in search.gaps(corners, _CRACK / 2, width)}
+    return tuple(sorted(found, key=lambda gap: (gap.width, gap.between)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Where passages are looked for.
+
+    Attributes
+    ----------
+    free : MultiPolygon
+        Without cracks, prepared.
+    boundary : geometry
+        Of `free`, prepared.
+    walls : _Walls
+    tree : STRtree
+        Boxes of the walls' edges.
+    """
+
+    free: MultiPolygon
+    boundary: BaseGeometry
+    walls: _Walls
+    tree: shapely.STRtree
+
+    @classmethod
+    def of(cls, free: MultiPolygon) -> _Search | None:
+        """Return the search in a free space; None where it is empty."""
+        free = _without_cracks(free)
+        if free.is_empty:
+            return None
+        walls = _walls(free)
+        # boxes: the index needs no more, and they are made in one call
+        low, high = np.minimum(walls.start, walls.end), np.maximum(walls.start, walls.end)
+        tree = shapely.STRtree(shapely.box(*low.T, *high.T))
+        boundary = free.boundary
+        shapely.prepare(boundary)
+        shapely.prepare(free)
+        return cls(free, boundary, walls, tree)
+
+    def chunks(self) -> list[IntArray]:
+        """Return the corners that jut into the free space, some at a time."""
+        jutting = self.walls.jutting
+        return np.array_split(jutting, math.ceil(len(jutting) / _CHUNK)) if len(jutting) else []
+
+    def gaps(self, corners: IntArray, below: float, limit: float) -> Iterator[Gap]:
+        """Yield the passages at some corners, wider than `below` and narrower than `limit`, by width."""
+        at = self.walls.start[corners]
+        corner, edge = self.tree.query(shapely.box(*(at - limit).T, *(at + limit).T))
+        return _gaps(self.walls, corners[corner], edge, below, limit, self.boundary, self.free)
 
 
 def _without_cracks(free: MultiPolygon) -> MultiPolygon:
@@ -174,7 +229,7 @@ def _cross(a: Array, b: Array) -> Array:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _narrowest(
+def _gaps(
     walls: _Walls,
     corner: IntArray,
     edge: IntArray,
@@ -182,8 +237,8 @@ def _narrowest(
     limit: float,
     boundary: BaseGeometry,
     free: MultiPolygon,
-) -> Gap | None:
-    """Return the narrowest passage between the corners and the edges paired with them.
+) -> Iterator[Gap]:
+    """Yield the passages between the corners and the edges paired with them, by width.
 
     Only passages wider than `below` and narrower than `limit` are looked for.
     """
@@ -202,14 +257,12 @@ def _narrowest(
     order = np.argsort(width, kind="stable")
     for some in np.array_split(order, max(1, len(order) // 512)):
         middle = shapely.points((p[some] + q[some]) / 2)
-        clearance = shapely.distance(boundary, middle)
-        empty = clearance >= width[some] / 2 * (1 - 1e-9) - 1e-12
+        # prepared, which `shapely.distance` would not be: it takes thousands of walls to see the difference
+        empty = ~shapely.dwithin(boundary, middle, width[some] / 2 * (1 - 1e-9) - 1e-12)
         empty[empty] = shapely.contains_properly(free, middle[empty])
-        if empty.any():
-            first = some[int(np.argmax(empty))]
-            ends = sorted(_rounded(point) for point in (p[first], q[first]))
-            return Gap(round(float(width[first]), _DIGITS), (ends[0], ends[1]))
-    return None
+        for k in some[empty].tolist():
+            ends = sorted(_rounded(point) for point in (p[k], q[k]))
+            yield Gap(round(float(width[k]), _DIGITS), (ends[0], ends[1]))
 
 
 def _rounded(point: Array) -> tuple[float, float]:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import math
+from codecs import BOM_UTF8
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from robocov.errors import MapError, shown
+from robocov.jsontext import depth_offset, line_and_column, offset_of
+from robocov.mistakes import Mistake, refusal
+from robocov.mistakes import place as place
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
+
+    from robocov.mistakes import Path as Steps
 
 MAX_BYTES = 50_000_000
 """Largest file that is read, in bytes."""
@@ -21,6 +27,8 @@ MAX_DEPTH = 32
 
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
+
+_SPACE = " \t\n\r"
 
 
 class _Object(dict[str, Any]):
@@ -73,32 +81,53 @@ def parse(text: str | bytes, where: str) -> Any:
     Raises
     ------
     MapError
-        When the text is not UTF-8 or not JSON (with line and column), or has a number that is
-        not finite, a key twice in one object, or lists nested deeper than `MAX_DEPTH`
-        (with the JSON path).
+        When the text is not UTF-8 or not JSON, or has a number that is not finite, a key twice in one
+        object, or lists nested deeper than `MAX_DEPTH`; with line and column.
     """
     where = one_line(where)
     if len(text) > MAX_BYTES:
         raise MapError(f"{where}: larger than {MAX_BYTES // 1_000_000} MB, but a smaller file was wanted")
-    if isinstance(text, bytes):
-        try:
-            text = text.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            byte = f"byte 0x{text[error.start]:02x} at offset {error.start}"
-            raise MapError(f"{where}: {byte}: not UTF-8, but JSON in UTF-8 was wanted") from None
+    text = _decoded(text, where)
     if not text.strip():
         raise MapError(f"{where}: empty, but JSON was wanted")
     try:
         value = json.loads(text, object_pairs_hook=_Object.of_pairs, parse_int=_whole_number)
     except json.JSONDecodeError as error:
-        place = f"line {error.lineno}, column {error.colno}"
-        found = shown(text[error.pos : error.pos + 12]) if error.pos < len(text) else "end of file"
-        reason = error.msg[:1].lower() + error.msg[1:]
-        raise MapError(f"{where}: {place}: {found}: not JSON: {reason}") from None
+        at, what = _syntax(text, error)
+        raise refusal(where, [_placed(Mistake((), what), text, at)]) from None
     except RecursionError:
-        raise MapError(f"{where}: {_too_deep('')}") from None
-    require_json(value, where)
+        too_deep = Mistake((), _too_deep(""))
+        raise refusal(where, [_placed(too_deep, text, depth_offset(text, MAX_DEPTH))]) from None
+    try:
+        require_json(value, where)
+    except MapError as error:
+        raise located(error, text, where) from None
     return value
+
+
+def located(error: MapError, text: str | bytes, where: str) -> MapError:
+    """Return the error of a document with the lines and columns of its mistakes in the document's text.
+
+    Parameters
+    ----------
+    error : MapError
+        Comes back as it is when it tells of no place.
+    text : str or bytes
+        What `parse` has read.
+    where : str
+        What messages call the text.
+    """
+    if not error.mistakes:
+        return error
+    try:
+        text = _decoded(text, where)
+        found = [
+            _placed(mistake, text, offset_of(text, mistake.path, at_key=mistake.at_key))
+            for mistake in error.mistakes
+        ]
+    except RecursionError:  # beside the place, something is nested as deep as parsing goes
+        return error
+    return refusal(one_line(where), found, error.unlisted)
 
 
 def require_json(value: object, where: str) -> None:
@@ -109,18 +138,23 @@ def require_json(value: object, where: str) -> None:
     MapError
         On anything else; the message names the JSON path.
     """
+    mistake = _first_mistake(value)
+    if mistake is not None:
+        raise refusal(where, [mistake])
+
+
+def _first_mistake(value: object) -> Mistake | None:
     if not isinstance(value, (dict, list, tuple)):
-        _require_scalar(value, (), where)
-        return
-    stack: list[tuple[Any, tuple[str | int, ...]]] = [(value, ())]
+        return _scalar_mistake(value, ())
+    stack: list[tuple[Any, Steps]] = [(value, ())]
     while stack:
         holder, path = stack.pop()
         if len(path) >= MAX_DEPTH:
-            raise MapError(f"{where}: {_too_deep(place(path[:4]) + '...: ')}")
+            return Mistake(path, _too_deep(place(path[:4]) + "...: "))
         if isinstance(holder, dict):
-            problem = _object_problem(holder, path)
-            if problem is not None:
-                raise MapError(f"{where}: {problem}")
+            mistake = _key_mistake(holder, path)
+            if mistake is not None:
+                return mistake
         inner = []
         for key, item in holder.items() if isinstance(holder, dict) else enumerate(holder):
             # most of a large file is numbers: no call, no path for each
@@ -129,45 +163,26 @@ def require_json(value: object, where: str) -> None:
             if isinstance(item, (dict, list, tuple)):
                 inner.append((item, (*path, key)))
             else:
-                _require_scalar(item, (*path, key), where)
+                mistake = _scalar_mistake(item, (*path, key))
+                if mistake is not None:
+                    return mistake
         stack += reversed(inner)
+    return None
 
 
-def _require_scalar(item: object, path: tuple[str | int, ...], where: str) -> None:
-    at = f"{place(path)}: " if path else ""
-    problem = None
+def _scalar_mistake(item: object, path: Steps) -> Mistake | None:
     if isinstance(item, float):
         if not math.isfinite(item):
-            problem = f"{item}, but a finite number was wanted"
+            return Mistake.at(path, f"{item}, but a finite number was wanted")
     elif isinstance(item, str):
         if not _is_text(item):
-            problem = f"{shown(item)}, but text that UTF-8 can hold was wanted"
+            return Mistake.at(path, f"{shown(item)}, but text that UTF-8 can hold was wanted")
     elif isinstance(item, int):
         if item.bit_length() > 1023:
-            problem = f"{item.bit_length()} bits long, but a smaller number was wanted"
+            return Mistake.at(path, f"{item.bit_length()} bits long, but a smaller number was wanted")
     elif item is not None:
-        problem = f"{type(item).__name__}, but a JSON value was wanted"
-    if problem is not None:
-        raise MapError(f"{where}: {at}{problem}")
-
-
-def place(path: Sequence[str | int]) -> str:
-    """Return `path` as messages show it.
-
-    >>> place(("obstacles", 2, "vertices", 0))
-    'obstacles[2].vertices[0]'
-    >>> place(("starts", "the lobby", "radius"))
-    'starts["the lobby"].radius'
-    """
-    text = ""
-    for step in path:
-        if isinstance(step, int):
-            text += f"[{step}]"
-        elif step.isidentifier() or step.replace("-", "_").replace("$", "_").isidentifier():
-            text += f".{step}" if text else step
-        else:
-            text += f"[{json.dumps(step, ensure_ascii=True)}]"
-    return text
+        return Mistake.at(path, f"{type(item).__name__}, but a JSON value was wanted")
+    return None
 
 
 def shown_json(value: object, limit: int = 60) -> str:
@@ -185,18 +200,59 @@ def one_line(text: object) -> str:
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in str(text))
 
 
-def _object_problem(item: dict[Any, Any], path: tuple[str | int, ...]) -> str | None:
+def _key_mistake(item: dict[Any, Any], path: Steps) -> Mistake | None:
     """Return what is wrong with the keys of an object, if anything is."""
     for key in item:
         if not isinstance(key, str) or not _is_text(key):
             at = f"{place(path)}: " if path else ""
-            return f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
+            text = f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
+            return Mistake((*path, key), text, at_key=True)
     twice = item.twice if isinstance(item, _Object) else None
-    return None if twice is None else f"{place((*path, twice))}: given twice, but once was wanted"
+    if twice is None:
+        return None
+    return replace(Mistake.at((*path, twice), "given twice, but once was wanted"), at_key=True)
 
 
 def _too_deep(prefix: str) -> str:
     return f"{prefix}nested too deeply, but at most {MAX_DEPTH} levels were wanted"
+
+
+def _decoded(text: str | bytes, where: str) -> str:
+    if isinstance(text, str):
+        return text
+    body = text.removeprefix(BOM_UTF8)
+    try:
+        return body.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = body[: error.start].decode("utf-8")
+        offset = error.start + len(text) - len(body)
+        found = f"byte 0x{body[error.start]:02x} at offset {offset}"
+        what = f"{found}: not UTF-8, but JSON in UTF-8 was wanted"
+        raise refusal(where, [_placed(Mistake((), what), before, len(before))]) from None
+
+
+def _placed(mistake: Mistake, text: str, offset: int) -> Mistake:
+    line, column = line_and_column(text, offset)
+    return replace(mistake, line=line, column=column)
+
+
+def _syntax(text: str, error: json.JSONDecodeError) -> tuple[int, str]:
+    """Return where text is no JSON, and why, in words that are the same in every version of Python."""
+    at = error.pos
+    before = text[:at].rstrip(_SPACE)
+    if text[at : at + 1] in ("}", "]") and before.endswith(","):
+        at = len(before) - 1  # later versions complain about the comma itself
+    rest = text[at : at + 12]
+    found = shown(rest.splitlines()[0] or rest) if rest else "end of file"
+    if text[at : at + 1] == "," and text[at + 1 :].lstrip(_SPACE)[:1] in ("}", "]"):
+        reason = "a comma that nothing follows"
+    elif text[at : at + 2] in ("//", "/*") or text[at : at + 1] == "#":
+        reason = "JSON has no comments"
+    elif text[at : at + 1] == "'":
+        reason = "texts stand in double quotes"
+    else:
+        reason = error.msg[:1].lower() + error.msg[1:]
+    return at, f"{found}: not JSON: {reason}"
 
 
 def _is_text(text: str) -> bool:

@@ -28,3 +28,10 @@ def test_unknown_names_get_the_nearest(name: str, message: str) -> None:
 def test_long_values_are_cut_in_messages() -> None:
     assert errors.shown([1.0] * 1000).endswith("...")
     assert len(errors.shown("x" * 1000)) == 60
+
+
+def test_strange_names_leave_messages_readable() -> None:
+    message = errors.unknown_name("controller", "x" * 1000, ["x" * 2000, "rapf"])
+    assert len(message) < 250
+    assert message.endswith("(known: rapf, " + "x" * 57 + "...)")
+    assert errors.unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")

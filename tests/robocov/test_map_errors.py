@@ -5,6 +5,10 @@ from __future__ import annotations
 import copy
 import json
 import math
+import pickle
+import re
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +22,7 @@ from hypothesis import strategies as st
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
 from robocov.mapmodels import validate
+from robocov.mistakes import MOST_LISTED
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -129,9 +134,14 @@ def test_errors_name_the_place_the_value_and_what_was_wanted(document: dict[str,
     with pytest.raises(MapError) as caught:
         parse_map(json.dumps(document), "folder/m.json")
     message = str(caught.value)
-    assert message.startswith("folder/m.json: ")
+    assert message.startswith(f"folder/m.json:1:{caught.value.column}: ")
     assert wanted in message
     assert "\n" not in message
+    with pytest.raises(MapError) as of_the_document:
+        from_json(document, "folder/m.json")
+    # what was never a text has no lines
+    assert str(of_the_document.value) == message.replace(f":1:{caught.value.column}: ", ": ", 1)
+    assert of_the_document.value.line is None
 
 
 @pytest.mark.parametrize(
@@ -139,19 +149,25 @@ def test_errors_name_the_place_the_value_and_what_was_wanted(document: dict[str,
     [
         (b"", "empty"),
         (b" \n", "empty"),
-        (b"\xff\xfe{", "byte 0xff at offset 0: not UTF-8"),
-        (b'{"format":\n "robocov-map"\n  oops}', "line 3, column 3: 'oops}': not JSON"),
-        (b'{"a": ', "end of file: not JSON"),
-        (b"nul", "line 1, column 1: 'nul': not JSON"),
-        (b'{"a": {"b": 1, "c": 2, "b": 3}}', "a.b: given twice"),
-        (b"[[NaN]]", "[0][0]: nan, but a finite number"),
-        (b"[-Infinity]", "[0]: -inf, but a finite number"),
-        (b"[1e999]", "[0]: inf, but a finite number"),
+        (b"\xff\xfe{", "m.json:1:1: byte 0xff at offset 0: not UTF-8"),
+        (b'\xef\xbb\xbf{\n"\xc3\xa9\xff', "m.json:2:3: byte 0xff at offset 8: not UTF-8"),
+        (b'{"format":\n "robocov-map"\n  oops}', "m.json:3:3: 'oops}': not JSON"),
+        (b'{"a": ', "m.json:1:7: end of file: not JSON"),
+        (b'{"a":\n1 /* one */}', "m.json:2:3: '/* one */}': not JSON: JSON has no comments"),
+        (b"{'a': 1}", "m.json:1:2: \"'a': 1}\": not JSON: texts stand in double quotes"),
+        (b"[1,\n2 ,\n]", "m.json:2:3: ',': not JSON: a comma that nothing follows"),
+        (b'{"a": 1, }', "m.json:1:8: ', }': not JSON: a comma that nothing follows"),
+        (b"nul", "m.json:1:1: 'nul': not JSON"),
+        (b'{"a": {"b": 1, "c": 2,\n "b": 3}}', "m.json:2:2: a.b: given twice"),
+        (b"[[NaN]]", "m.json:1:3: [0][0]: nan, but a finite number"),
+        (b"[-Infinity]", "m.json:1:2: [0]: -inf, but a finite number"),
+        (b"[1e999]", "m.json:1:2: [0]: inf, but a finite number"),
         (b"[" + b"9" * 5000 + b"]", "[0]: inf, but a finite number"),
-        (b"[" * 100_000, "nested too deeply"),
-        (b"[" * 40 + b"]" * 40, "nested too deeply"),
-        (b'["\\ud800"]', "but text that UTF-8 can hold was wanted"),
-        (b"[]", "[], but a JSON object with a map was wanted"),
+        (b"[" * 100_000, "m.json:1:33: nested too deeply"),
+        (b"[" * 40 + b"]" * 40, "m.json:1:33: [0][0][0][0]...: nested too deeply"),
+        (b'[\n"\\ud800"]', "m.json:2:1: [0]: '\\ud800', but text that UTF-8 can hold was wanted"),
+        (b'{"a": {"\\ud800": 1}}', "m.json:1:8: a: key '\\ud800', but text"),
+        (b"[]", "m.json:1:1: [], but a JSON object with a map was wanted"),
     ],
 )
 def test_what_is_no_json_is_said_with_its_place(text: bytes, wanted: str) -> None:
@@ -179,6 +195,61 @@ def test_several_errors_are_counted() -> None:
     document = changed("boundary", 0, 0, "a", document=changed("obstacles", 1, "radius", -1))
     with pytest.raises(MapError, match=r"boundary\[0\]\[0\].*\(and 1 more\)$"):
         from_json(document)
+
+
+def test_every_mistake_has_its_line() -> None:
+    document = changed("boundary", 0, 0, "a", document=changed("obstacles", 1, "radius", -1))
+    lines = json.dumps(document, indent=2).splitlines()
+    with pytest.raises(MapError) as caught:
+        parse_map("\r\n".join(lines), "m.json")
+    first, second = caught.value.mistakes
+    assert (first.path, second.path) == (("boundary", 0, 0), ("obstacles", 1, "radius"))
+    for mistake, value in ((first, '"a"'), (second, "-1")):
+        assert mistake.line is not None and mistake.column is not None
+        assert lines[mistake.line - 1][mistake.column - 1 :].startswith(value)
+    assert str(caught.value) == f"m.json:{first.line}:{first.column}: {first.text} (and 1 more)"
+    assert (caught.value.line, caught.value.column) == (first.line, first.column)
+
+
+@pytest.mark.parametrize("place", [lambda k: [1, 2, k], lambda k: [70 + k, 2]])
+def test_of_very_many_mistakes_some_are_listed_and_all_counted(place: Callable[[int], list[int]]) -> None:
+    """Structural ones and those of rules alike."""
+    starts = {"given": {"kind": "points", "positions": [place(k) for k in range(50)]}}
+    with pytest.raises(MapError, match=r"\(and 49 more\)$") as caught:
+        parse_map(json.dumps(changed("starts", starts)), "m.json")
+    assert len(caught.value.mistakes) == MOST_LISTED
+    assert caught.value.unlisted == 50 - MOST_LISTED
+
+
+def test_lines_are_looked_up_in_large_files_too() -> None:
+    ring = [[math.cos(k / 1e4), math.sin(k / 1e4)] for k in range(60_000)]
+    document = changed("boundary", [*ring, [2, "x"]], document=changed("extra", {"more": ring}))
+    began = time.perf_counter()
+    with pytest.raises(MapError) as caught:
+        parse_map(json.dumps(document, indent=1), "m.json")
+    assert time.perf_counter() - began < 10.0
+    text = json.dumps(document, indent=1).splitlines()
+    assert caught.value.line is not None and '"x"' in text[caught.value.line - 1]
+
+
+def test_what_is_nested_as_deep_as_parsing_goes_leaves_a_mistake_without_a_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def too_deep(*_: object, **__: object) -> int:
+        raise RecursionError
+
+    monkeypatch.setattr("robocov.strictjson.offset_of", too_deep)
+    with pytest.raises(MapError, match=r"^m\.json: a: nan, but a finite number") as caught:
+        parse_map('{"a": NaN}', "m.json")
+    assert caught.value.line is None
+
+
+def test_errors_survive_a_process() -> None:
+    with pytest.raises(MapError) as caught:
+        parse_map(json.dumps(changed("obstacles", 1, "radius", -1)), "m.json")
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert str(again) == str(caught.value)
+    assert again.mistakes == caught.value.mistakes
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,7 +322,7 @@ def loads_or_says_why(load: Any) -> None:
         environment = load()
     except MapError as error:
         message = str(error)
-        assert message.startswith("m.json: ")
+        assert re.match(r"m\.json(:\d+:\d+)?: ", message)
         assert message.isprintable()
         assert any(words in message for words in ("was wanted", "were wanted", "not JSON", "known:")), message
     else:
@@ -304,8 +375,26 @@ def test_the_schema_is_one_and_knows_every_key() -> None:
         assert item["description"]
         assert item["additionalProperties"] is False
         for key, value in item["properties"].items():
-            assert key == "kind" or value["description"], key
+            assert value["description"] and value["examples"], key
     SCHEMA.validate(DOCUMENT)
+
+
+def test_the_examples_of_the_schema_are_good() -> None:
+    schema = map_schema()
+    for item in (schema, *schema["$defs"].values()):
+        for key, value in item["properties"].items():
+            whole = {"$schema": schema["$schema"], "$defs": schema["$defs"], **value}
+            for example in value["examples"]:
+                jsonschema.Draft202012Validator(whole).validate(example)
+            assert not jsonschema.Draft202012Validator(whole).is_valid(object()), key
+    # together they are a map
+    whole = {key: value["examples"][0] for key, value in schema["properties"].items()}
+    assert from_json(whole).obstacles
+
+
+@pytest.mark.parametrize("name", bundled_maps())
+def test_the_schema_knows_every_bundled_map(name: str) -> None:
+    SCHEMA.validate(json.loads(bundled_maps()[name].read_text()))
 
 
 @pytest.mark.parametrize(("document", "wanted"), STRUCTURAL, ids=lambda value: str(value)[-40:])

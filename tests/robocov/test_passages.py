@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Point, Polygon, box
 from shapely.affinity import affine_transform
 from shapely.geometry.base import BaseGeometry
 
-from robocov.passages import narrowest_gap
+from robocov.passages import gaps_narrower, narrowest_gap
 
 
 def free(*parts: BaseGeometry) -> MultiPolygon:
@@ -153,3 +153,36 @@ def test_a_niche_counts_when_deeper_than_wide_wherever_its_ring_begins(first: in
     else:
         assert gap is not None
         assert gap.width == pytest.approx(1.0)
+
+
+# all that are too narrow
+
+
+def test_all_gaps_below_a_width_are_found() -> None:
+    walls = ROOM - box(2, 0, 2.2, 2) - box(2, 2.5, 2.2, 6) - box(7, 0, 7.2, 4) - box(7, 4.9, 7.2, 6)
+    for width, doors in [(0.4, set()), (0.6, {0.5}), (1.0, {0.5, 0.9})]:
+        found = gaps_narrower(free(walls), width)
+        assert {gap.width for gap in found} == doors
+        assert [gap.width for gap in found] == sorted(gap.width for gap in found)
+        for gap in found:
+            x = (gap.between[0][0] + gap.between[1][0]) / 2
+            assert abs(x - (2.1 if gap.width == 0.5 else 7.1)) <= 0.1 + 1e-9
+    assert gaps_narrower(free(ROOM), 100.0) == ()
+    assert gaps_narrower(MultiPolygon(), 1.0) == ()
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 9), st.integers(0, 5), st.integers(1, 3), st.integers(1, 3)), max_size=6
+    )
+)
+def test_the_narrowest_of_all_is_the_narrowest(blocks: list[tuple[int, int, int, int]]) -> None:
+    room = ROOM - shapely.union_all([box(x, y, x + u - 0.35, y + v - 0.2) for x, y, u, v in blocks])
+    space = free(room)
+    gap = narrowest_gap(space)
+    if gap is None:
+        assert gaps_narrower(space, 20.0) == ()
+    else:
+        assert gaps_narrower(space, gap.width + 1e-3)[0].width == gap.width
+        assert gaps_narrower(space, gap.width - 1e-5) == ()

@@ -242,6 +242,7 @@ WRONG = [
     ),
     ('"mine.py:Mine"]', '"yours.py:Mine"]', "controllers[2]: 'yours.py:Mine': "),
     ('"rpf", ', '"rfp", ', "controllers[1]: unknown controller 'rfp': did you mean 'rpf'?"),
+    ("seeds = 4", "seeds = " + "9" * 5000, "not TOML: exceeds the limit"),
     ("[sampling]", "[sampling", "not TOML: expected ']' at the end of a table declaration (at line "),
 ]
 
@@ -277,7 +278,7 @@ def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
 
 def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
     (folder / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "bad"}')
-    with pytest.raises(InputError, match=r"study.toml: maps\[0\]: .*bad.json: boundary: missing, but "):
+    with pytest.raises(InputError, match=r"study.toml: maps\[0\]: .*bad.json:1:1: boundary: missing, but "):
         read_study(written(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
 
 

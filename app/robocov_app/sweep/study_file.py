@@ -140,7 +140,7 @@ def read_study(path: Path | str) -> Study:
         document = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # of TOML, or of a whole number with thousands of digits
         raise InputError(f"{where}: not TOML: {_lowered(one_line(error))}") from None
     except RecursionError:
         raise InputError(f"{where}: nested too deeply") from None

@@ -11,7 +11,10 @@ import shapely
 from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError, shown, unknown_name
 from robocov.generator.blocks import city
+from robocov.generator.caves import cave
+from robocov.generator.mazes import maze
 from robocov.generator.polygons import scattered
+from robocov.generator.request import AREA_TOLERANCE as AREA_TOLERANCE
 from robocov.generator.request import SIDES, Request, checked
 from robocov.generator.rooms import building
 from robocov.maprules import check_rules
@@ -24,9 +27,6 @@ if TYPE_CHECKING:
     from robocov.environment import Obstacle
 
     Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], "list[Obstacle] | None"]
-
-AREA_TOLERANCE = 0.005
-"""Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""
 
 _ATTEMPTS = 40
 """Layouts that are drawn before the parameters count as impossible."""
@@ -63,6 +63,8 @@ class Kind:
     obstacles : int
     area : float
         What is taken where nothing else is asked for.
+    about : bool
+        A map has about as many of them as are asked for, not exactly.
     """
 
     layout: Layout
@@ -70,12 +72,17 @@ class Kind:
     counted: str
     obstacles: int
     area: float
+    about: bool = False
 
 
 GENERATORS: dict[str, Kind] = {
     "polygons": Kind(scattered, "scattered obstacles: convex polygons, L and U shapes", "obstacles", 6, 0.2),
     "blocks": Kind(city, "a town: blocks between streets", "blocks", 12, 0.4),
     "rooms": Kind(building, "a building: rooms with doors, and some furniture", "rooms", 6, 0.12),
+    "mazes": Kind(maze, "a maze: corridors, some dead ends, some ways round", "cells", 36, 0.12, about=True),
+    "caves": Kind(
+        cave, "a cave: chambers and tunnels with smooth walls, and pillars", "chambers", 12, 0.4, about=True
+    ),
 }
 """The kinds of maps by their names."""
 
@@ -105,9 +112,12 @@ def generated_map(
         One of `GENERATORS`. ``polygons``: obstacles that keep `gap` from each other and from the
         boundary, convex, L-shaped or U-shaped (`robocov.generator.polygons.MIX`). ``blocks``: blocks between
         streets, which are at least `gap` wide, also along the boundary. ``rooms``: rooms, each with a way
-        to all others through doors that are at least `gap` wide, and furniture.
+        to all others through doors that are at least `gap` wide, and furniture. ``mazes``: corridors of
+        one width, at least `gap`, between walls on a grid. ``caves``: chambers and tunnels that are at
+        least `gap` wide, in rock that leaves nothing free along the boundary.
     obstacles : int
-        How many obstacles, blocks, or rooms; by default as many as the kind says.
+        How many obstacles, blocks, or rooms; of mazes about how many cells, of caves chambers. By default
+        as many as the kind says.
     area : float
         Blocked area as a part of the map's; by default as the kind says.
     gap : float, m
@@ -179,13 +189,14 @@ def _corner(request: Request, rng: np.random.Generator) -> DiscStart:
 def _environment(seed: int, kind: str, request: Request, layout: list[Obstacle]) -> Environment:
     """Return the map without its starts."""
     width, height = float(request.width), float(request.height)
-    counted = GENERATORS[kind].counted
+    of_kind = GENERATORS[kind]
+    about = "about " if of_kind.about else ""
     return Environment(
         f"{kind} {seed}",
         ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         tuple(layout),
-        description=f"Generated with seed {seed}: {request.obstacles} {counted}, {request.area:.3g} of the "
-        f"area blocked, every passage at least {request.gap:g} m wide.",
+        description=f"Generated with seed {seed}: {about}{request.obstacles} {of_kind.counted}, "
+        f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide.",
         extra={
             "generator": {
                 "kind": kind,

@@ -21,6 +21,9 @@ LEAST_GAP = 0.21
 
 assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + GAP)
 
+AREA_TOLERANCE = 0.005
+"""Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""
+
 MOST_OBSTACLES = 200
 
 SIDES = 1.0, 1000.0

@@ -1,0 +1,223 @@
+"""`robocov generate`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+import tyro
+
+from robocov.environment import Environment
+from robocov.errors import InputError, MapError, OutputError, ParameterError, counted
+from robocov.mapcheck import check_map
+from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
+from robocov_app.options import in_range
+from robocov_app.progress import progress
+
+Job: TypeAlias = tuple[str, Callable[[], Environment]]
+"""The name of a map, and what makes it."""
+
+KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
+
+MOST = 10_000
+"""Maps that are generated in one call at most."""
+
+_SIDE = 10.0
+
+_SETTLED = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
+"""Options that say what maps are like, and how many; a study has settled them."""
+
+
+@dataclass
+class Arguments:
+    """Make random maps, by a seed: the same words give the same map.
+
+    The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
+    free space of each is one piece, no passage of it is narrower than the gap, and it has the starts
+    corner, centre and uniform. Without --out the map is printed.
+
+    With --count the maps of as many seeds, one after the other, go to a folder.
+    With --study the maps go there that robocov paper draws by chance, with its starts.
+
+    Example: robocov generate --kind rooms --seed 3 --obstacles 8 --area 0.2 --gap 0.6 --out map.json
+    """
+
+    kind: KindName = "polygons"
+    """What the map is like."""
+    seed: int = 0
+    """A whole number; with --count that of the first map."""
+    obstacles: int | None = None
+    """How many obstacles, blocks or rooms; of mazes about how many cells, of caves chambers."""
+    area: float | None = None
+    """Blocked area, as a part of the map's; what suits the kind by default."""
+    gap: float = 0.6
+    """Least width of every passage in metres."""
+    side: float = _SIDE
+    """Side of a square map in metres."""
+    width: float | None = None
+    """Width of a map that is no square, in metres; with --height."""
+    height: float | None = None
+    """Height of a map that is no square, in metres; with --width."""
+    count: int | None = None
+    """How many maps to put in a folder."""
+    study: Literal["full", "quick"] | None = None
+    """The maps of robocov paper, or of robocov paper --quick, in place of all the options above."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")] = None
+    """The file to write; with --count and --study the folder."""
+    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Draw the maps on one sheet, a PNG, SVG or PDF."""
+    theme: Literal["light", "dark"] = "light"
+    """Colours of the sheet."""
+    overwrite: bool = False
+    """Replace earlier maps of the same names."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Generate, save, draw and tell."""
+    _check(options)
+    made: list[Environment] = []
+    rows: list[dict[str, Any]] = []
+    if options.count is None and options.study is None:
+        made.append(_generated(options, options.seed))
+        if options.out is None:
+            print(dump_map(made[0]), end="")
+        else:
+            save_map(made[0], options.out)
+            rows.append(_row(options.out, made[0]))
+    else:
+        assert options.out is not None
+        jobs = _of_seeds(options) if options.study is None else _of_study(options.study)
+        with progress("generating", len(jobs), quiet=options.json) as update:
+            for number, (name, make) in enumerate(jobs):
+                path = options.out / f"{name}.json"
+                _check_ours(path)
+                made.append(make())
+                save_map(made[-1], path)
+                rows.append(_row(path, made[-1]))
+                update(number + 1)
+    if options.plot is not None:
+        from robocov_app.map_sheet import plot_maps
+        from robocov_app.plots import save_figure
+
+        save_figure(plot_maps(made, options.theme), options.plot)
+    if options.out is not None:
+        _tell(options, rows)
+
+
+def _check(options: Arguments) -> None:
+    """Complain about options before anything is made."""
+    if options.study is not None:
+        for field in fields(Arguments):
+            value = getattr(options, field.name)
+            if field.name in _SETTLED and value != field.default:
+                raise InputError(f"--{field.name}: {value}, but --study says what its maps are like")
+    if options.count is not None:
+        in_range("--count", options.count, 1, MOST)
+    if (options.width is None) != (options.height is None):
+        given, missing = ("width", "height") if options.height is None else ("height", "width")
+        raise InputError(f"--{given}: {getattr(options, given):g}, but --{missing} was wanted with it")
+    if options.side != _SIDE and options.width is not None:
+        raise InputError(f"--side: {options.side:g}, but --width and --height say how large the map is")
+    if options.plot is not None:
+        from robocov_app.plots import check_figure_path
+
+        check_figure_path(options.plot)
+    _check_out(options.out, folder=bool(options.count or options.study), overwrite=options.overwrite)
+
+
+def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
+    """Make the folder for the maps, or make sure that no file is lost."""
+    if folder:
+        if out is None:
+            raise InputError("--out: a folder for the maps was wanted with --count and --study")
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            used = any(out.iterdir())
+        except OSError as error:
+            raise OutputError(f"{out}: cannot be used for maps: {error.strerror or error}") from error
+        if used and not overwrite:
+            raise InputError(f"{out}: the folder is not empty; another --out, or --overwrite, was wanted")
+    elif out is not None:
+        if out.is_dir() or not out.name:
+            raise InputError(
+                f"--out: {str(out)!r}, but the name of a file was wanted (--count makes a folder)"
+            )
+        if out.exists() and not overwrite:
+            raise InputError(f"{out}: exists already; another --out, or --overwrite, was wanted")
+
+
+def _check_ours(path: Path) -> None:
+    """Make sure that no file but a map is replaced in a folder."""
+    if path.exists():
+        try:
+            load_map(path)
+        except MapError:
+            raise InputError(
+                f"{path}: is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
+            ) from None
+
+
+def _generated(options: Arguments, seed: int) -> Environment:
+    """Return the map of a seed; what cannot be made is told with the option that is in the way."""
+    from robocov.generator import generated_map
+
+    try:
+        return generated_map(
+            seed,
+            kind=options.kind,
+            obstacles=options.obstacles,
+            area=options.area,
+            gap=options.gap,
+            side=options.side,
+            width=options.width,
+            height=options.height,
+        )
+    except ParameterError as error:
+        # its messages begin with the name of the parameter
+        of_seed = "" if options.count is None else f" (seed {seed})"
+        raise ParameterError(f"--{error}{of_seed}") from None
+
+
+def _of_seeds(options: Arguments) -> list[Job]:
+    """Return what makes the maps of as many seeds as were asked for."""
+    assert options.count is not None
+    seeds = range(options.seed, options.seed + options.count)
+    digits = len(str(seeds[-1]))
+    return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
+
+
+def _of_study(name: str) -> list[Job]:
+    """Return what makes the maps that a study of the paper draws by chance."""
+    from robocov_app.paper.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
+
+    plan = FULL if name == "full" else QUICK
+    maps = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan))
+    bundled = bundled_maps()
+    return [(each.name, partial(_same, each.environment)) for each in maps if each.name not in bundled]
+
+
+def _same(environment: Environment) -> Environment:
+    return environment
+
+
+def _row(path: Path, environment: Environment) -> dict[str, Any]:
+    return {"file": str(path), **check_map(environment).to_dict()}
+
+
+def _tell(options: Arguments, rows: list[dict[str, Any]]) -> None:
+    if options.json:
+        print(json.dumps({"out": str(options.out), "maps": rows}, indent=1))
+        return
+    for row in rows:
+        gap = row["narrowest_gap_m"]
+        narrowest = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
+        print(
+            f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free, {narrowest}, "
+            f"{counted(row['obstacles'], 'obstacle')}, {row['vertices']} vertices"
+        )

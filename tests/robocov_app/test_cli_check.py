@@ -1,0 +1,197 @@
+"""`robocov check`: every mistake with its line, and maps that are checked at each save."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from called import COMMAND
+
+from robocov.mapfile import bundled_maps
+from robocov_app.cli import main
+from robocov_app.commands import check
+
+GOOD = """{
+  "format": "robocov-map", "version": 1,
+  "name": "hall",
+  "boundary": [[0, 0], [10, 0], [10, 6], [0, 6]],
+  "obstacles": [
+    {"kind": "circle", "center": [5, 3], "radius": 1},
+    {"kind": "circle", "center": [2, 2], "radius": 0.5}
+  ]
+}
+"""
+BAD = GOOD.replace('"radius": 1}', '"radius": -1}').replace('[2, 2], "radius"', '[2], "raduis"')
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.json"
+    path.write_text(GOOD)
+    return path
+
+
+def test_each_mistake_gets_a_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file.write_text(BAD)
+    assert main(["check", str(file), "rooms"]) == 2
+    said = capsys.readouterr()
+    lines = said.err.splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith(f"robocov: error: {file}:6:52: obstacles[0].radius: -1, but a number")
+    assert lines[1].startswith(f"robocov: error: {file}:7:5: obstacles[1].radius: missing, but a number")
+    assert lines[2].startswith(f"robocov: error: {file}:7:34: obstacles[1].center: [2], but a point")
+    assert lines[3].startswith(f"robocov: error: {file}:7:39: obstacles[1]: unknown key 'raduis': did you")
+    assert said.out.startswith("rooms: valid\n")
+
+
+def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file.write_text(BAD)
+    assert main(["check", str(file), str(file.parent / "none.json"), "--json"]) == 2
+    row, none = json.loads(capsys.readouterr().out)["maps"]
+    assert (row["line"], row["column"]) == (7, 39)
+    assert (
+        row["error"].startswith(f"{file}:7:39: obstacles[1]: unknown key") and "(and 3 more)" in row["error"]
+    )
+    second = row["mistakes"][1]
+    assert {key: second[key] for key in ("path", "line", "column")} == {
+        "path": "obstacles[0].radius",
+        "line": 6,
+        "column": 52,
+    }
+    assert second["text"].startswith("obstacles[0].radius: -1, but a number")
+    assert row["mistakes_not_listed"] == 0
+    assert none["line"] is None and none["mistakes"] == []
+    assert none["error"] == f"{file.parent / 'none.json'}: no such file"
+
+
+def test_what_is_too_much_to_be_listed_is_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
+    assert main(["check", str(file)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 21
+    assert lines[-1] == f"robocov: error: {file}: and 10 more mistakes"
+
+
+def saves(*steps: Any) -> Any:
+    """Return what stands for the watched changes: the files, after each step was taken."""
+
+    def changes(paths: list[Path]) -> Iterator[tuple[Path, ...]]:
+        yield tuple(paths)
+        for step in steps:
+            step()
+            yield (paths[0],)
+
+    return changes
+
+
+def test_differences_are_to_the_last_valid_state(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps = [
+        lambda: file.write_text(GOOD.replace("[5, 3]", "[5, 4.9]")),
+        lambda: file.write_text(BAD),
+        lambda: file.write_text(GOOD.replace("0.5}", "0.7}")),
+    ]
+    monkeypatch.setattr(check, "changes", saves(*steps))
+    assert main(["check", "--watch", str(file), "square"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    blocks = said.out.split(": valid")
+    assert len(blocks) == 5
+    assert "was" not in blocks[1] and "  area " in blocks[2]
+    assert "narrowest gap  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
+    assert "warning        the gap between" in blocks[3] and "does not pass (new)" in blocks[3]
+    assert f"{file}: invalid\n{file}:6:52: obstacles[0].radius: -1" in blocks[3]
+    assert ", was 0.100 m, between" in blocks[4] and "no longer      the gap between" in blocks[4]
+    assert "free area      55.3" in blocks[4]
+
+
+def test_for_programs_each_check_is_an_object_on_a_line(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(check, "changes", saves(lambda: file.write_text(BAD)))
+    assert main(["check", "--watch", str(file), "square", "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [(row["map"], row["valid"]) for row in rows] == [
+        (str(file), True),
+        ("square", True),
+        (str(file), False),
+    ]
+    assert rows[2]["line"] == 7
+
+
+def test_a_bundled_map_is_watched_at_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    watched: list[Path] = []
+    monkeypatch.setattr(check, "changes", lambda paths: watched.extend(paths) or iter(()))
+    assert main(["check", "--watch", "rooms", "no such", "there/none.json"]) == 0
+    assert watched == [bundled_maps()["rooms"], Path("no such"), Path("there/none.json")]
+
+
+def read_until(stream: int, wanted: bytes, seconds: float = 30.0) -> bytes:
+    found, deadline = b"", time.monotonic() + seconds
+    while wanted not in found:
+        left = deadline - time.monotonic()
+        assert left > 0, found
+        if select.select([stream], [], [], left)[0]:
+            found += os.read(stream, 65536)
+    return found
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("terminal", [False, True])
+def test_watching_from_outside(file: Path, terminal: bool) -> None:
+    ours, theirs = pty.openpty() if terminal else os.pipe()
+    process = subprocess.Popen(
+        [*COMMAND, "check", "--watch", str(file)], stdout=theirs, stderr=subprocess.PIPE, text=True
+    )
+    os.close(theirs)
+    try:
+        first = read_until(ours, b"Ctrl-C ends" if terminal else b"narrowest gap")
+        assert (b"\x1b[2J" in first) == terminal
+        began = time.monotonic()
+        fresh = file.with_suffix(".new")
+        fresh.write_text(BAD)
+        fresh.replace(file)
+        said = read_until(ours, b"missing, but")
+        assert time.monotonic() - began < 10.0
+        assert b"mine.json:6:52: obstacles[0].radius: -1" in said
+        process.send_signal(signal.SIGINT)
+        _, complaints = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        os.close(ours)
+    assert process.returncode == 130
+    assert complaints == "robocov: stopped\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_watching_costs_next_to_nothing(file: Path) -> None:
+    with subprocess.Popen(
+        [*COMMAND, "check", "--watch", str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        read_until(process.stdout.fileno(), b"narrowest gap")
+        before = _seconds_of(process.pid)
+        time.sleep(2.0)
+        used = _seconds_of(process.pid) - before
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert used < 0.2
+
+
+def _seconds_of(pid: int) -> float:
+    """Return the seconds of processors that a process has used so far."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        pytest.skip("needs /proc")
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,176 @@
+"""`robocov generate`: files, folders, the maps of the paper's study, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from called import COMMAND, answer, complaint
+
+from robocov.generator import GENERATORS, generated_map
+from robocov.mapfile import bundled_maps, dump_map, load_map
+from robocov_app.cli import main
+from robocov_app.commands.generate import KindName
+from robocov_app.paper.plan import QUICK, claim_maps, convex_maps, tuning_maps
+
+
+def test_every_kind_can_be_asked_for() -> None:
+    assert KindName.__args__ == tuple(GENERATORS)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", GENERATORS)
+def test_a_map_is_printed_or_saved(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    expected = generated_map(5, kind=kind)
+    assert main(["generate", "--kind", kind, "--seed", "5"]) == 0
+    said = capsys.readouterr()
+    assert (said.out, said.err) == (dump_map(expected), "")
+    json.loads(said.out)
+    out = tmp_path / "map.json"
+    assert main(["generate", "--kind", kind, "--seed", "5", "-o", str(out)]) == 0
+    assert load_map(out) == expected
+    assert capsys.readouterr().out.startswith(f"{out}: ")
+
+
+def test_every_option_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "map.json"
+    words = "--kind rooms --seed 3 --obstacles 8 --area 0.15 --gap 0.7 --width 12 --height 9"
+    row = answer(capsys, "generate", *words.split(), "--out", str(out))
+    expected = generated_map(3, kind="rooms", obstacles=8, area=0.15, gap=0.7, width=12, height=9)
+    assert load_map(out) == expected
+    assert row["out"] == str(out)
+    (told,) = row["maps"]
+    assert told["file"] == str(out) and told["area_m2"] == 108.0
+    assert told["narrowest_gap_m"] >= 0.7 and told["warnings"] == []
+    assert main(["generate", "--side", "8", "--out", str(out), "--overwrite"]) == 0
+    assert load_map(out) == generated_map(0, side=8.0)
+
+
+def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, sheet = tmp_path / "new" / "maps", tmp_path / "sheet.png"
+    words = ["generate", "--kind", "mazes", "--count", "4", "--seed", "8", "--out", str(folder)]
+    assert main([*words, "--plot", str(sheet), "--theme", "dark"]) == 0
+    said = capsys.readouterr()
+    assert said.err.startswith("generating: 4 of 4 in ")
+    assert len(said.out.splitlines()) == 4
+    names = ["mazes-08.json", "mazes-09.json", "mazes-10.json", "mazes-11.json"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    for seed, name in enumerate(names, start=8):
+        assert load_map(folder / name) == generated_map(seed, kind="mazes")
+    assert sheet.read_bytes().startswith(b"\x89PNG")
+    assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; another --out, or")
+
+
+def test_overwriting_replaces_maps_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["generate", "--count", "2", "--out", str(tmp_path), "--overwrite"]
+    other, mine = tmp_path / "other.json", tmp_path / "polygons-1.json"
+    other.write_text("mine")
+    assert main([*words, "--gap", "0.5"]) == 0
+    assert main(words) == 0
+    assert load_map(tmp_path / "polygons-1.json") == generated_map(1)
+    capsys.readouterr()
+    mine.write_text("{}")
+    assert main(words) == 2
+    assert f"{mine}: is no map of robocov, so --overwrite leaves it alone" in capsys.readouterr().err
+    assert (other.read_text(), mine.read_text()) == ("mine", "{}")
+
+
+def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
+    maps = {
+        each.name: each.environment for plan in (claim_maps, tuning_maps, convex_maps) for each in plan(QUICK)
+    }
+    drawn = {name: environment for name, environment in maps.items() if name not in bundled_maps()}
+    assert len(drawn) == 3 + 5 + 3
+    assert [Path(row["file"]).stem for row in rows] == list(drawn)
+    for name, environment in drawn.items():
+        assert load_map(tmp_path / f"{name}.json") == environment
+    # its words make the same map, but for the starts
+    extra = drawn["generated-2"].extra["generator"]
+    words = [f"--{name}={extra[name]}" for name in ("kind", "seed", "obstacles", "area")]
+    out = tmp_path / "again.json"
+    answer(
+        capsys, "generate", *words, f"--gap={extra['gap_m']}", f"--side={extra['width_m']}", "-o", str(out)
+    )
+    assert load_map(out).obstacles == drawn["generated-2"].obstacles
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "--kind mases",
+            "--kind: 'mases', but one of 'polygons', 'blocks', 'rooms', 'mazes', 'caves' was wanted",
+        ),
+        ("--seed -1", "--seed: -1, but a whole number of at least 0 was wanted"),
+        ("--seed x", "--seed: 'x', but a whole number was wanted"),
+        ("--obstacles 0", "--obstacles: 0, but a whole number from 1 to 200 was wanted"),
+        ("--area 2", "--area: 2.0, but a number from 0.01 to 0.9 was wanted"),
+        ("--area nan", "--area: nan, but a number from"),
+        ("--area 0.8", "--area: 0.8, but no layout of 6 obstacles was found"),
+        ("--gap 0.1", "--gap: 0.1, but a number from 0.21 to 3.33333 was wanted"),
+        ("--side 0", "--side: 0.0, but a number from 1 to 1000 was wanted"),
+        ("--width 5", "--width: 5, but --height was wanted with it"),
+        ("--height 5", "--height: 5, but --width was wanted with it"),
+        ("--width 5 --height 2000", "--height: 2000.0, but a number from 1 to 1000 was wanted"),
+        ("--side 5 --width 5 --height 5", "--side: 5, but --width and --height say how large the map is"),
+        ("--count 0 --out maps", "--count: 0, but a number from 1 to 10000 was wanted"),
+        ("--count 3", "--out: a folder for the maps was wanted with --count and --study"),
+        ("--study full", "--out: a folder for the maps was wanted with --count and --study"),
+        ("--study full --gap 0.7 --out maps", "--gap: 0.7, but --study says what its maps are like"),
+        ("--study full --count 3 --out maps", "--count: 3, but --study says what its maps are like"),
+        ("--study half", "--study: 'half', but one of 'None', 'full', 'quick' was wanted"),
+        ("--plot sheet.gif", "sheet.gif: suffix '.gif', but .png, .svg or .pdf was wanted"),
+        ("--plot none/sheet.png", "none/sheet.png: cannot be written: there is no folder none"),
+        ("--out .", "--out: '.', but the name of a file was wanted"),
+        ("--out none/map.json", "none/map.json: cannot be written: No such file or directory"),
+    ],
+)
+def test_what_cannot_be_made_is_told_with_its_option(
+    words: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert complaint(capsys, "generate", *words.split()).startswith(message)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--count", "2", "--seed", "4", "--area", "0.8", "--out", str(tmp_path / "maps")]
+    assert main(["generate", *words]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].endswith("another number was wanted (seed 4)")
+
+
+def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "map.json"
+    file.write_text("mine")
+    assert "exists already; another --out, or --overwrite" in complaint(capsys, "generate", "-o", str(file))
+    assert file.read_text() == "mine"
+    assert "cannot be used for maps: " in complaint(capsys, "generate", "--count", "2", "-o", str(file / "x"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_keeps_the_maps_that_are_done(tmp_path: Path) -> None:
+    words = ["generate", "--kind", "caves", "--count", "5000", "--out", str(tmp_path / "maps")]
+    process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while len(list(tmp_path.glob("maps/caves-*.json"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, complaints = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert complaints.splitlines()[-1] == "robocov: stopped"
+    kept = sorted(tmp_path.glob("maps/*"))
+    assert len(kept) >= 2
+    for file in kept:
+        assert load_map(file).name.startswith("caves ")
+    assert not list(tmp_path.glob("maps/.*"))
