@@ -5,6 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from robocov.errors import counted
+
+
+def square_metres(area: float, digits: int = 4) -> str:
+    """Return an area with so many digits, and never as a power of ten.
+
+    >>> square_metres(30083.2), square_metres(0.123456)
+    ('30083 m²', '0.1235 m²')
+    """
+    return f"{area:.0f} m²" if area >= 1000 else f"{area:.{digits}g} m²"
+
 
 @dataclass(frozen=True)
 class ImportReport:
@@ -20,8 +31,17 @@ class ImportReport:
         Vertices in the file, and in the map.
     area_read, area_kept : float, m²
         Free area that the file encloses, and that of the map.
-    repaired, dropped : tuple of str
-        What was changed and what was left out, one line each.
+    repaired, dropped, changed, notes : tuple of str
+        What was put right, what was left out, what was changed on purpose (simplified, grown), and
+        what is worth knowing besides; one line each.
+    size : (width, height), m
+        Of the map's boundary.
+    obstacles : int
+        Obstacles of the map.
+    tolerance : float, m
+        By how much walls were allowed to move.
+    moved_area : float, m²
+        Area that was free and is not, or is and was not, for the simplification.
     """
 
     source: str
@@ -32,14 +52,23 @@ class ImportReport:
     area_kept: float
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    size: tuple[float, float] = (0.0, 0.0)
+    obstacles: int = 0
+    tolerance: float = 0.0
+    moved_area: float = 0.0
 
     def lines(self) -> list[str]:
         """Return the report for people, one fact a line."""
         return [
             f"{self.format}: {self.vertices_read} vertices read, {self.vertices_kept} kept; "
-            f"free area {self.area_read:.4g} m² read, {self.area_kept:.4g} m² kept",
+            f"free area {square_metres(self.area_read)} read, {square_metres(self.area_kept)} kept",
+            f"{self.size[0]:.4g} x {self.size[1]:.4g} m, {counted(self.obstacles, 'obstacle')}",
             *(f"repaired: {line}" for line in self.repaired),
             *(f"dropped: {line}" for line in self.dropped),
+            *(f"changed: {line}" for line in self.changed),
+            *(f"note: {line}" for line in self.notes),
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -51,6 +80,12 @@ class ImportReport:
             "vertices_kept": self.vertices_kept,
             "area_read_m2": self.area_read,
             "area_kept_m2": self.area_kept,
+            "size_m": list(self.size),
+            "obstacles": self.obstacles,
+            "tolerance_m": self.tolerance,
+            "moved_area_m2": self.moved_area,
             "repaired": list(self.repaired),
             "dropped": list(self.dropped),
+            "changed": list(self.changed),
+            "notes": list(self.notes),
         }

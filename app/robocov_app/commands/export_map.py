@@ -1,0 +1,75 @@
+"""`robocov export`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from robocov.errors import InputError
+from robocov.mapfile import load_map
+from robocov.strictjson import one_line
+from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
+
+
+@dataclass
+class Arguments:
+    """Write a map in a foreign format, and say what that format cannot hold.
+
+    The format is that of the suffix. What an option has no meaning for is refused.
+
+      svg        .svg: boundary and obstacles by their ids, at true scale; --scale --digits
+      geojson    .geojson: boundary and obstacles as features; --origin makes degrees; --digits
+      wkt        .wkt: the free space as polygons with holes, as JuPedSim has it; --digits
+      ros        .yaml: a map of ROS map_server, with its picture; --cell --mode --image
+      movingai   .map: a grid of Moving AI's benchmarks; --cell
+      picture    .png: a picture, obstacles black; --cell
+
+    Example: robocov export office -o office.svg
+    """
+
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")]
+    """Path to a map JSON, or the name of a bundled map."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE")]
+    """The file to write."""
+    format: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """The format, where the suffix does not say it."""
+    cell: float | None = None
+    """Side of a cell, or of a pixel, in metres."""
+    mode: Literal["trinary", "scale", "raw"] | None = None
+    """How a ROS map says what is occupied; trinary by default."""
+    image: Literal["pgm", "png"] | None = None
+    """Kind of the picture of a ROS map; pgm by default."""
+    scale: float | None = None
+    """Metres that a millimetre of an SVG stands for; 0.001, true scale, by default."""
+    digits: int | None = None
+    """Decimals of coordinates; by default a micrometre."""
+    origin: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="LON LAT")] = None
+    """Longitude and latitude of [0, 0] m: GeoJSON in degrees. Needs pyproj: robocov[geo]."""
+    overwrite: bool = False
+    """Replace existing files."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> None:
+    """Export and report."""
+    if options.format is not None and options.format not in EXPORTERS:
+        known = ", ".join(EXPORTERS)
+        raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
+    chosen = exporter(options.out, options.format)
+    how = WriteOptions(**{field.name: getattr(options, field.name) for field in fields(WriteOptions)})
+    for file in chosen.files(options.out, how):
+        if file.exists() and Path(options.map).exists() and file.samefile(options.map):
+            raise InputError(f"{file}: the map that is read; another -o was wanted")
+        if file.exists() and not options.overwrite:
+            raise InputError(f"{file}: exists already; another -o, or --overwrite, was wanted")
+    report = export_map(load_map(options.map), options.out, format=options.format, options=how)
+    if options.json:
+        print(json.dumps(report.to_dict()))
+        return
+    for line in report.lines():
+        print(line)

@@ -1,0 +1,233 @@
+"""Pictures as grids of brightness: PNG of every kind, PGM plain and raw, of 1 to 16 bits.
+
+The size in the header is looked at before anything is unpacked.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.errors import MapError, shown
+from robocov.strictjson import one_line
+from robocov_app.importers import limits
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+    from PIL.Image import Image
+
+PNG = b"\x89PNG\r\n\x1a\n"
+"""A PNG file begins so."""
+
+_PIECE = 1 << 20
+"""Bytes that are unpacked at a time."""
+
+_STRIP = 512
+"""Rows that are converted at a time, which bounds the memory."""
+
+_BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
+"""What separates the numbers of a PGM header: a comment runs to the end of its line."""
+
+_DIGITS = re.compile(rb"\d+")
+
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+"""Samples a pixel, by the colour type of a PNG."""
+
+_PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
+"""First column and row, and steps, of the passes of an interlaced PNG."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brightness:
+    """A picture without its colours.
+
+    Attributes
+    ----------
+    level : (rows, columns)
+        Whole numbers from 0, black, to `full`, white, the top row first: of colours the sum of red,
+        green and blue.
+    full : int
+    alpha : (rows, columns) uint8, or None
+        From 0, transparent, to 255, opaque; None where the picture has no such thing.
+    texts : dict of str
+        What a PNG says of itself.
+    """
+
+    level: NDArray[np.uint8] | NDArray[np.uint16]
+    full: int
+    alpha: NDArray[np.uint8] | None = None
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+
+def is_picture(head: bytes) -> bool:
+    """Return whether a file that begins with `head` is a PNG or a PGM."""
+    return head.startswith(PNG) or re.match(rb"P[25](?:[ \t\r\n]|#)", head) is not None
+
+
+def read_picture(path: Path, where: str) -> Brightness:
+    """Return the picture at `path`.
+
+    Parameters
+    ----------
+    path : Path
+    where : str
+        What messages call it.
+
+    Raises
+    ------
+    MapError
+        When there is no such file, it is neither PNG nor PGM, broken, cut off, or has more than
+        `limits.MAX_CELLS` pixels.
+    """
+    data = limits.content(path)
+    if data.startswith(PNG):
+        return _png(data, where)
+    if data[:2] in (b"P2", b"P5"):
+        return _pgm(data, where)
+    raise MapError(f"{where}: begins with {shown(data[:8])}, but a PNG or PGM (P2, P5) was wanted")
+
+
+def _pgm(data: bytes, where: str) -> Brightness:
+    """Return a PGM; see https://netpbm.sourceforge.net/doc/pgm.html."""
+    numbers: list[int] = []
+    at = 2
+    for name in ("width", "height", "largest value"):
+        blank = _BLANK.match(data, at)
+        digits = _DIGITS.match(data, blank.end()) if blank else None
+        if digits is None or len(digits[0]) > 9:
+            found = shown(data[blank.end() if blank else at :][:12])
+            raise MapError(f"{where}: {name}: {found}, but a whole number was wanted")
+        numbers.append(int(digits[0]))
+        at = digits.end()
+    width, height, most = numbers
+    limits.require_cells(width, height, where)
+    if not 1 <= most <= 65535:
+        raise MapError(f"{where}: largest value: {most}, but a number from 1 to 65535 was wanted")
+    count = width * height
+    level: Any
+    if data.startswith(b"P5"):
+        raw = np.dtype(np.uint8 if most < 256 else ">u2")
+        # one blank ends the header, or a line end of two; what comes after the picture is not looked at
+        at += 2 if data[at : at + 2] == b"\r\n" and len(data) - at - 2 >= count * raw.itemsize else 1
+        if len(data) - at < count * raw.itemsize:
+            have = max(0, len(data) - at) // raw.itemsize
+            raise MapError(f"{where}: cut off after {have} of {count} pixels")
+        level = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
+    else:
+        level = _plain(data[at:], count, where)
+    level = level.reshape(height, width)
+    highest = int(level.max())
+    if highest > most:
+        raise MapError(f"{where}: a pixel of {highest}, but at most {most}, the largest value, was wanted")
+    return Brightness(level, most)
+
+
+def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
+    """Return the pixels of a plain PGM, (count,)."""
+    # a digit and a blank each
+    if len(text) < 2 * count - 1:
+        raise MapError(f"{where}: cut off: {len(text)} bytes are too few for {count} pixels")
+    if b"#" in text:
+        text = re.sub(rb"#[^\r\n]*", b" ", text)
+    values = np.empty(count, np.uint16)
+    done = at = 0
+    while done < count and at < len(text):
+        blank = _BLANK.search(text, at + _PIECE)
+        piece = text[at : blank.start() if blank else len(text)].strip()
+        at = blank.end() if blank else len(text)
+        if not piece:
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)
+            try:
+                numbers = np.fromstring(piece, dtype=np.int64, sep=" ")[: count - done]
+            except (DeprecationWarning, ValueError, OverflowError):
+                raise MapError(f"{where}: pixels that are not whole numbers, of {count}") from None
+        if numbers.min() < 0 or numbers.max() > 65535:
+            worst = int(numbers.min()) if numbers.min() < 0 else int(numbers.max())
+            raise MapError(f"{where}: a pixel of {worst}, but a number from 0 to 65535 was wanted")
+        values[done : done + len(numbers)] = numbers
+        done += len(numbers)
+    if done < count:
+        raise MapError(f"{where}: cut off after {done} of {count} pixels")
+    return values
+
+
+def _png(data: bytes, where: str) -> Brightness:
+    """Return a PNG; see https://www.w3.org/TR/png/."""
+    if len(data) < 33 or data[12:16] != b"IHDR":
+        raise MapError(f"{where}: cut off in its header, but a whole PNG was wanted")
+    width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    limits.require_cells(width, height, where)
+    _require_whole(data, width, height, where)
+    import io
+
+    import PIL.Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # our own limit is the lower one
+            with PIL.Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+                return _converted(image)
+    except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
+        raise MapError(f"{where}: broken, but a whole PNG was wanted: {one_line(error)[:100]}") from None
+
+
+def _require_whole(data: bytes, width: int, height: int, where: str) -> None:
+    """Check that the pixels of a PNG unpack to just what its header says, before there is room made for them.
+
+    They are unpacked piece by piece, and nothing is kept.
+    """
+    bits = data[24] * _CHANNELS.get(data[25], 0)
+    passes = _PASSES if data[28] else ((0, 0, 1, 1),)
+    wanted = 0
+    for left, top, right, down in passes:
+        columns, rows = -((left - width) // right), -((top - height) // down)
+        wanted += rows * (1 + (columns * bits + 7) // 8) if columns > 0 and rows > 0 else 0
+    unpacker = zlib.decompressobj()
+    found, at = 0, 8
+    try:
+        while at + 8 <= len(data) and found <= wanted and not unpacker.eof:
+            length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+            packed = data[at + 8 : at + 8 + length] if kind == b"IDAT" else b""
+            at += 12 + length
+            while packed and found <= wanted and not unpacker.eof:
+                found += len(unpacker.decompress(packed, _PIECE))
+                packed = unpacker.unconsumed_tail
+    except zlib.error as error:
+        raise MapError(f"{where}: broken, but a whole PNG was wanted: {one_line(error)[:100]}") from None
+    if found != wanted:
+        what = "cut off, or broken" if found < wanted else "more pixels than its header says"
+        raise MapError(f"{where}: {what}, but a whole PNG of {width} x {height} pixels was wanted")
+
+
+def _converted(image: Image) -> Brightness:
+    """Return a picture without its colours; only a strip of it is copied at a time."""
+    image.load()
+    texts = {str(key): value for key, value in image.info.items() if isinstance(value, str)}
+    transparent = "transparency" in image.info
+    if image.mode.startswith("I") and not transparent:
+        return Brightness(np.asarray(image).astype(np.uint16), 65535, None, texts)
+    has_alpha = transparent or image.mode in ("LA", "PA", "RGBA", "La", "RGBa")
+    grey = image.mode in ("1", "L", "LA") and not transparent
+    mode = ("LA" if has_alpha else "L") if grey else ("RGBA" if has_alpha else "RGB")
+    colours = 1 if grey else 3
+    shape = (image.height, image.width)
+    level: Any = np.empty(shape, np.uint8 if grey else np.uint16)
+    alpha = np.empty(shape, np.uint8) if has_alpha else None
+    for top in range(0, image.height, _STRIP):
+        rows = slice(top, min(top + _STRIP, image.height))
+        strip = np.asarray(image.crop((0, rows.start, image.width, rows.stop)).convert(mode))
+        strip = strip.reshape(strip.shape[0], strip.shape[1], -1)
+        level[rows] = strip[:, :, :colours].sum(axis=2, dtype=level.dtype)
+        if alpha is not None:
+            alpha[rows] = strip[:, :, colours]
+    return Brightness(level, 255 * colours, alpha, texts)

@@ -1,0 +1,383 @@
+"""From what is free in a foreign map to an environment: valid, connected, simple, with starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from robocov.environment import Environment, PolygonObstacle
+from robocov.errors import MapError, ParameterError, counted, shown
+from robocov.mapfile import from_json, to_json
+from robocov.mapmodels import SMALLEST
+from robocov.robots import DEFAULT_RADIUS
+from robocov.starts import GAP, DiscStart, StartSpec, UniformStart
+from robocov.strictjson import one_line
+from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
+from robocov_app.importers.corners import sharpened
+from robocov_app.importers.passing import rooms
+from robocov_app.importers.report import ImportReport, square_metres
+from robocov_app.importers.simplifying import simplified
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.environment import Ring
+    from robocov_app.importers.foreign import ForeignMap
+
+DEFAULT_TOLERANCE = 0.02
+"""By how much walls of vector formats may move, in metres."""
+
+_GRID = 1e-4
+"""Coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer."""
+
+_TINY = 0.01
+"""Obstacles smaller than this, in m², are perhaps noise: many of them are worth a word."""
+
+_MANY = 10
+
+_SOON = 50_000
+"""Of maps with more vertices it takes too long to say where robots do not pass."""
+
+
+@dataclass(frozen=True)
+class Shaping:
+    """How a foreign map becomes an environment.
+
+    Attributes
+    ----------
+    simplify : float or None, m
+        Walls may move by so much, and corners by twice as much, where that saves vertices; 0 keeps
+        all. None: one cell of a raster but no more than a robot's diameter, `DEFAULT_TOLERANCE` of the rest.
+    specks : float or None, m²
+        Smaller obstacles, and smaller separate parts of the free space, are dropped; 0 keeps all. None:
+        what is noise in maps of that format, as single cells are in those that robots made.
+    keep : str
+        ``largest``: the largest connected part of the free space; ``all``: every part.
+    hull : bool
+        Whether the boundary is the convex hull of the free space, instead of its outline.
+    margin : float, m
+        So much solid is left around the free space, inside the boundary.
+    radius : float, m
+        Of a robot: what it can pass before, it can pass afterwards.
+    default_start : str
+        Which start comes first: ``room``, a disc at the roomiest place, or ``uniform``.
+
+    Raises
+    ------
+    ParameterError
+        When a value is out of range.
+    """
+
+    simplify: float | None = None
+    specks: float | None = None
+    keep: Literal["largest", "all"] = "largest"
+    hull: bool = False
+    margin: float = 0.0
+    radius: float = DEFAULT_RADIUS
+    default_start: Literal["room", "uniform"] = "room"
+
+    def __post_init__(self) -> None:
+        ranges = {"simplify": (0.0, 10.0, "m"), "specks": (0.0, 1e6, "m²"), "margin": (0.0, 100.0, "m")}
+        ranges["radius"] = (1e-3, 100.0, "m")
+        for name, (low, high, unit) in ranges.items():
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and low <= value <= high):
+                raise ParameterError(
+                    f"{name}: {shown(value)}, but a number from {low:g} to {high:g} ({unit}) was wanted"
+                )
+        for name, choices in (("keep", ("largest", "all")), ("default_start", ("room", "uniform"))):
+            value = getattr(self, name)
+            if value not in choices:
+                raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(choices)} was wanted")
+
+
+@dataclass
+class _Told:
+    """What the report will say."""
+
+    repaired: list[str] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+    changed: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
+    """Return the environment that `foreign` stands for, and what was done to it.
+
+    Parameters
+    ----------
+    foreign : ForeignMap
+    shaping : Shaping
+    where : str
+        What messages call the map: a file's name.
+
+    Raises
+    ------
+    MapError
+        When nothing is free, no place is wide enough for a robot, or the map breaks another rule.
+    """
+    told = _Told(list(foreign.repaired), list(foreign.dropped), [], list(foreign.notes))
+    outer = _valid_boundary(foreign.boundary, told)
+    read = _valid(foreign.free, outer, told, where)
+    least = foreign.specks if shaping.specks is None else shaping.specks
+    parts = _without_specks(_kept(read, shaping.keep, least, told, where), foreign.cell, least, told)
+    _require_room(parts, shaping, where)
+    tolerance = shaping.simplify
+    if tolerance is None:
+        tolerance = _default_tolerance(foreign.cell, shaping.radius, told)
+    if foreign.cut_corners:
+        parts = [sharpened(part, tolerance) for part in parts]
+    simple = simplified(MultiPolygon(parts), tolerance, foreign.cell, shaping.radius)
+    told.changed += simple.changed
+    if outer is not None:
+        straight = simplified(MultiPolygon([outer]), tolerance, foreign.cell, shaping.radius)
+        base: Polygon | None = filled(straight.free)
+    else:
+        base = None
+    digits = _digits(foreign.cell)
+    free = rounded(simple.free, digits)
+    if free.is_empty:
+        raise MapError(f"{where}: {read.area:.3g} m² are free, but more was wanted: is the scale right?")
+    boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
+    if outer is not None:
+        solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
+    environment = Environment(
+        name=one_line(foreign.name)[:100].strip() or "map",
+        boundary=_ring(boundary.exterior, digits),
+        obstacles=_obstacles(solid, digits, told),
+        starts=_starts(free, shaping),
+        description=foreign.description[:10_000],
+    )
+    # through the rules of map files: what is imported can be saved and loaded
+    environment = from_json(to_json(environment), where)
+    _note_unreached(environment, shaping.radius, told)
+    width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
+    report = ImportReport(
+        source=where,
+        format=foreign.format,
+        vertices_read=foreign.vertices_read,
+        vertices_kept=_vertices(environment),
+        area_read=float(read.area),
+        area_kept=environment.free_area,
+        repaired=tuple(told.repaired),
+        dropped=tuple(told.dropped),
+        changed=tuple(told.changed),
+        notes=tuple(told.notes),
+        size=(round(width, digits), round(height, digits)),
+        obstacles=len(environment.obstacles),
+        tolerance=simple.tolerance,
+    )
+    return environment, report
+
+
+def _valid_boundary(outer: Polygon | None, told: _Told) -> Polygon | None:
+    """Return the boundary that the format gives, valid and without holes."""
+    if outer is None:
+        return None
+    if not outer.is_valid:
+        told.repaired.append(f"the boundary met itself: {_reason(outer)}")
+        valid = polygons(shapely.make_valid(outer, method="structure", keep_collapsed=False))
+        return Polygon(valid[0].exterior) if valid else None
+    return Polygon(outer.exterior)
+
+
+def _valid(given: MultiPolygon, outer: Polygon | None, told: _Told, where: str) -> MultiPolygon:
+    """Return the free space within `outer` as disjoint valid polygons, the largest first."""
+    if not np.isfinite(shapely.get_coordinates(given)).all():
+        raise MapError(f"{where}: a coordinate is not finite, but numbers were wanted")
+    free: BaseGeometry = given
+    if not free.is_valid:
+        told.repaired.append(f"outlines met themselves or each other: {_reason(free)}")
+        free = shapely.make_valid(free, method="structure", keep_collapsed=False)
+    if outer is not None and not shapely.covers(outer, free):
+        inside = shapely.intersection(free, outer)
+        if free.area - inside.area > CRUMB:
+            told.dropped.append(
+                f"{square_metres(free.area - inside.area, 3)} of free space outside the boundary"
+            )
+        free = inside
+    parts = polygons(free)
+    if not parts:
+        raise MapError(f"{where}: nothing is free, but some free space was wanted")
+    return MultiPolygon(parts)
+
+
+def _reason(geometry: BaseGeometry) -> str:
+    """Return why `geometry` is not valid, as a message shows it."""
+    what, _, place = shapely.is_valid_reason(geometry).partition("[")
+    x, _, y = place.rstrip("]").partition(" ")
+    return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
+
+
+def _kept(
+    free: MultiPolygon, keep: Literal["largest", "all"], specks: float, told: _Told, where: str
+) -> list[Polygon]:
+    """Return the parts of the free space that stay, the largest first."""
+    parts = list(free.geoms)
+    if keep == "largest":
+        kept = parts[:1]
+    else:
+        least = max(specks, min(CRUMB, parts[0].area))
+        kept = [part for part in parts if part.area >= least]
+    if not kept:
+        raise MapError(
+            f"{where}: no part of the free space is larger than {parts[0].area:.3g} m², "
+            f"but one of at least {specks:g} m² was wanted"
+        )
+    left = parts[len(kept) :]
+    if left:
+        largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
+        told.dropped.append(
+            f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}"
+        )
+    if len(kept) > 1:
+        told.notes.append(f"the free space is of {len(kept)} separate parts: robots cannot pass between them")
+    return kept
+
+
+def _without_specks(parts: list[Polygon], cell: float | None, least: float, told: _Told) -> list[Polygon]:
+    """Return `parts` without the holes that are too small."""
+    crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
+    result: list[Polygon] = []
+    specks: list[Polygon] = []
+    crumbs: list[Polygon] = []
+    tiny = 0
+    for part in parts:
+        holes = np.array([Polygon(hole) for hole in part.interiors], dtype=object)
+        area = shapely.area(holes)
+        specks += holes[(area < least) & (area >= crumb)].tolist()
+        crumbs += holes[area < crumb].tolist()
+        stays = area >= max(crumb, least)
+        tiny += int(np.count_nonzero(stays & (area < _TINY)))
+        if not stays.all():
+            part = Polygon(part.exterior, shapely.get_exterior_ring(holes[stays]).tolist())
+        result.append(part)
+    if specks:
+        what = counted(len(specks), "obstacle")
+        told.dropped.append(f"{what} smaller than {least:.3g} m², {_squared(specks)} (--specks 0 keeps them)")
+    if crumbs:
+        told.dropped.append(f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}, which come of rounding")
+    if tiny >= _MANY and least < _TINY:
+        told.notes.append(f"{tiny} obstacles are smaller than {_TINY:g} m² (--specks {_TINY:g} drops them)")
+    return result
+
+
+def _without_slivers(solid: list[Polygon], before: BaseGeometry, tolerance: float) -> list[Polygon]:
+    """Return `solid` without what lies between a boundary and a free space that ran along it.
+
+    Walls of the two have moved apart there: such a sliver was not solid `before`, and is no thicker than
+    they may move.
+    """
+    if not solid or tolerance == 0.0:
+        return solid
+    parts = np.array(solid, dtype=object)
+    thin = shapely.is_empty(shapely.buffer(parts, -tolerance, quad_segs=2))
+    fresh = np.zeros(len(parts), dtype=bool)
+    fresh[thin] = shapely.area(shapely.intersection(parts[thin], before)) < shapely.area(parts[thin]) / 2
+    return list(parts[~fresh])
+
+
+def _default_tolerance(cell: float | None, radius: float, told: _Told) -> float:
+    """Return by how much walls may move, m: where cells are larger than robots, each one counts."""
+    if cell is None:
+        return DEFAULT_TOLERANCE
+    if cell > 2 * radius:
+        told.notes.append(
+            f"cells are larger than robots: walls move by at most {2 * radius:g} m, not by one "
+            f"(--simplify {cell:g})"
+        )
+    return min(cell, 2 * radius)
+
+
+def _squared(parts: list[Polygon]) -> str:
+    area = sum(part.area for part in parts)
+    return f"{square_metres(area, 3)}{' together' if len(parts) > 1 else ''}"
+
+
+def _digits(cell: float | None) -> int:
+    """Return how many decimals coordinates have."""
+    grid = _GRID if cell is None else min(_GRID, cell / 100)
+    return -math.floor(math.log10(grid) + 1e-9)
+
+
+def _ring(ring: BaseGeometry, digits: int) -> Ring:
+    """Return a closed ring as a map has it: counter-clockwise from its leftmost vertex."""
+    points = np.round(shapely.get_coordinates(ring)[:-1], digits) + 0.0
+    if not shapely.is_ccw(ring):
+        points = points[::-1]
+    first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
+    return tuple((float(x), float(y)) for x, y in np.roll(points, -first, axis=0))
+
+
+def _obstacles(solid: list[Polygon], digits: int, told: _Told) -> tuple[PolygonObstacle, ...]:
+    """Return `solid` as obstacles, the largest first, without what is too small for a map."""
+    sides = shapely.bounds(np.array(solid, dtype=object)).reshape(-1, 4)
+    small = np.minimum(sides[:, 2] - sides[:, 0], sides[:, 3] - sides[:, 1]) < SMALLEST
+    if small.any():
+        told.dropped.append(f"{counted(int(small.sum()), 'obstacle')} thinner than {SMALLEST * 1000:g} mm")
+    kept = [part for part, gone in zip(solid, small, strict=True) if not gone]
+    kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
+    return tuple(
+        PolygonObstacle(_ring(part.exterior, digits), tuple(_ring(hole, digits) for hole in part.interiors))
+        for part in kept
+    )
+
+
+def _vertices(environment: Environment) -> int:
+    return len(environment.boundary) + sum(
+        len(obstacle.vertices) + sum(map(len, obstacle.holes))
+        for obstacle in environment.obstacles
+        if isinstance(obstacle, PolygonObstacle)
+    )
+
+
+def _clearance(shaping: Shaping) -> float:
+    """Return how far from walls a robot starts, m: the rules of maps want room for the usual one."""
+    return max(DEFAULT_RADIUS, shaping.radius) * (1 + GAP)
+
+
+def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
+    """Check that a robot fits somewhere in the free space."""
+    clearance = _clearance(shaping)
+    widest = 0.0
+    for part in parts:
+        if math.sqrt(part.area) > widest:
+            widest = max(widest, shapely.maximum_inscribed_circle(part, tolerance=clearance / 50).length)
+        if widest >= clearance:
+            return
+    raise MapError(
+        f"{where}: no place is wide enough for a robot of radius {clearance / (1 + GAP):g} m "
+        f"(the widest is for one of {widest / (1 + GAP):.3g} m): is the scale right?"
+    )
+
+
+def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
+    """Return the starts: a disc at the roomiest place, and everywhere."""
+    clearance = _clearance(shaping)
+    part = free.geoms[0]
+    # what is finer than this does not move a start by much
+    spoke = shapely.maximum_inscribed_circle(part, tolerance=max(0.01, math.sqrt(part.area) / 500))
+    x, y = spoke.coords[0]
+    # the disc holds centres: one robot's radius stays between it and the walls
+    radius = min(spoke.length - clearance, 2.0)
+    starts: dict[str, StartSpec] = {"uniform": UniformStart()}
+    if radius >= 0.02:
+        room = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+        both: dict[str, StartSpec] = {"room": room, **starts}
+        starts = both if shaping.default_start == "room" else dict(reversed(both.items()))
+    return starts
+
+
+def _note_unreached(environment: Environment, radius: float, told: _Told) -> None:
+    """Say how much of the free space robots do not reach from where most of it is, if that is soon known."""
+    if _vertices(environment) > _SOON:
+        return
+    places = sorted((place.area for place in rooms(environment.free, radius)), reverse=True)[1:]
+    if places:
+        what = f"{counted(len(places), 'place')} of {square_metres(sum(places), 3)}"
+        told.notes.append(f"{what} no robot of radius {radius:g} m reaches from the largest one")

@@ -1,0 +1,416 @@
+"""Small files of every format to start from, all written here, and the words that make them up."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import zlib
+from dataclasses import dataclass, field
+from typing import Any
+
+MAP: dict[str, Any] = {
+    "$schema": "./map.schema.json",
+    "format": "robocov-map",
+    "version": 1,
+    "name": "hall",
+    "description": "One of everything.",
+    "boundary": [[0, 0], [10, 0], [10, 6], [5, 6.5], [0, 6]],
+    "obstacles": [
+        {
+            "kind": "polygon",
+            "name": "desk",
+            "vertices": [[2, 2], [4, 2], [4, 4], [2, 4]],
+            "holes": [[[2.5, 2.5], [3.5, 2.5], [3.5, 3.5]]],
+        },
+        {"kind": "circle", "center": [7, 2], "radius": 0.5},
+        {"kind": "wall", "points": [[5, 0], [5, 2.4], [6, 3]], "width": 0.1},
+    ],
+    "starts": {
+        "west": {"kind": "disc", "center": [1, 1], "radius": 0.8},
+        "all": {"kind": "uniform"},
+        "given": {"kind": "points", "positions": [[1, 1], [1.5, 1.25]]},
+    },
+    "extra": {"author": {"name": "Ada"}},
+}
+
+STUDY = """\
+maps = ["square", "rooms"]
+controllers = ["rapf", "lloyd"]
+robots = [2, 4]
+starts = "*"
+seeds = 3
+duration = 2.0
+
+[gains.rapf]
+k_rep = [0.1, 1.0]
+k_att = {low = 3.0, high = 100.0, scale = "log"}
+
+[sampling]
+method = "sobol"
+samples = 4
+
+[team]
+max_speed = [0.5, 1.0]
+"""
+
+PLAN = "\n".join(
+    [
+        *("@@@@@@@@@@@@", "@..........@", "@..TT..WW..@", "@..TT..WW..@", "@..........@", "@.SS....GG.@"),
+        *("@.SS....GG.@", "@..........@", "@@@@@@@@@@@@"),
+    ]
+)
+
+SVG = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="200mm" height="120mm" viewBox="0 0 20 12">
+  <style>.wall { stroke: #333; stroke-width: 0.2; fill: none }</style>
+  <defs><g id="chair"><circle cx="0" cy="0" r="0.4"/></g></defs>
+  <rect id="boundary" x="0" y="0" width="20" height="12" fill="none" stroke="black"/>
+  <g transform="translate(2 1) rotate(10) scale(1.2, 0.9)">
+    <path id="desk" d="M 3 3 h 2 v 1.5 l -1 0.5 q -1 1 -1 0 z"/>
+    <path class="wall" d="M8,1 C 9 2 9 4 8 5 S 10 8 11 6 A 1 2 30 0 1 13 7"/>
+    <polygon points="5,6 7,6 6.5,8"/>
+    <polyline class="wall" points="9 6 9 9 12 9"/>
+  </g>
+  <ellipse cx="15" cy="4" rx="1" ry="0.6" style="fill:#f00;opacity:0.5"/>
+  <line x1="16" y1="8" x2="19" y2="8" stroke="blue" stroke-width="0.15"/>
+  <use href="#chair" x="17" y="10"/>
+</svg>
+"""
+
+_DXF = [
+    *(0, "SECTION", 2, "HEADER", 9, "$ACADVER", 1, "AC1015", 9, "$INSUNITS", 70, 6, 0, "ENDSEC"),
+    *(0, "SECTION", 2, "BLOCKS", 0, "BLOCK", 8, "0", 2, "CHAIR", 70, 0, 10, 0.0, 20, 0.0),
+    *(0, "CIRCLE", 8, "0", 10, 0.0, 20, 0.0, 40, 0.4, 0, "ENDBLK", 8, "0", 0, "ENDSEC"),
+    *(0, "SECTION", 2, "ENTITIES"),
+    *(0, "LWPOLYLINE", 100, "AcDbEntity", 8, "boundary", 100, "AcDbPolyline", 90, 4, 70, 1),
+    *(10, 0.0, 20, 0.0, 10, 10.0, 20, 0.0, 10, 10.0, 20, 6.0, 10, 0.0, 20, 6.0),
+    *(0, "LINE", 8, "walls", 10, 5.0, 20, 0.0, 11, 5.0, 21, 2.5),
+    *(0, "ARC", 8, "walls", 10, 7.0, 20, 4.0, 40, 1.0, 50, 30.0, 51, 200.0),
+    *(0, "CIRCLE", 8, "pillars", 10, 3.0, 20, 3.0, 40, 0.5),
+    *(0, "INSERT", 8, "chairs", 2, "CHAIR", 10, 8.0, 20, 1.5, 41, 1.0, 42, 1.0, 50, 45.0),
+    *(0, "ENDSEC", 0, "EOF"),
+]
+
+
+def png(rows: list[list[int]], depth: int = 8) -> bytes:
+    """Return a grey picture of one channel as PNG."""
+    width, height = len(rows[0]), len(rows)
+    size = {8: "B", 16: "H"}[depth]
+    raw = b"".join(b"\0" + struct.pack(f">{width}{size}", *row) for row in rows)
+    header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(kind, data) for kind, data in chunks)
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    """Return a chunk of a PNG."""
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def pgm(rows: list[list[int]], *, text: bool = False) -> bytes:
+    """Return a grey picture as PGM."""
+    head = f"{'P2' if text else 'P5'}\n# a comment\n{len(rows[0])} {len(rows)}\n255\n".encode()
+    if text:
+        return head + "\n".join(" ".join(map(str, row)) for row in rows).encode() + b"\n"
+    return head + b"".join(map(bytes, rows))
+
+
+GREY = [
+    [{"@": 0, "T": 0, "W": 205}.get(letter, 254) for letter in row for _ in range(2)]
+    for row in PLAN.split("\n")
+    for _ in range(2)
+]
+
+ROS = (
+    "image: {}\nresolution: 0.25\norigin: [-1.0, -2.0, 0.1]\n"
+    "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """An input: files beside each other, the first of which is read.
+
+    Attributes
+    ----------
+    files : dict of name to bytes
+    """
+
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    @property
+    def main(self) -> str:
+        """The name of the file that is read."""
+        return next(iter(self.files))
+
+    def with_file(self, name: str, content: bytes) -> Case:
+        """Return the case with another content of one file."""
+        return Case({**self.files, name: content})
+
+
+def _one(name: str, *contents: str | bytes) -> list[Case]:
+    return [Case({name: text.encode() if isinstance(text, str) else text}) for text in contents]
+
+
+def _rgba() -> bytes:
+    from PIL import Image
+
+    file = io.BytesIO()
+    picture = Image.new("LA", (12, 9), (255, 255))
+    picture.putpixel((3, 4), (0, 255))
+    picture.putpixel((5, 5), (90, 0))
+    picture.save(file, "PNG")
+    return file.getvalue()
+
+
+def _feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+_SQUARE = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]
+_HOLE = [[2, 2], [2, 4], [4, 4], [4, 2], [2, 2]]
+
+GEOJSON = {
+    "type": "FeatureCollection",
+    "features": [
+        _feature("Polygon", [_SQUARE, _HOLE], name="boundary"),
+        _feature("MultiPolygon", [[[[7, 1], [8, 1], [8, 2], [7, 1]]]], name="desk"),
+        _feature("LineString", [[5, 0], [5, 2.5], [6, 3]], name="wall"),
+        _feature("MultiLineString", [[[1, 5], [2, 5]], [[3, 5], [4, 5.5]]]),
+        _feature("Point", [8, 4], name="pillar"),
+        {"type": "Feature", "properties": None, "geometry": None},
+    ],
+}
+DEGREES = {
+    "type": "Polygon",
+    "coordinates": [[[6.1, 50.7], [6.1004, 50.7], [6.1004, 50.7003], [6.1, 50.7003], [6.1, 50.7]]],
+}
+
+WKT = (
+    "POLYGON ((0 0, 10 0, 10 6, 0 6, 0 0), (2 2, 2 4, 4 4, 4 2, 2 2))",
+    "SRID=25832;GEOMETRYCOLLECTION (POLYGON ((0 0, 10 0, 10 6, 0 6, 0 0)), "
+    "LINESTRING (5 0, 5 2.5), POINT (8 4))",
+    "MULTIPOLYGON Z (((0 0 1, 10 0 1, 10 6 1, 0 0 1)), ((20 0 1, 30 0 1, 30 6 1, 20 0 1)))\n"
+    "MULTIPOINT ((1 1), (2 2))\n",
+)
+
+SEEDS: dict[str, list[Case]] = {
+    "map": _one("map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})),
+    "check": _one("map.json", json.dumps(MAP, indent=1)),
+    "study": _one("study.toml", STUDY, 'maps = "*"\ncontrollers = ["rpf"]\n'),
+    "movingai": _one("plan.map", f"type octile\nheight 9\nwidth 12\nmap\n{PLAN}\n"),
+    "picture": [
+        *_one("plan.png", png(GREY), png([[257 * value for value in row] for row in GREY], 16), _rgba()),
+        *_one("plan.pgm", pgm(GREY), pgm(GREY, text=True)),
+    ],
+    "ros": [
+        Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": pgm(GREY)}),
+        Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": png(GREY)}),
+    ],
+    "houseexpo": _one(
+        "plan.json",
+        json.dumps(
+            {
+                "id": "ours",
+                "room_num": 2,
+                "bbox": {"min": [0, 0], "max": [6, 7]},
+                "verts": [[0, 0], [6, 0], [6, 4], [3, 4], [3, 7], [0, 7], [0, 0]],
+                "room_category": {"Kitchen": [[0, 0, 3, 4]]},
+            }
+        ),
+    ),
+    "rings": _one(
+        "plan.json",
+        json.dumps([_SQUARE, _HOLE]),
+        json.dumps([[_SQUARE, _HOLE]]),
+        json.dumps({"vertices": [0, 0, 10, 0, 10, 6, 0, 6, 2, 2, 2, 4, 4, 4], "holes": [4], "dimensions": 2}),
+    ),
+    "wkt": _one("plan.wkt", *WKT),
+    "geojson": _one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES)),
+    "svg": _one("plan.svg", SVG),
+    "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
+}
+"""The seeds of each target."""
+
+_JSON = [
+    '"',
+    "[",
+    "]",
+    "{",
+    "}",
+    ",",
+    ":",
+    "null",
+    "true",
+    "[]",
+    "{}",
+    '""',
+    "[[]]",
+    "NaN",
+    "Infinity",
+    "\\u0000",
+    "\\ud800",
+]
+
+TOKENS: dict[str, list[str]] = {
+    "map": [*_JSON, '"kind"', '"polygon"', '"wall"', '"circle"', '"disc"', '"points"', '"holes"', '"extra"'],
+    "study": [
+        "[",
+        "]",
+        "{",
+        "}",
+        "=",
+        '"*"',
+        "[[gains.rapf]]",
+        "[team]",
+        "inf",
+        "nan",
+        "seeds",
+        "1979-05-27",
+        "'''",
+        "low",
+    ],
+    "movingai": ["type", "octile", "height", "width", "map", "@", ".", "T", "W", "S", "G", "\r\n", "\t", "?"],
+    "picture": ["P2", "P5", "P6", "#", "\n", "255", "65535", "IHDR", "IDAT", "PLTE", "tRNS", "iCCP", "zTXt"],
+    "ros": [
+        *(
+            "image:",
+            "resolution:",
+            "origin:",
+            "negate:",
+            "mode: raw",
+            "mode: trinary",
+            "free_thresh:",
+            "---\n",
+        ),
+        *(
+            "&a",
+            "*a",
+            "!!python/object/apply:os.system",
+            "[",
+            "]",
+            "{",
+            "}",
+            "../",
+            "/dev/zero",
+            "|",
+            ">",
+            ".inf",
+            "~",
+        ),
+    ],
+    "houseexpo": [*_JSON, '"verts"', '"id"', '"bbox"', '"room_num"'],
+    "rings": [*_JSON, '"vertices"', '"holes"', '"dimensions"', "[0, 0]"],
+    "wkt": [
+        *("POLYGON", "MULTIPOLYGON", "GEOMETRYCOLLECTION", "LINESTRING", "POINT", "EMPTY", " Z ", "ZM", "M"),
+        *(
+            "(",
+            ")",
+            ",",
+            "((",
+            "))",
+            "SRID=4326;",
+            "CURVEPOLYGON",
+            "CIRCULARSTRING",
+            "nan",
+            "inf",
+            "\n",
+            "--",
+        ),
+    ],
+    "geojson": [
+        *_JSON,
+        *(
+            '"type"',
+            '"coordinates"',
+            '"geometry"',
+            '"Polygon"',
+            '"GeometryCollection"',
+            '"geometries"',
+            '"features"',
+        ),
+        *('"Feature"', '"crs"', '"urn:ogc:def:crs:EPSG::4326"', '"MultiPoint"', '"properties"', "180", "-90"),
+    ],
+    "svg": [
+        *(
+            "<g>",
+            "</g>",
+            "<path d='M0 0",
+            "/>",
+            "<rect",
+            "<use href='#chair'/>",
+            "transform='",
+            "matrix(1 0 0 1 0 0)",
+        ),
+        *(
+            "scale(0)",
+            "skewX(90)",
+            "rotate(45 1 1)",
+            "z",
+            "A",
+            "a0 0 0 0 0 0 0",
+            "M",
+            "m",
+            "C",
+            "Q",
+            "T",
+            "viewBox='0 0 0 0'",
+        ),
+        *(
+            "<!DOCTYPE a>",
+            '<!ENTITY a "b">',
+            "&a;",
+            "<![CDATA[",
+            "]]>",
+            "<!--",
+            "-->",
+            "100%",
+            "1e3em",
+            "px",
+            "style='",
+            "#",
+        ),
+        *(
+            'href="#boundary"',
+            'id="chair"',
+            "<symbol",
+            "<clipPath",
+            "<mask",
+            "<svg",
+            "display:none",
+            "url(#a)",
+        ),
+    ],
+    "dxf": [
+        *(
+            "\n0\n",
+            "SECTION",
+            "ENDSEC",
+            "EOF",
+            "LINE",
+            "LWPOLYLINE",
+            "INSERT",
+            "CIRCLE",
+            "ARC",
+            "SPLINE",
+            "HATCH",
+        ),
+        *(
+            "ELLIPSE",
+            "POLYLINE",
+            "VERTEX",
+            "SEQEND",
+            "BLOCK",
+            "ENDBLK",
+            "TABLES",
+            "AC1027",
+            "$ACADVER",
+            "CHAIR",
+            "999",
+        ),
+    ],
+}
+TOKENS["check"] = TOKENS["map"]

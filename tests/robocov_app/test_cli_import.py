@@ -1,0 +1,142 @@
+"""`robocov import` on grids and pictures: what it writes, says and refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import answer, complaint
+from raster_files import PLAN, drawn, pgm, ros_map
+
+from robocov.mapfile import load_map
+from robocov_app.cli import main
+from robocov_app.importers import IMPORTERS, ReadOptions
+
+GRID = "type octile\nheight 4\nwidth 5\nmap\n@@@@@\n@..T@\n@...@\n@@@@@\n"
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
+    assert main(list(words)) == 0
+    out = capsys.readouterr()
+    assert out.err == ""
+    return out.out.splitlines()
+
+
+def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = ros_map(tmp_path, drawn(PLAN))
+    out, picture = tmp_path / "out.json", tmp_path / "seen.png"
+    lines = said(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
+    assert lines == [
+        "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",
+        "3 x 1.5 m, 0 obstacles",
+        "note: 16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, taken as obstacles",
+        "note: cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 0.25)",
+        f"saved in {out} and {picture}",
+    ]
+    assert load_map(out).free_area == pytest.approx(4.25)
+    assert load_map(out).name == "plan"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_answer_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = ros_map(tmp_path, drawn(PLAN))
+    row = answer(
+        capsys, "import", str(path), "-o", str(tmp_path / "a.json"), "--unknown", "cut", "--simplify", "0"
+    )
+    assert (row["out"], row["source"], row["format"]) == (str(tmp_path / "a.json"), str(path), "ros")
+    assert row["size_m"] == [4.5, 3.0]
+    assert row["area_kept_m2"] == pytest.approx(4.25)
+    assert row["tolerance_m"] == 0.0
+    assert row["notes"][0].endswith("30 % unknown, cut away")
+
+
+def test_the_name_of_the_map_is_that_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "maps").mkdir()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "maps" / "grid.map").write_text(GRID)
+    assert said(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
+    assert load_map(Path("grid.json")).free_area == 1.25
+    assert "grid.json: exists already; another -o, or --overwrite" in complaint(
+        capsys, "import", "maps/grid.map"
+    )
+    words = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")
+    assert main(list(words)) == 0
+    assert json.loads(capsys.readouterr().out)["area_kept_m2"] == 6
+
+
+def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "plan.map"
+    path.write_text(GRID)
+    message = complaint(capsys, "import", str(path), "--overwrite", "-o", str(path))
+    assert f"{path}: the file that is read; another -o was wanted" in message
+    picture = tmp_path / "plan.png"
+    picture.write_bytes(b"")
+    words = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(picture))
+    assert "another --preview was wanted" in complaint(capsys, "import", str(picture), *words)
+    assert path.read_text() == GRID
+    assert set(tmp_path.iterdir()) == {path, picture}
+
+
+def test_every_option_of_readers_is_one_of_the_command(tmp_path: Path) -> None:
+    from dataclasses import fields
+
+    from robocov_app.commands.import_map import Arguments
+
+    here = {field.name for field in fields(Arguments)}
+    assert {field.name for field in fields(ReadOptions)} <= here
+
+
+@pytest.mark.parametrize(
+    ("file", "words", "wanted"),
+    [
+        ("plan.yaml", "--water free", "--water: no option of the format ros, whose options are: --anywhere"),
+        ("plan.yaml", "--cell 1", "--cell: no option of the format ros"),
+        ("plan.yaml", "--invert", "--invert: no option of the format ros"),
+        ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
+        ("plan.pgm", "--trees obstacle", "--trees: no option of the format picture"),
+        ("plan.pgm", "", "--cell, the metres a pixel, was wanted (or import plan.yaml beside it)"),
+        ("plan.pgm", "--cell nan", "cell: nan, but a number from 1e-6"),
+        ("plan.pgm", "--cell 1 --threshold 3", "threshold: 3.0, but a number from 0 to 1"),
+        ("plan.pgm", "--cell 0.001", "no place is wide enough for a robot of radius 0.1 m"),
+        ("plan.yaml", "--radius 1", "no place is wide enough for a robot of radius 1 m"),
+        ("plan.yaml", "--simplify -1", "simplify: -1.0, but a number from 0 to 10"),
+        ("plan.yaml", "--keep some", "--keep: 'some', but one of 'largest', 'all'"),
+        ("plan.yaml", "--format bmp", "--format: 'bmp', but one of "),
+        ("plan.yaml", "--format movingai", "line 1: 'image: plan.pgm', but type octile"),
+        ("none.yaml", "", "none.yaml: no such file"),
+        ("plan.yaml", "--preview a.bmp", "a.bmp"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str, wanted: str
+) -> None:
+    ros_map(tmp_path, drawn(PLAN))
+    (tmp_path / "grid.map").write_text(GRID)
+    out = tmp_path / "out.json"
+    assert wanted in complaint(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
+    assert not out.exists()
+
+
+def test_help_names_every_format(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["import", "-h"]) == 0
+    text = capsys.readouterr().out
+    for name in IMPORTERS:
+        assert name in text
+
+
+def test_a_large_map_is_soon_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # 1200 x 1200 cells of halls with pillars: a map of this size must not be a matter of minutes
+    pixels = np.full((1200, 1200), 254, dtype=np.uint8)
+    y, x = np.mgrid[0:1200, 0:1200]
+    pixels[(x % 60 - 30) ** 2 + (y % 60 - 30) ** 2 < 49] = 0
+    pixels[:, ::300] = pixels[::300, :] = 0
+    for door in range(90, 1200, 300):
+        pixels[door : door + 20, ::300] = pixels[::300, door : door + 20] = 254
+    path = ros_map(tmp_path, pgm(pixels), resolution=0.05)
+    row = answer(capsys, "import", str(path), "-o", str(tmp_path / "a.json"))
+    assert row["vertices_kept"] < row["vertices_read"] / 2
+    assert row["area_kept_m2"] == pytest.approx(row["area_read_m2"], rel=0.01)

@@ -1,0 +1,31 @@
+"""Small vector files, written for tests and read by their importers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from robocov_app.importers import IMPORTERS, ForeignMap, ReadOptions
+
+
+def read(folder: Path, kind: str, content: Any, **options: Any) -> ForeignMap:
+    """Write `content` (text, bytes, or what JSON can hold) to a file of that kind, and read it."""
+    importer = IMPORTERS[kind]
+    path = folder / f"plan{importer.suffixes[0]}"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+    assert importer.sniff(path, path.read_bytes())
+    return importer.read(path, ReadOptions(**options))
+
+
+def square(x: float, y: float, width: float, height: float) -> list[list[float]]:
+    """Return a closed ring."""
+    return [[x, y], [x + width, y], [x + width, y + height], [x, y + height], [x, y]]
+
+
+def svg(body: str, head: str = 'width="1000" height="600"') -> str:
+    """Return a document of SVG."""
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>'
