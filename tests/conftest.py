@@ -13,6 +13,7 @@ from robocov.starts import DiscStart, UniformStart
 
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""
+os.environ["ROBOCOV_DRAFTS"] = ""
 
 # what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -86,6 +86,33 @@ TESTED_THROUGH = {
         "test_demo_window",
     ),
     **dict.fromkeys("drawing tool".split(), "test_demo_tools"),
+    **dict.fromkeys("paged screen".split(), "test_demo_window"),
+    **dict.fromkeys(
+        (f"editor_{name}" for name in "actions deeds fields menus settings toolbox typed".split()),
+        "test_editor_desk",
+    ),
+    **dict.fromkeys((f"editor_{name}" for name in "stretching underlay".split()), "test_editor_drawing"),
+    **dict.fromkeys((f"editor_{name}" for name in "drags grips".split()), "test_editor_selecting"),
+    **dict.fromkeys((f"editor_{name}" for name in "drawn_rings picture".split()), "test_editor_sheet"),
+    **dict.fromkeys((f"editor_{name}" for name in "arena handles strips".split()), "test_editor_findings"),
+    **dict.fromkeys(
+        (f"editor_{name}" for name in "dialogs keyboard lists pages panel pasteboard pointer status".split()),
+        "test_editor_window",
+    ),
+    **dict.fromkeys("editor_opening edit".split(), "test_editor_documents"),
+    **dict.fromkeys((f"editor_{name}" for name in "annotations reading".split()), "test_editor_document"),
+    **dict.fromkeys(
+        (f"editor_{name}" for name in "adding affine placing plane".split()),
+        "test_editor_edits",
+    ),
+    **dict.fromkeys((f"editor_{name}" for name in "corners walls".split()), "test_editor_vertices"),
+    **dict.fromkeys(
+        (f"editor_readout_{name}" for name in "messages process".split()),
+        "test_editor_readout_worker",
+    ),
+    "editor_outlines": "test_editor_booleans",
+    "editor_faults": "test_editor_problems",
+    "editor_targets": "test_editor_snapping",
     **dict.fromkeys("kept keep_process".split(), "test_demo_keeping"),
     "own_process": "test_cost_worker",
     **dict.fromkeys("replay saved".split(), "test_cli_replay"),
@@ -98,6 +125,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("dependence_plots result_plots".split(), "test_report_document"),
     "lock": "test_sweep_ledger",
     "sweep": "test_cli_sweep",
+    "generate": "test_cli_generate",
     **dict.fromkeys("asking claims gain_claims outcomes placements verdicts".split(), "test_paper_claims"),
     **dict.fromkeys("contenders plan".split(), "test_paper_plan"),
     **dict.fromkeys("figures claim_plots".split(), "test_paper_figures"),
@@ -107,6 +135,21 @@ TESTED_THROUGH = {
     "reading": "test_paper_reading",
     "paper_tables": "test_paper_studying",
     "paper": "test_paper_command",
+    **dict.fromkeys("foreign bounding importers_report".split(), "test_shaping"),
+    **dict.fromkeys("outline passing".split(), "test_simplifying"),
+    "importers_reading": "test_importing",
+    "raster": "test_ros",
+    "exporters_writing": "test_exporting",
+    "importers_corners": "test_houseexpo",
+    "shapes": "test_enclosing",
+    "json_file": "test_geojson",
+    **dict.fromkeys("text_file wkt_text".split(), "test_wkt"),
+    **dict.fromkeys("svg_drawing svg_tree".split(), "test_svg"),
+    "svg_numbers": "test_svg_path",
+    **dict.fromkeys("dxf_curves dxf_drawing".split(), "test_dxf"),
+    **dict.fromkeys(
+        "coordinates exporters_wkt exporters_geojson exporters_svg".split(), "test_vector_round_trips"
+    ),
 }
 """Modules without a test file of their own, and the one that tests them."""
 

@@ -12,7 +12,7 @@ from robocov.controllers import make_controller
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map, parse_map
 from robocov.simulation import Simulation
-from robocov_app.cli import COMMANDS
+from robocov_app.cli import COMMANDS, main
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -27,7 +27,7 @@ def block(language: str, part: str) -> str:
 def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
     text = block("json", "robocov-map")
     assert parse_map(text, "README").free_area < 60.0
-    with pytest.raises(MapError, match=r"^mine.json: obstacles\[2\].radius: -1, but "):
+    with pytest.raises(MapError, match=r"^mine.json:8:54: obstacles\[2\].radius: -1, but "):
         parse_map(text.replace('"radius": 0.5', '"radius": -1'), "mine.json")
 
 
@@ -73,3 +73,22 @@ def test_pictures_are_there() -> None:
     assert len(names) >= 2
     for name in ("".join(pair) for pair in names):
         assert (Path(__file__).parents[1] / name).is_file()
+
+
+def test_the_maps_that_it_generates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    # a few of many will do
+    text = block("sh", "robocov generate").replace("--count 20", "--count 3").replace("full", "quick")
+    calls = [line.partition("#")[0].split() for line in text.splitlines()]
+    assert [call[:2] for call in calls] == [["robocov", "generate"]] * 3
+    for call in calls:
+        assert main(call[1:]) == 0
+    assert load_map("cave.json").starts
+    assert len(list(Path("mazes").iterdir())) == 3 and Path("mazes.png").stat().st_size > 1000
+    assert Path("paper-maps/generated-1.json").is_file()
+
+
+def test_a_map_may_begin_with_its_schema(tmp_path: Path) -> None:
+    assert '`{"$schema": "./map.schema.json",`' in README
+    text = block("json", "robocov-map").replace("{", '{"$schema": "./map.schema.json",', 1)
+    assert parse_map(text, "README").schema == "./map.schema.json"

@@ -33,13 +33,16 @@ COMMANDS = {
     "replay": ("replay", "a saved run or comparison again: in the window, or as frames and a film"),
     "report": ("report", "one HTML page of runs, comparisons and sweeps, with a replay; no network"),
     "paper": ("paper", "the paper's figures again, and its claims tested over many maps"),
+    "edit": ("edit", "the map editor: draw, check, try; nothing is lost"),
     "check": ("check", "validate maps; area, free area, components, narrowest gap"),
     "maps": ("maps", "list the bundled maps"),
+    "generate": ("generate", "random maps by a seed: scattered obstacles, towns, rooms, mazes, caves"),
     "controllers": ("controllers", "list the controllers and their gains"),
     "cost": ("cost", "the exact coverage cost (22) of given positions"),
     "optimum": ("optimum", "the best positions with the whole map known: a reference for the cost"),
     "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
     "import": ("import_map", "turn a foreign map file into a map JSON"),
+    "export": ("export_map", "write a map in a foreign format: SVG, GeoJSON, WKT, ROS, MovingAI, PNG"),
     "schema": ("schema", "print the JSON Schema of map files"),
 }
 

@@ -79,11 +79,12 @@ def test_check_measures_maps_and_reports_each_bad_one(
     assert main(["check", "square", str(bad), "--json"]) == 2
     rows = json.loads(capsys.readouterr().out)["maps"]
     assert [row["valid"] for row in rows] == [True, False]
-    assert rows[1]["error"].startswith(f"{bad}: boundary")
+    assert rows[1]["error"].startswith(f"{bad}:1:66: boundary")
+    assert (rows[1]["line"], rows[1]["column"]) == (1, 66)
     assert main(["check", "square", str(bad)]) == 2
     said = capsys.readouterr()
     assert "narrowest gap" in said.out
-    assert f"robocov: error: {bad}: boundary" in said.err
+    assert f"robocov: error: {bad}:1:66: boundary" in said.err
 
 
 def test_cost_of_a_robot_in_the_middle_of_a_square(

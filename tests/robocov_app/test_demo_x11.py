@@ -3,151 +3,36 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from called import COMMAND
-from PIL import Image
+from x11_hands import MARKS, Hands, ended, invisible_display, run_window, said
 
 from robocov_app.demo.settings import FOLDER
 
-MISSING = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
-pytestmark = [
-    pytest.mark.xdist_group("x11"),
-    pytest.mark.skipif(sys.platform != "linux", reason="X11"),
-    pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
-]
+pytestmark = MARKS
 
-PATIENCE = 15.0
 SIZE = (1000, 640)
-
-
-def ended(process: subprocess.Popen) -> int:
-    """Wait for the end of a process, and see to it."""
-    try:
-        return process.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        return process.wait()
 
 
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
-    """Start a display that nobody sees, on a number that is free."""
-    read, write = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp", "-noreset"],
-        pass_fds=(write,),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(write)
-    try:
-        with os.fdopen(read) as told:
-            number = told.readline().strip()
-        assert number, "Xvfb did not start"
-        yield f":{number}"
-    finally:
-        server.terminate()
-        ended(server)
-
-
-class Hands:
-    """Presses keys and the mouse in the window of a process."""
-
-    def __init__(self, process: subprocess.Popen, display: str, folder: Path) -> None:
-        self.process, self.folder, self.shots = process, folder, 0
-        self.kept = {**os.environ, "DISPLAY": display}
-        self.window = ""
-
-    def tool(self, *words: object) -> str:
-        done = subprocess.run(
-            ["xdotool", *map(str, words)], env=self.kept, capture_output=True, text=True, check=False
-        )
-        return done.stdout.strip()
-
-    def until(self, there: Callable[[], object], what: str) -> None:
-        began = time.monotonic()
-        while not there():
-            assert self.process.poll() is None, f"it has ended before {what}: {said(self.process)}"
-            assert time.monotonic() - began < PATIENCE, f"no {what}"
-            time.sleep(0.03)
-
-    def find(self) -> None:
-        def found() -> bool:
-            self.window = self.tool("search", "--onlyvisible", "--pid", self.process.pid).split("\n")[0]
-            return bool(self.window)
-
-        self.until(found, "window")
-        # there is no window manager that would do it
-        self.tool("windowfocus", "--sync", self.window)
-        time.sleep(0.3)
-
-    def key(self, *names: str) -> None:
-        self.tool("key", "--delay", "60", *names)
-
-    def move(self, x: float, y: float) -> None:
-        self.tool("mousemove", "--window", self.window, round(x), round(y))
-        time.sleep(0.06)
-
-    def drag(self, *path: tuple[float, float]) -> None:
-        self.move(*path[0])
-        self.tool("mousedown", 1)
-        time.sleep(0.06)
-        for place in path[1:]:
-            self.move(*place)
-        self.tool("mouseup", 1)
-        time.sleep(0.06)
-
-    def shot(self) -> np.ndarray:
-        """Press F12, and return the picture that this saves; the first may come before anything is drawn."""
-        while True:
-            self.shots += 1
-            path = self.folder / f"robocov-{self.shots}.png"
-            self.key("F12")
-            self.until(path.exists, f"picture {path.name}")
-            with Image.open(path) as picture:
-                pixels = np.asarray(picture.convert("RGB")).astype(int)
-            if pixels.any():
-                return pixels
+    with invisible_display() as number:
+        yield number
 
 
 @contextmanager
 def shown(display: str, folder: Path, *words: str) -> Iterator[Hands]:
-    kept = {
-        key: value for key, value in os.environ.items() if key not in ("SDL_VIDEODRIVER", "WAYLAND_DISPLAY")
-    }
-    kept |= {"DISPLAY": display, FOLDER: str(folder / "settings"), "SDL_VIDEODRIVER": "x11"}
     command = [*COMMAND, "demo", "square", "--folder", str(folder), "--size", f"{SIZE[0]}x{SIZE[1]}"]
     options = ["--scale", "1", "--lattice", "16", "--robots", "3", "--paused", *words]
-    process = subprocess.Popen(
-        [*command, *options], env=kept, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        hands = Hands(process, display, folder)
-        hands.find()
+    with run_window(display, folder, [*command, *options], **{FOLDER: str(folder / "settings")}) as hands:
         yield hands
-    finally:
-        if process.poll() is None:
-            process.kill()
-        ended(process)
-        for stream in (process.stdout, process.stderr):
-            if stream is not None:
-                stream.close()
-
-
-def said(process: subprocess.Popen) -> str:
-    assert process.stderr is not None
-    return "\n".join(line for line in process.stderr.read().splitlines() if "XDG_RUNTIME_DIR" not in line)
 
 
 def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, tmp_path: Path) -> None:

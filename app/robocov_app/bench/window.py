@@ -16,8 +16,9 @@ from robocov_app.demo.costs import LATTICE, WorkerCosts
 from robocov_app.demo.desk import Desk
 from robocov_app.demo.opening import display
 from robocov_app.demo.scenario import Law, Limits, Scenario
+from robocov_app.demo.screen import undisturbed
 from robocov_app.demo.session import Session
-from robocov_app.demo.window import FPS, Window, undisturbed
+from robocov_app.demo.window import FPS, Window
 from robocov_app.view.picture import standard_layers
 
 if TYPE_CHECKING:

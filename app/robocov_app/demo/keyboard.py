@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import pygame
 
-from robocov_app.demo.actions import REPEATING, all_actions
+from robocov_app.demo.actions import REPEATING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
-    from robocov_app.demo.desk import Desk
-    from robocov_app.demo.overlays import Palette
-    from robocov_app.demo.panel import Panel
+    from robocov_app.demo.actions import Action
+    from robocov_app.demo.overlays import CommandList
+    from robocov_app.demo.paged import Paged
 
 _ALSO_WHILE_TYPING = (pygame.K_F1, pygame.K_F9, pygame.K_F12)
+
+
+class Commanded(Protocol):
+    """What typed commands go to."""
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Do something; what cannot be done is told, in a sentence."""
+
+    def command(self, text: str) -> None:
+        """Do what was typed."""
 
 
 class Keyboard:
@@ -24,17 +34,26 @@ class Keyboard:
     Parameters
     ----------
     desk, panel, palette
-    titles : dict of name to title
-        Of the layers.
+    actions : iterable of Action
+        Those with keys.
     do : callable
         Does an action by its name.
+    repeating : set of str
+        Names of the actions that are done again and again while a key is held down.
     """
 
     def __init__(
-        self, desk: Desk, panel: Panel, palette: Palette, titles: dict[str, str], do: Callable[[str], None]
+        self,
+        desk: Commanded,
+        panel: Paged,
+        palette: CommandList,
+        actions: Iterable[Action],
+        do: Callable[[str], None],
+        repeating: frozenset[str] = REPEATING,
     ) -> None:
         self._desk, self._panel, self._palette, self._do = desk, panel, palette, do
-        self._keys = {key: action.name for action in all_actions(titles) for key in action.keys}
+        self._keys = {key: action.name for action in actions for key in action.keys}
+        self._repeating = repeating
         self._down: set[int] = set()
         self._opened_by = ""
 
@@ -69,7 +88,7 @@ class Keyboard:
             return
         name = self._keys.get(key_of(event))
         # who holds F12 down a little too long wants one picture
-        if name is None or (event.key in self._down and name not in REPEATING):
+        if name is None or (event.key in self._down and name not in self._repeating):
             return
         self._do(name)
         # its letter is still to come, and not meant for the palette

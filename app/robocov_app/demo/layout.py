@@ -56,6 +56,7 @@ def laid_out(
     *,
     panel: bool = True,
     legend_rows: int = 1,
+    plot: bool = True,
 ) -> Layout:
     """Lay a window out.
 
@@ -71,6 +72,8 @@ def laid_out(
         Whether the panel is shown.
     legend_rows : int
         Of the legend that several panes share.
+    plot : bool
+        Whether there are a plot and a time line.
 
     Examples
     --------
@@ -83,8 +86,8 @@ def laid_out(
     wide = min(round(PANEL * scale), width - 1) if panel else 0
     left = width - wide
     status = round(STATUS * scale)
-    track = round(TRACK * scale)
-    chart = min(round(CHART * scale), height // 3)
+    track = round(TRACK * scale) if plot else 0
+    chart = min(round(CHART * scale), height // 3) if plot else 0
     arena: Box = (0, 0, left, max(height - status - track - chart, 1))
     legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
     around = 68 * scale

@@ -31,7 +31,7 @@ HEADLESS_FPS = 30
 
 
 @contextmanager
-def display(*, headless: bool) -> Iterator[None]:
+def display(*, headless: bool, otherwise: str = NO_DISPLAY) -> Iterator[None]:
     """Start pygame's display, real or not.
 
     Raises
@@ -44,18 +44,18 @@ def display(*, headless: bool) -> Iterator[None]:
     elif sys.platform == "linux" and not any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
     ):
-        raise InputError(NO_DISPLAY)
+        raise InputError(otherwise)
     import pygame
 
     try:
         pygame.display.init()
     except pygame.error:
-        raise InputError(NO_DISPLAY) from None
+        raise InputError(otherwise) from None
     if not headless and pygame.display.get_driver() in ("offscreen", "dummy", "evdev"):
         wanted = os.environ.get("SDL_VIDEODRIVER", "")
         if pygame.display.get_driver() != wanted:
             pygame.display.quit()
-            raise InputError(NO_DISPLAY)
+            raise InputError(otherwise)
     pygame.font.init()
     pygame.key.set_repeat(*KEY_REPEAT)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pygame
@@ -17,6 +17,8 @@ from robocov_app.view.fonts import label, shortened, text_width
 from robocov_app.view.theme import mix
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from robocov_app.demo.actions import Action
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.layout import Layout
@@ -73,7 +75,14 @@ def dim(screen: pygame.Surface, theme: Theme) -> None:
     screen.blit(veil, (0, 0))
 
 
-def draw_message(screen: pygame.Surface, desk: Desk, layout: Layout, theme: Theme) -> None:
+class Saying(Protocol):
+    """Who tells something for a while."""
+
+    message: str
+    trouble: bool
+
+
+def draw_message(screen: pygame.Surface, desk: Saying, layout: Layout, theme: Theme) -> None:
     """Show what was said last, above the plot."""
     if not desk.message:
         return
@@ -97,11 +106,24 @@ def draw_message(screen: pygame.Surface, desk: Desk, layout: Layout, theme: Them
 
 def draw_help(screen: pygame.Surface, layout: Layout, theme: Theme, titles: dict[str, str]) -> None:
     """Show all keys, in columns."""
+    hint = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
+    draw_keys(screen, layout, theme, all_actions(titles), _GROUPS, hint)
+
+
+def draw_keys(
+    screen: pygame.Surface,
+    layout: Layout,
+    theme: Theme,
+    actions: Iterable[Action],
+    groups: Sequence[str],
+    words: str,
+) -> None:
+    """Show the keys of actions, group by group in columns, under a line with a hint."""
     dim(screen, theme)
-    actions = [action for action in all_actions(titles) if action.keys]
+    actions = [action for action in actions if action.keys]
     scale = layout.scale
     blocks: list[tuple[str, Action | None]] = []
-    for group in _GROUPS:
+    for group in groups:
         blocks.append((group, None))
         members = [action for action in actions if action.group == group]
         blocks += [(group, action) for action in members]
@@ -109,7 +131,7 @@ def draw_help(screen: pygame.Surface, layout: Layout, theme: Theme, titles: dict
     row = 16.5 * scale
     columns = 4 if width >= 1150 * scale else 3
     # small windows get smaller letters rather than a page that does not fit
-    rows = -(-(len(blocks) + len(_GROUPS)) // columns) + 1
+    rows = -(-(len(blocks) + len(groups)) // columns) + 1
     row = min(row, (height - 90 * scale) / rows)
     size = max(8, round(row * 0.66))
     box = pygame.Rect(0, 0, round(min(width - 24 * scale, 1240 * scale)), round(rows * row + 66 * scale))
@@ -117,11 +139,7 @@ def draw_help(screen: pygame.Surface, layout: Layout, theme: Theme, titles: dict
     card(screen, box, theme, scale)
     title = label("Keys", round(16 * scale), theme.ink, True)
     screen.blit(title, (box.left + round(20 * scale), box.top + round(12 * scale)))
-    hint = label(
-        "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes",
-        round(11 * scale),
-        theme.faint,
-    )
+    hint = label(words, round(11 * scale), theme.faint)
     screen.blit(hint, hint.get_rect(midright=(box.right - round(20 * scale), box.top + round(22 * scale))))
     wide = (box.width - 40 * scale) / columns
     x, y = box.left + 20 * scale, box.top + 44 * scale
@@ -148,17 +166,24 @@ def draw_help(screen: pygame.Surface, layout: Layout, theme: Theme, titles: dict
         y += row
 
 
-class Palette:
-    """Commands by name: type some letters, choose, Enter; or a command such as ``k_rep 0.5``."""
+class CommandList:
+    """Commands by name: type some letters, choose, Enter.
+
+    Parameters
+    ----------
+    actions : list of Action
+    ghost : str
+        What is shown before anything is typed.
+    """
 
     ROWS = 9
 
-    def __init__(self, desk: Desk, titles: dict[str, str]) -> None:
+    def __init__(self, actions: Sequence[Action], ghost: str) -> None:
         self.open = False
         self.text = ""
         self.chosen = 0
-        self._desk = desk
-        self._titles = titles
+        self._actions = [action for action in actions if action.name != "palette"]
+        self._ghost = ghost
 
     def show(self) -> None:
         """Open it, empty."""
@@ -167,8 +192,7 @@ class Palette:
     @property
     def found(self) -> list[Action]:
         """What matches."""
-        actions = [action for action in all_actions(self._titles) if action.name != "palette"]
-        return matching(actions, self.text)[: self.ROWS]
+        return matching(self._actions, self.text)[: self.ROWS]
 
     def type(self, text: str) -> None:
         """Take letters."""
@@ -184,9 +208,7 @@ class Palette:
 
     def is_command(self) -> bool:
         """Whether what is typed is a command with a value, not the name of an action."""
-        word, value = parted(self.text)
-        names = {each.name.removeprefix("team.") for each in self._desk.parameters()} | set(COMMAND_WORDS)
-        return bool(value) and word in names
+        return False
 
     def draw(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> None:
         """Draw it."""
@@ -202,9 +224,7 @@ class Palette:
         typed = label(self.text + "▏", size, theme.ink)
         screen.blit(typed, (box.left + round(18 * scale), box.top + round(14 * scale)))
         if not self.text:
-            ghost = label(
-                "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4", size, theme.faint
-            )
+            ghost = label(self._ghost, size, theme.faint)
             screen.blit(ghost, (box.left + round(30 * scale), box.top + round(14 * scale)))
         line = mix(theme.panel, theme.ink, 0.2)
         screen.fill(line, pygame.Rect(box.left, box.top + round(44 * scale), box.width, 1))
@@ -234,6 +254,21 @@ class Palette:
             y += row
         hint = label("↑ ↓ choose · Enter does it · Esc closes", round(11 * scale), theme.faint)
         screen.blit(hint, hint.get_rect(midbottom=(box.centerx, box.bottom - round(9 * scale))))
+
+
+class Palette(CommandList):
+    """The demo's commands by name; or a command such as ``k_rep 0.5``."""
+
+    def __init__(self, desk: Desk, titles: dict[str, str]) -> None:
+        ghost = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
+        super().__init__(all_actions(titles), ghost)
+        self._desk = desk
+
+    def is_command(self) -> bool:
+        """Whether what is typed is a command with a value, not the name of an action."""
+        word, value = parted(self.text)
+        names = {each.name.removeprefix("team.") for each in self._desk.parameters()} | set(COMMAND_WORDS)
+        return bool(value) and word in names
 
 
 def draw_caption(

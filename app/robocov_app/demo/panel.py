@@ -9,6 +9,7 @@ from robocov.controllers import controller_kind
 from robocov.errors import ParameterError
 from robocov_app.demo.actions import all_actions
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
+from robocov_app.demo.paged import Paged
 from robocov_app.demo.pages import (
     GAP,
     MARGIN,
@@ -20,23 +21,19 @@ from robocov_app.demo.pages import (
     show_page,
 )
 from robocov_app.demo.scenario import MOST_PANES
-from robocov_app.demo.widgets import Widgets
 from robocov_app.view.theme import LIGHT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    import pygame
-
     from robocov_app.demo.desk import Desk
-    from robocov_app.demo.layout import Box, Layout
-    from robocov_app.view.theme import Theme
+    from robocov_app.demo.widgets import Widgets
 
 TABS = ("parameters", "show", "robot", "keep")
 _TAB_WIDTHS = (86, 64, 64, 64)
 
 
-class Panel:
+class Panel(Paged):
     """Builds the widgets, and keeps them as the desk is.
 
     Parameters
@@ -46,132 +43,33 @@ class Panel:
         Of the layers.
     do : callable
         Does an action by its name.
-
-    Attributes
-    ----------
-    tab : str
-        The page that is open.
-    body : Box
-        Where the page is, in the window.
-    covered : bool
-        Something else is drawn in its place: it takes no events.
-    widgets : Widgets or None
-        None while the panel is hidden.
     """
 
+    tabs = TABS
+    tab_widths = _TAB_WIDTHS
+
     def __init__(self, desk: Desk, titles: dict[str, str], do: Callable[[str], None]) -> None:
-        self.desk, self.titles, self._do = desk, titles, do
-        self.tab = TABS[0]
-        self.body: Box = (0, 0, 0, 0)
-        self.covered = False
-        self.widgets: Widgets | None = None
-        self._box: Box = (0, 0, 0, 0)
-        self._theme: Theme | None = None
-        self._actions = {action.name: action for action in all_actions(titles)}
-        self._structure: object = None
-        self._version = -1
-
-    def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Build what another layout and theme need."""
-        widgets, self._box, self._theme = self.widgets, layout.panel, theme
-        self._structure = None
-        if not layout.panel[2]:
-            self.stop_typing()
-            self.widgets = None
-            return
-        if widgets is not None and widgets.theme is theme and widgets.scale == layout.scale:
-            widgets.resize(layout.size, layout.panel)
-        else:
-            self.stop_typing()
-            self.widgets = Widgets(layout.size, layout.panel, theme, layout.scale, self._actions, self._do)
-        self._refresh()
-
-    def show_tab(self, name: str) -> None:
-        """Turn to a page."""
-        if name in TABS:
-            self.tab = name
-            self.desk.version += 1
-
-    def update(self, seconds: float) -> None:
-        """Let the widgets live, and say what the desk says."""
-        if self.widgets is None:
-            return
-        if self.covered:
-            if self.widgets.typed_into is not None or self.widgets.open_menu is not None:
-                self.widgets.let_go()
-                self.widgets.manager.update(seconds)
-            return
-        ended = self.widgets.ended()
-        if ended or self._version != self.desk.version or self._structure != self._wanted():
-            self._refresh()
-        self.widgets.manager.update(seconds)
-
-    def fill(self, screen: pygame.Surface) -> None:
-        """Draw what is behind the widgets."""
-        if self._theme is not None:
-            screen.fill(self._theme.panel, self._box)
-
-    def draw(self, screen: pygame.Surface) -> None:
-        """Draw the widgets."""
-        if self.widgets is not None:
-            self.widgets.manager.draw_ui(screen)
-
-    @property
-    def busy(self) -> bool:
-        """Whether it must keep up with every frame: somebody uses it, or something is different."""
-        widgets = self.widgets
-        used = widgets is not None and (self.typing or self.unfolded or widgets.held)
-        return used or self._version != self.desk.version
-
-    @property
-    def typing(self) -> bool:
-        """Whether keys go into a field."""
-        return self.widgets is not None and self.widgets.typed_into is not None
-
-    def stop_typing(self) -> None:
-        """Take the keys away from all fields, and close menus."""
-        if self.widgets is not None and (self.typing or self.unfolded):
-            self.widgets.let_go()
-            self.widgets.ended()
-            self.desk.version += 1
-
-    @property
-    def unfolded(self) -> bool:
-        """Whether a menu is open, which may hang over other things."""
-        return self.widgets is not None and not self.covered and self.widgets.open_menu is not None
-
-    def take(self, event: pygame.event.Event) -> bool:
-        """Give an event to the widgets; return whether one of them took it."""
-        return self.widgets is not None and not self.covered and self.widgets.take(event)
+        super().__init__(desk, all_actions(titles), do)
+        self.desk, self.titles = desk, titles
 
     # building
 
-    def _wanted(self) -> object:
+    def wanted(self) -> object:
         """Return all on which it depends what widgets there are."""
         desk, session = self.desk, self.desk.session
         laws = tuple(session.circumstances(lane).law.name for lane in session.lanes)
         starts = tuple(session.environment.starts)
         return laws, desk.active, self.tab, desk.map_name, starts, session.scenario.start_name, *desk.laws
 
-    def _refresh(self) -> None:
-        assert self.widgets is not None
-        wanted = self._wanted()
-        if wanted != self._structure:
-            self._structure = wanted
-            self._build(self.widgets)
-        self._sync(self.widgets)
-        self._version = self.desk.version
-
-    def _build(self, widgets: Widgets) -> None:
+    def build(self, widgets: Widgets) -> None:
+        """Make the widgets."""
         y = self._environment(widgets, 8)
         y = self._controllers(widgets, y)
         y = self._run(widgets, y)
         y = self._tools(widgets, y)
         widgets.section("tabs", None, y, lambda: self._tabs(widgets))
         y += 34
-        left, _, width, height = widgets.place
-        top = round(y * widgets.scale)
-        self.body = (left, top, width, max(height - top, 0))
+        self._place_body(widgets, y)
         if self.tab == "parameters":
             parameters_page(widgets, self.desk, y)
         elif self.tab == "show":
@@ -180,17 +78,6 @@ class Panel:
             robot_page(widgets, y)
         else:
             keep_page(widgets, y)
-
-    def _tabs(self, widgets: Widgets) -> None:
-        x = float(MARGIN)
-        for name, width in zip(TABS, _TAB_WIDTHS, strict=True):
-
-            def turn(name: str = name) -> None:
-                self.show_tab(name)
-
-            rect = widgets.rect(x, 0, width, 26)
-            widgets.button(name.capitalize(), rect, turn, name=f"tab:{name}", style="#small")
-            x += width + GAP
 
     def _environment(self, widgets: Widgets, y: float) -> float:
         desk, rect = self.desk, widgets.rect
@@ -294,7 +181,8 @@ class Panel:
 
     # keeping up
 
-    def _sync(self, widgets: Widgets) -> None:
+    def sync(self, widgets: Widgets) -> None:
+        """Let the widgets say what the desk says."""
         desk, session = self.desk, self.desk.session
         widgets.say("button", "pause", "Pause" if session.playing else "Play")
         widgets.mark("pause", not session.playing)
@@ -303,8 +191,7 @@ class Panel:
         widgets.mark("film", desk.filming)
         widgets.mark("fade", desk.fade)
         widgets.say("button", "theme", "Dark" if self._theme is LIGHT else "Light")
-        for name in TABS:
-            widgets.mark(f"tab:{name}", name == self.tab, ("#chosen_tab", "#small"))
+        self._mark_tabs(widgets)
         for name in desk.tools:
             widgets.mark(f"tool:{name}", desk.tool.name == name)
         widgets.fill("robots", str(session.scenario.robots))

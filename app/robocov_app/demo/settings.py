@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -29,29 +29,37 @@ class Settings(BaseModel):
     fade: bool = False
 
 
-def settings_file() -> Path | None:
+Kept = TypeVar("Kept", bound=BaseModel)
+
+
+def settings_file(name: str = "window.json") -> Path | None:
     """Return where the settings are kept, None where they are not to be."""
     named = os.environ.get(FOLDER)
     if named is not None:
-        return Path(named) / "window.json" if named else None
+        return Path(named) / name if named else None
     from platformdirs import user_config_path
 
-    return user_config_path("robocov", appauthor=False) / "window.json"
+    return user_config_path("robocov", appauthor=False) / name
 
 
 def load_settings(file: Path | None) -> tuple[Settings, str]:
     """Return the settings, and what to tell if they could not be read: the defaults are used then."""
+    return loaded(Settings, file)
+
+
+def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
+    """Return settings of a kind, and what to tell if they could not be read: the defaults are used then."""
     if file is None:
-        return Settings(), ""
+        return kind(), ""
     try:
-        return Settings.model_validate_json(file.read_bytes()), ""
+        return kind.model_validate_json(file.read_bytes()), ""
     except FileNotFoundError:
-        return Settings(), ""
+        return kind(), ""
     except (OSError, ValidationError, ValueError):
-        return Settings(), f"{file} could not be read: default settings"
+        return kind(), f"{file} could not be read: default settings"
 
 
-def save_settings(settings: Settings, file: Path | None) -> str:
+def save_settings(settings: BaseModel, file: Path | None) -> str:
     """Write the settings, whole or not at all; return what to tell if that failed."""
     if file is None:
         return ""

@@ -10,6 +10,7 @@ import pygame
 from robocov_app.demo.clock import speed_words
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
+from robocov_app.view.fonts import shortened
 from robocov_app.view.theme import mix
 
 if TYPE_CHECKING:
@@ -73,17 +74,20 @@ def cursor_words(desk: Desk) -> str:
     return f"{words}: {distance:.2f} m to robot {numbers[owner]}, {share:.1f} × the mean"
 
 
-def draw_status(screen: pygame.Surface, layout: Layout, theme: Theme, said: list[str]) -> None:
+def draw_status(
+    screen: pygame.Surface, layout: Layout, theme: Theme, said: list[str], hint: str = HINT
+) -> None:
     """Draw the line; what there is no room for is left out, from the end."""
     scale = layout.scale
     left, top, width, height = layout.status
     screen.fill(mix(theme.panel, theme.ink, 0.06), pygame.Rect(layout.status))
     canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
     size = theme.small_text
-    room = width - 44 * scale - canvas.text_width(HINT, size)
+    room = width - 44 * scale - canvas.text_width(hint, size)
     kept = list(said)
     while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
         kept.pop()
     y = top + height / 2
-    canvas.text("    ".join(kept), (left + 12 * scale, y), size=size)
-    canvas.text(HINT, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
+    words = shortened("    ".join(kept), canvas.text_size(size), room)
+    canvas.text(words, (left + 12 * scale, y), size=size)
+    canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")

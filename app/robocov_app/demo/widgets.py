@@ -196,9 +196,9 @@ class Widgets:
         self._now.calls[pygame_gui.UI_BUTTON_PRESSED, button] = lambda _: call()
         self._made(button, "button", name)
 
-    def does(self, text: str, rect: pygame.Rect, action: str) -> None:
+    def does(self, text: str, rect: pygame.Rect, action: str, *, style: str | None = None) -> None:
         """Make a button that does an action."""
-        self.button(text, rect, lambda: self._do(action), name=action)
+        self.button(text, rect, lambda: self._do(action), name=action, style=style)
 
     def menu(
         self, name: str, options: list[str], now: str, rect: pygame.Rect, call: Callable[[str], object]
@@ -324,6 +324,13 @@ class Widgets:
         """The menu that is open, which may hang over other things."""
         menus = self._all("menus")
         return next((menu for menu in menus if menu.current_state is menu.menu_states["expanded"]), None)
+
+    def focus(self, name: str) -> None:
+        """Let keys go into a field, in place of what is in it."""
+        entry = self.find("entry", name)
+        if entry is not None:
+            self.manager.set_focus_set(entry)
+            self._select(None)
 
     def let_go(self) -> None:
         """Take the keys away from all fields, and close the menu that is open."""

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import warnings
-from contextlib import contextmanager, suppress
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -13,6 +10,7 @@ import pygame
 
 from robocov.atomic import written
 from robocov.errors import RobocovError
+from robocov_app.demo.actions import all_actions
 from robocov_app.demo.arena import Arena
 from robocov_app.demo.asked import report_on
 from robocov_app.demo.chart import Chart
@@ -21,12 +19,13 @@ from robocov_app.demo.film import FPS as FILM_FPS
 from robocov_app.demo.film import Film, pixels
 from robocov_app.demo.keeping import Keeper
 from robocov_app.demo.keyboard import Keyboard
-from robocov_app.demo.layout import SMALLEST, inside, laid_out
+from robocov_app.demo.layout import inside, laid_out
 from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.demo.panel import TABS, Panel
 from robocov_app.demo.pointer import Pointer
 from robocov_app.demo.report_page import ReportPage
-from robocov_app.demo.status import draw_status, facts
+from robocov_app.demo.screen import shown, undisturbed
+from robocov_app.demo.status import HINT, draw_status, facts
 from robocov_app.demo.tour import Tour
 from robocov_app.output import free_name
 from robocov_app.recording import png_bytes
@@ -34,7 +33,7 @@ from robocov_app.view.picture import standard_layers
 from robocov_app.view.theme import theme_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.inspector import Report
@@ -54,7 +53,8 @@ _PAN = 60
 _GOES_ON_WITH = frozenset({"help", "theme", "screenshot", "film", "panel", "fullscreen", "quit"})
 """What may be done without ending the tour."""
 
-_OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+"""Types of events that the mouse makes."""
 
 
 class Window:
@@ -68,9 +68,21 @@ class Window:
         Of text and lines.
     patient : bool
         Nobody watches: films wait for their encoder instead of leaving frames out.
+    screen : pygame.Surface or None
+        Of a window that is there already.
     """
 
-    def __init__(self, desk: Desk, size: tuple[int, int], scale: float, *, patient: bool = False) -> None:
+    hint = HINT
+
+    def __init__(
+        self,
+        desk: Desk,
+        size: tuple[int, int],
+        scale: float,
+        *,
+        patient: bool = False,
+        screen: pygame.Surface | None = None,
+    ) -> None:
         self.desk = desk
         self.scale = scale
         self.closed = False
@@ -80,7 +92,7 @@ class Window:
         self.keeper = Keeper()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         self.windowed: tuple[int, int] | None = None
-        self.screen = _shown(size)
+        self.screen = screen or shown(size)
         pygame.display.set_caption("robocov")
         self.arena = Arena(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
@@ -88,7 +100,8 @@ class Window:
         self.palette = Palette(desk, self.titles)
         self.report_page = ReportPage()
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
-        self.keyboard = Keyboard(desk, self.panel, self.palette, self.titles, lambda name: self.do(name))
+        actions = all_actions(self.titles)
+        self.keyboard = Keyboard(desk, self.panel, self.palette, actions, lambda name: self.do(name))
         self._patient = patient
         self._own = self._what_to_do()
         self._arranged: tuple[object, ...] | None = None
@@ -235,7 +248,8 @@ class Window:
         self.arena.draw(self.screen)
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
-        draw_status(self.screen, layout, theme, facts(desk, self._rate, self._steps_rate, filmed))
+        said = facts(desk, self._rate, self._steps_rate, filmed)
+        draw_status(self.screen, layout, theme, said, self.hint)
         if layout.panel[2] and self.tour is not None:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
@@ -326,7 +340,7 @@ class Window:
     def _fullscreen(self) -> None:
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
         windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
-        self.screen = _shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        self.screen = shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
 
     def _toggle_help(self) -> None:
         self.help = not self.help
@@ -376,7 +390,7 @@ class Window:
             self.help = self.palette.open = False
         elif event.type == pygame.MOUSEWHEEL and self._over_report():
             self.report_page.wheel(event.y, self.scale)
-        elif event.type in _OF_THE_MOUSE:
+        elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:
             self.pointer.leave()
@@ -386,26 +400,3 @@ class Window:
             elif event.type == pygame.WINDOWFOCUSLOST:
                 self.keyboard.leave()
             self.panel.take(event)
-
-
-def _shown(size: tuple[int, int]) -> pygame.Surface:
-    screen = pygame.display.set_mode(size, pygame.RESIZABLE)
-    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
-        # pygame-ce has no other way yet to give a window of the display module a least size
-        warnings.simplefilter("ignore", DeprecationWarning)
-        pygame.Window.from_display_module().minimum_size = SMALLEST
-    return screen
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Keep the garbage collector away from all that is there now, modules most of all.
-
-    It would look at it again every half minute, which holds a frame up by 25 ms.
-    """
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()

@@ -36,17 +36,22 @@ class ScaleBar(Layer):
     in_world = False
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        length = bar_length(canvas)
-        pixels = length * canvas.camera.zoom
-        left = EDGE * canvas.scale
-        y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
-        tick, width = 4.0 * canvas.scale, canvas.width(1.5)
-        ink = canvas.theme.ink
-        for x in (left, left + pixels):
-            box = pygame.Rect(round(x - width / 2), round(y - tick), width, round(2 * tick))
-            canvas.surface.fill(ink, box)
-        canvas.surface.fill(ink, pygame.Rect(round(left), round(y - width / 2), round(pixels), width))
-        canvas.text(length_label(length), (left + pixels + 8 * canvas.scale, y), bold=True)
+        draw_bar(canvas)
+
+
+def draw_bar(canvas: Canvas) -> None:
+    """Draw the bar at the foot of a canvas, with its length."""
+    length = bar_length(canvas)
+    pixels = length * canvas.camera.zoom
+    left = EDGE * canvas.scale
+    y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
+    tick, width = 4.0 * canvas.scale, canvas.width(1.5)
+    ink = canvas.theme.ink
+    for x in (left, left + pixels):
+        box = pygame.Rect(round(x - width / 2), round(y - tick), width, round(2 * tick))
+        canvas.surface.fill(ink, box)
+    canvas.surface.fill(ink, pygame.Rect(round(left), round(y - width / 2), round(pixels), width))
+    canvas.text(length_label(length), (left + pixels + 8 * canvas.scale, y), bold=True)
 
 
 def bar_length(canvas: Canvas) -> float:

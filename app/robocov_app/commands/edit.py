@@ -1,0 +1,102 @@
+"""``robocov edit``: the map editor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from robocov.errors import MapError, ParameterError
+from robocov_app.options import in_range, parsed_size
+
+
+@dataclass
+class Arguments:
+    """The map editor: draw and change maps, see at once what is wrong with them, try them.
+
+    Everything has a key: press F1. Nothing is lost: work that was not saved is offered at the next start.
+
+    Example: robocov edit plan.json --background plan.png
+    """
+
+    map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
+    """A map JSON, which need not be there yet; the name of a bundled map, of which a copy is opened; or a
+    file of a foreign format, which is imported. Without it an empty sheet."""
+    background: Path | None = None
+    """A picture to put under the map, such as a scanned floor plan."""
+    theme: Literal["light", "dark"] | None = None
+    """Colours; by default those of the last time."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size of the window in pixels; by default that of the last time."""
+    scale: float | None = None
+    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
+    folder: Path = Path()
+    """Where maps and screenshots are saved that are not given a path."""
+    screenshot: Path | None = None
+    """Save a picture of the window, drawn without a display, and end."""
+    page: Literal["map", "object", "snap", "problems", "history"] = "map"
+    """The panel's page in that picture."""
+
+    def __post_init__(self) -> None:
+        if self.scale is not None:
+            in_range("--scale", self.scale, 0.5, 4.0)
+        if self.screenshot is not None and self.screenshot.suffix.lower() != ".png":
+            raise ParameterError(
+                f"--screenshot: {str(self.screenshot)!r}, but a name ending in .png was wanted"
+            )
+        self.pixels()
+
+    def pixels(self) -> tuple[int, int] | None:
+        """Return the size that was asked for, None when none was."""
+        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
+
+
+def command(options: Arguments) -> int:
+    """Open the editor, or save a picture of it."""
+    from robocov_app.editor.opening import EditorOpening
+
+    opening = EditorOpening(
+        None if options.map is None else map_path(options.map),
+        options.folder,
+        background=options.background,
+        theme=options.theme,
+        size=options.pixels(),
+        scale=options.scale,
+        headless=options.screenshot is not None,
+    )
+    with opening.window() as window:
+        if options.screenshot is None:
+            window.run()
+            return 0
+        from robocov.atomic import written
+        from robocov_app.demo.film import pixels
+        from robocov_app.recording import png_bytes
+
+        window.panel.show_tab(options.page)
+        window.desk.message = ""
+        for _ in range(3):
+            window.frame(0.2)
+        with written(options.screenshot) as part:
+            part.write_bytes(png_bytes(pixels(window.screen)))
+    print(f"saved {options.screenshot}")
+    return 0
+
+
+def map_path(name: str) -> Path:
+    """Return the file that is meant: a path, or that of a bundled map.
+
+    Raises
+    ------
+    MapError
+        For a name that is neither.
+    """
+    from robocov.mapfile import bundled_maps, map_file
+
+    path = Path(name)
+    if name not in bundled_maps() and path.suffix:
+        if path.suffix.lower() != ".json" and not path.is_file():
+            raise MapError(f"{name}: there is no such file")
+        return path
+    return map_file(name)

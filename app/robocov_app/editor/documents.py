@@ -1,0 +1,385 @@
+"""Documents opened, saved and left, with the questions that have to be asked. Knows no pygame."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps, map_file
+from robocov_app.editor.asking import Answer, FileQuestion, Picker, Question
+from robocov_app.editor.background import picture_laid
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.drafts import opened_elsewhere
+from robocov_app.editor.edits import underlaid
+from robocov_app.editor.files import ChangedError
+from robocov_app.editor.paper import SUFFIX, Paper
+from robocov_app.editor.settings import MOST_RECENT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from robocov_app.editor.desk import Desk
+    from robocov_app.editor.drafts import Draft
+
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
+
+
+class Documents:
+    """What can be done with whole documents.
+
+    Parameters
+    ----------
+    desk : Desk
+    drafts : Path or None
+        Where drafts are kept.
+    fit : callable
+        Shows the whole map.
+    """
+
+    def __init__(self, desk: Desk, drafts: Path | None, fit: Callable[[], object]) -> None:
+        self.desk, self.drafts, self._fit = desk, drafts, fit
+        self.leaving = False
+
+    def deeds(self) -> dict[str, Callable[[], object]]:
+        """Return what the actions do, by their names."""
+        return {
+            "new": lambda: self.leave(self.new),
+            "open": self.ask_file,
+            "recent": self.ask_recent,
+            "save": self.save,
+            "save:as": self.ask_name,
+            "export": self.ask_export,
+            "reload": self.reload,
+            "background": self.ask_picture,
+            "quit": self.quit,
+        }
+
+    # leaving what is open
+
+    def leave(self, then: Callable[[], object]) -> None:
+        """Put another document in place of this one, after asking what is to become of it."""
+        paper = self.desk.paper
+        if not paper.unsaved:
+            then()
+            paper.close(discard=True)
+            return
+
+        def save() -> None:
+            self.save(then=lambda: self.leave(then))
+
+        def discard() -> None:
+            then()
+            paper.close(discard=True)
+
+        words = f"“{paper.title}” has changes that are in no file."
+        answers = (
+            Answer("Save", "s", save),
+            Answer("Discard", "d", discard),
+            Answer("Cancel", "c", _nothing),
+        )
+        self.desk.asked = Question("Save the changes?", words, answers)
+
+    def quit(self) -> None:
+        """End, after asking what is to become of what is open."""
+        self.leave(self._leave_for_good)
+
+    def _leave_for_good(self) -> None:
+        self.leaving = True
+
+    def _put(self, paper: Paper) -> None:
+        self.desk.put(paper)
+        self._fit()
+        if paper.path is not None:
+            self.remember(paper.path)
+
+    # opening
+
+    def new(self) -> str:
+        """Put an empty sheet on the desk."""
+        self._put(Paper.new(self.drafts))
+        return "a new map: 10 x 10 m; B draws another boundary"
+
+    def ask_file(self) -> None:
+        """Ask which file to open."""
+        from robocov_app.importers import IMPORTERS
+
+        foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
+        suffixes = [SUFFIX, *foreign]
+
+        def chosen(text: str) -> None:
+            self.open(Path(text))
+
+        self.desk.asked = FileQuestion("Open a map", self.desk.folder, chosen, suffixes)
+
+    def ask_recent(self) -> None:
+        """Ask which of the maps to open that were open lately, or come with robocov."""
+        names = [(path, "recent") for path in self.desk.recent if Path(path).exists()]
+        names += [(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
+
+        def chosen(text: str) -> None:
+            self.open(map_file(text))
+
+        self.desk.asked = Picker("Open a recent or bundled map", names, chosen)
+
+    def open(self, path: Path) -> None:
+        """Open a file: a map, or one of a foreign format as a new map.
+
+        Raises
+        ------
+        RobocovError
+            When it cannot be read; what is open stays.
+        """
+        own = self.desk.paper.path
+        if own is not None and own.exists() and path.exists() and path.samefile(own):
+            self.reload()
+            return
+        if opened_elsewhere(self.drafts, path):
+            raise MapError(f"{path.name}: another editor has it open")
+        paper, words, report = opened(path, self.drafts)
+
+        def put() -> None:
+            self._put(paper)
+            self.desk.say(words)
+            self.show_report(path, report)
+
+        self.leave(put)
+
+    def show_report(self, path: Path, report: Sequence[str]) -> None:
+        """Show what an import has done."""
+        if report:
+            answers = (Answer("All right", "a", _nothing),)
+            self.desk.asked = Question(f"Imported {path.name}", "\n".join(report), answers)
+
+    def recover(self, draft: Draft) -> None:
+        """Go on with work that was left behind.
+
+        Raises
+        ------
+        RobocovError
+            When it cannot be read, or another editor goes on with it.
+        """
+        self._put(Paper.recovered(draft, self.drafts))
+        self.desk.say(f"recovered: {draft.words()}")
+
+    def remember(self, path: Path) -> None:
+        """Note a file as one that was open lately."""
+        name = str(path)
+        self.desk.recent = [name, *(each for each in self.desk.recent if each != name)][:MOST_RECENT]
+
+    # saving
+
+    def save(self, then: Callable[[], object] | None = None) -> str | None:
+        """Save to the document's file; ask for one if it has none."""
+        if self.desk.paper.path is None:
+            self.ask_name(then)
+            return None
+        return self._save(self.desk.paper.path, then)
+
+    def ask_name(self, then: Callable[[], object] | None = None) -> None:
+        """Ask where to save."""
+        suggested = self.desk.paper.suggested(self.desk.folder)
+        text = str(suggested)
+        if suggested.parent == self.desk.folder:
+            text = suggested.name
+
+        def chosen(typed: str) -> str | None:
+            return self._save(Path(typed), then)
+
+        self.desk.asked = FileQuestion("Save as", self.desk.folder, chosen, [SUFFIX], text=text, saves=True)
+
+    def _save(self, path: Path, then: Callable[[], object] | None, *, over: bool = False) -> str | None:
+        desk = self.desk
+        try:
+            words = desk.paper.save(path, over=over)
+        except ChangedError as error:
+            answers = (
+                Answer("Save as…", "a", lambda: self.ask_name(then)),
+                Answer("Replace it", "r", lambda: self._save(path, then, over=True)),
+                Answer("Cancel", "c", _nothing),
+            )
+            desk.asked = Question("Replace the file?", str(error), answers)
+            return None
+        assert desk.paper.path is not None
+        self.remember(desk.paper.path)
+        grave = [problem for problem in desk.problems if problem.grave]
+        if grave:
+            words += f", as a draft: {grave[0].words}"
+        if then is not None:
+            then()
+        return words
+
+    # exporting
+
+    def ask_export(self) -> None:
+        """Ask where to write the map in a foreign format, which goes by the suffix.
+
+        Raises
+        ------
+        MapError
+            When the map is only a draft.
+        """
+        from robocov_app.exporters import EXPORTERS
+
+        self.desk.sketch.environment()
+        suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
+
+        def chosen(text: str) -> str | None:
+            return self._export(Path(text))
+
+        title = f"Export to a file ending in {', '.join(suffixes)}"
+        name = Path(self.desk.paper.suggested(self.desk.folder).name).stem
+        self.desk.asked = FileQuestion(
+            title, self.desk.folder, chosen, suffixes, text=f"{name}.svg", saves=True
+        )
+
+    def _export(self, path: Path, *, over: bool = False) -> str | None:
+        from robocov_app.exporters import export_map
+
+        if path.exists() and not over:
+            answers = (
+                Answer("Another name…", "a", self.ask_export),
+                Answer("Replace it", "r", lambda: self._export(path, over=True)),
+                Answer("Cancel", "c", _nothing),
+            )
+            self.desk.asked = Question("Replace the file?", f"{path} is there already.", answers)
+            return None
+        report = export_map(self.desk.sketch.environment(), path)
+        said = [f"exported: {', '.join(str(file) for file in report.files)}", *report.dropped]
+        return "; ".join(said)
+
+    # what happens on the disk
+
+    def look(self) -> None:
+        """Ask what to do when something else has changed or removed the file."""
+        desk = self.desk
+        if desk.asked is not None:
+            return
+        state = desk.paper.look(desk.now)
+        if state == "gone":
+            desk.say(f"{desk.paper.title} is no longer there; Ctrl S writes it again", trouble=True)
+        elif state == "changed":
+            answers = (
+                Answer("Reload", "r", self.reload),
+                Answer("Keep mine", "k", desk.paper.keep_mine),
+            )
+            words = f"Something else has changed {desk.paper.title}. Reloading can be undone."
+            desk.asked = Question("The file has changed", words, answers)
+
+    def reload(self) -> str:
+        """Read the file again."""
+        if self.desk.paper.path is None:
+            raise MapError("the map has no file yet")
+        self.desk.paper.reload()
+        self.desk.readout = None
+        self.desk.version += 1
+        self.desk.ask_readings()
+        return f"read again: {self.desk.paper.title}"
+
+    # the picture under the map
+
+    def ask_picture(self) -> None:
+        """Ask which picture to put under the map."""
+
+        def chosen(text: str) -> None:
+            self.underlay(Path(text))
+
+        self.desk.asked = FileQuestion("Picture under the map", self.desk.folder, chosen, PICTURES)
+
+    def underlay(self, path: Path) -> None:
+        """Put a picture under the map.
+
+        Raises
+        ------
+        MapError
+            When it is no picture.
+        """
+        lay_under(self.desk, path)
+        self.desk.choose("picture")
+        self._fit()
+
+
+def lay_under(desk: Desk, path: Path) -> None:
+    """Put a picture under the map, as wide as the map is, or 20 m.
+
+    Raises
+    ------
+    MapError
+        When it is no picture.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            pixels = picture.size
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
+        raise MapError(f"{path}: not a picture that can be read") from None
+    bounds = desk.sketch.bounds
+    laid = picture_laid(_from_map(path, desk.paper.path), pixels)
+    if bounds is not None and desk.sketch.background is None:
+        laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
+    desk.change(underlaid(desk.sketch, laid))
+
+
+def _from_map(path: Path, of: Path | None) -> str:
+    """Return how a map names a picture: from its own folder where that is near, else from the root."""
+    path = path.resolve()
+    if of is not None:
+        try:
+            near = os.path.relpath(path, of.resolve().parent)
+        except ValueError:  # on another drive
+            return path.as_posix()
+        if near.count("..") < 2:
+            return Path(near).as_posix()
+    return path.as_posix()
+
+
+def opened(path: Path, drafts: Path | None) -> tuple[Paper, str, list[str]]:
+    """Return the document of a file, what to tell, and what importing it has done, if it was imported.
+
+    Raises
+    ------
+    RobocovError
+        When it cannot be read.
+    """
+    if path.suffix.lower() == SUFFIX and not path.exists():
+        return Paper.new(drafts, path), f"a new map, {path.name}: 10 x 10 m; B draws another boundary", []
+    try:
+        paper = Paper.opened(path, drafts)
+    except MapError as error:
+        if path.suffix.lower() == SUFFIX and _is_map(path):
+            raise
+        imported = _imported(path, drafts)
+        if imported is None:
+            raise error from None
+        return imported
+    words = f"{paper.title}: opened as a copy" if paper.path is None else f"opened: {paper.title}"
+    return paper, words, []
+
+
+def _is_map(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return b"robocov-map" in file.read(4096)
+    except OSError:
+        return True
+
+
+def _imported(path: Path, drafts: Path | None) -> tuple[Paper, str, list[str]] | None:
+    """Return a foreign map as a document without a file, None where no importer knows it."""
+    from robocov_app.importers import detect, import_map
+
+    if not path.is_file():
+        return None
+    try:
+        detect(path)
+    except MapError:
+        return None
+    environment, report, _ = import_map(path)
+    paper = Paper(Sketch.from_environment(environment), drafts, saved=False, stem=path.stem)
+    return paper, f"imported: {path.name}, not saved yet", report.lines()
+
+
+def _nothing() -> None:
+    """Change nothing."""

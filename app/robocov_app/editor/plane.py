@@ -1,0 +1,71 @@
+"""Points and angles of the plane: to the tenth of a millimetre, exact at right angles, within reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.errors import MapError
+from robocov.mapmodels import FARTHEST
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.environment import Point, Ring
+
+DECIMALS = 4
+"""Digits after the decimal point of what the editor writes: a tenth of a millimetre."""
+
+
+def rounded(point: Iterable[float]) -> Point:
+    """Return a point to the tenth of a millimetre, without minus zeros.
+
+    >>> rounded((0.1 + 0.2, -0.00001))
+    (0.3, 0.0)
+    """
+    x, y = point
+    return tenths(x), tenths(y)
+
+
+def tenths(length: float) -> float:
+    """Return a length to the tenth of a millimetre.
+
+    >>> tenths(2 / 3)
+    0.6667
+    """
+    return round(float(length), DECIMALS) + 0.0
+
+
+def ring_near(points: Array) -> Ring:
+    """Return (n, 2) points to the tenth of a millimetre.
+
+    Raises
+    ------
+    MapError
+        When one is farther away than maps reach, or is no number.
+    """
+    if not np.all(np.abs(points) <= FARTHEST):  # nan is not near either
+        raise MapError(f"that is too far away: maps reach {FARTHEST / 1000:.0f} km from their origin")
+    return tuple([(x, y) for x, y in (np.round(points, DECIMALS) + 0.0).tolist()])
+
+
+def nearest_on(starts: Array, ends: Array, point: Array) -> Array:
+    """Return for k edges the (k, 2) places that are nearest to a point."""
+    along = ends - starts
+    squared = np.einsum("kd,kd->k", along, along)
+    part = np.einsum("kd,kd->k", point - starts, along) / np.where(squared > 0.0, squared, 1.0)
+    return np.asarray(starts + np.clip(part, 0.0, 1.0)[:, None] * along)
+
+
+def cos_sin(degrees: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle, exact at quarters of a turn.
+
+    >>> cos_sin(-90.0)
+    (0.0, -1.0)
+    """
+    quarters, rest = divmod(degrees, 90.0)
+    if rest == 0.0:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
+    return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

@@ -1,0 +1,143 @@
+"""Parts of drafts read from documents: what a map may not be is kept, what is no map at all is refused."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import unknown_name
+from robocov.mistakes import Mistake, place, refusal
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov.strictjson import shown_json
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from robocov.environment import Obstacle, Point, Ring
+    from robocov.mistakes import Path
+    from robocov.starts import StartSpec
+
+_KEYS = {
+    "polygon": ("kind", "name", "vertices", "holes"),
+    "circle": ("kind", "name", "center", "radius"),
+    "wall": ("kind", "name", "points", "width"),
+    "disc": ("kind", "center", "radius"),
+    "points": ("kind", "positions"),
+    "uniform": ("kind",),
+}
+
+
+class PartReader:
+    """Reads parts of a map document, as strictly as to know what they are, and no further.
+
+    Sizes may be 0 or less, rings may have few points or none, names may be empty: such a draft can be
+    edited, and says itself what is wrong with it. All methods raise a MapError with the place.
+
+    Parameters
+    ----------
+    where : str
+        What messages call the document.
+    """
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+
+    def refuse(self, path: Path, what: str, *, at_key: bool = False) -> NoReturn:
+        """Raise the error that something is wrong at a place."""
+        at = f"{place(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
+        raise refusal(self._where, [Mistake(path, at + what, at_key)])
+
+    def object(self, value: Any, path: Path) -> Mapping[str, Any]:
+        """Return an object."""
+        if not isinstance(value, dict):
+            self.refuse(path, f"{shown_json(value)}, but an object was wanted")
+        return value
+
+    def members(self, value: Any, path: Path, known: Iterable[str]) -> Mapping[str, Any]:
+        """Return an object that has known keys only."""
+        known = list(known)
+        for key in self.object(value, path):
+            if key not in known:
+                self.refuse((*path, key), unknown_name("key", str(key), known), at_key=True)
+        return self.object(value, path)
+
+    def text(self, value: Any, path: Path) -> str:
+        """Return a text."""
+        if not isinstance(value, str):
+            self.refuse(path, f"{shown_json(value)}, but a text was wanted")
+        return value
+
+    def number(self, value: Any, path: Path) -> float:
+        """Return a finite number."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            self.refuse(path, f"{shown_json(value)}, but a number was wanted")
+        return float(value)
+
+    def items(self, value: Any, path: Path, what: str) -> list[Any]:
+        """Return a list of something."""
+        if not isinstance(value, list):
+            self.refuse(path, f"{shown_json(value)}, but a list of {what} was wanted")
+        return value
+
+    def point(self, value: Any, path: Path) -> Point:
+        """Return a point."""
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            self.refuse(path, f"{shown_json(value)}, but a point [x, y] in metres was wanted")
+        x, y = value
+        # most of a large file: no path for each
+        if type(x) is float and type(y) is float:
+            return x, y
+        return self.number(x, (*path, 0)), self.number(y, (*path, 1))
+
+    def ring(self, value: Any, path: Path) -> Ring:
+        """Return points, any number of them."""
+        points = self.items(value, path, "points [x, y]")
+        return tuple([self.point(point, (*path, k)) for k, point in enumerate(points)])
+
+    def obstacle(self, value: Any, path: Path) -> Obstacle:
+        """Return an obstacle."""
+        kind = self._kind(value, path, ("polygon", "circle", "wall"))
+        members = self.members(value, path, _KEYS[kind])
+        name = self.text(members["name"], (*path, "name")) if members.get("name") is not None else None
+        if kind == "polygon":
+            holes = self.items(members.get("holes", []), (*path, "holes"), "rings")
+            rings = tuple(self.ring(hole, (*path, "holes", k)) for k, hole in enumerate(holes))
+            return PolygonObstacle(self._ring_at(members, path, "vertices"), rings, name)
+        if kind == "circle":
+            center = self.point(self._at(members, path, "center"), (*path, "center"))
+            return CircleObstacle(center, self._number_at(members, path, "radius"), name)
+        return WallObstacle(
+            self._ring_at(members, path, "points"), self._number_at(members, path, "width"), name
+        )
+
+    def start(self, value: Any, path: Path) -> StartSpec:
+        """Return a start."""
+        kind = self._kind(value, path, ("disc", "uniform", "points"))
+        members = self.members(value, path, _KEYS[kind])
+        if kind == "disc":
+            center = self.point(self._at(members, path, "center"), (*path, "center"))
+            return DiscStart(center, self._number_at(members, path, "radius"))
+        if kind == "points":
+            return PointsStart(self._ring_at(members, path, "positions"))
+        return UniformStart()
+
+    def _kind(self, value: Any, path: Path, kinds: tuple[str, ...]) -> str:
+        wanted = f"one of {', '.join(kinds)}"
+        if not isinstance(value, dict):
+            self.refuse(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
+        kind = self._at(value, path, "kind")
+        if kind not in kinds:
+            self.refuse((*path, "kind"), f"{shown_json(kind)}, but {wanted} was wanted")
+        return str(kind)
+
+    def _at(self, members: Mapping[str, Any], path: Path, key: str) -> Any:
+        if key not in members:
+            self.refuse((*path, key), "missing, but it was wanted")
+        return members[key]
+
+    def _ring_at(self, members: Mapping[str, Any], path: Path, key: str) -> Ring:
+        return self.ring(self._at(members, path, key), (*path, key))
+
+    def _number_at(self, members: Mapping[str, Any], path: Path, key: str) -> float:
+        return self.number(self._at(members, path, key), (*path, key))

@@ -1,0 +1,31 @@
+"""All tools of the editor, in the order in which they are shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from robocov_app.editor.drawing import Boundary, Measure, Places, Polygon, Wall
+from robocov_app.editor.selecting import Pan, Select
+from robocov_app.editor.stretching import Circle, Disc, Rectangle
+from robocov_app.editor.underlay import Underlay
+
+if TYPE_CHECKING:
+    from robocov_app.editor.tool import Tool
+
+
+def toolbox() -> dict[str, Tool]:
+    """Return one of each tool by name."""
+    tools: list[Tool] = [
+        Select(),
+        Pan(),
+        Polygon(),
+        Rectangle(),
+        Circle(),
+        Wall(),
+        Boundary(),
+        Measure(),
+        Disc(),
+        Places(),
+        Underlay(),
+    ]
+    return {tool.name: tool for tool in tools}

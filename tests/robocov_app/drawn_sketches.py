@@ -1,0 +1,236 @@
+"""Sketches drawn by hypothesis, sound ones and broken ones, and all that the editor can do to them."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov_app.editor import arranging, booleans, clipboard, edits, simplifying, vertices
+from robocov_app.editor.background import Background
+from robocov_app.editor.document import BOUNDARY, Item, Sketch
+from robocov_app.editor.selection import Edge, Selection, points_of, rings_of
+
+HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
+
+tenths = st.integers(-20, 140).map(lambda k: k / 10)
+places = st.tuples(tenths, tenths)
+floats = st.floats(-1e6, 1e6, allow_nan=False).map(lambda x: x + 0.0)
+anywhere = st.tuples(floats, floats)
+names = st.one_of(st.none(), st.sampled_from(["desk", "west wall", "süd", "“a”"]), st.text(max_size=6))
+
+
+def rings(points=places, least=0, most=7):
+    return st.lists(points, min_size=least, max_size=most).map(tuple)
+
+
+_sizes = st.integers(-2, 30).map(lambda k: k / 10)
+
+
+def shapes(points=places, sizes=_sizes):
+    """Obstacles, many of them broken."""
+    return st.one_of(
+        st.builds(PolygonObstacle, rings(points), st.lists(rings(points), max_size=2).map(tuple), names),
+        st.builds(CircleObstacle, points, sizes, names),
+        st.builds(WallObstacle, rings(points), sizes, names),
+    )
+
+
+@st.composite
+def sound_shapes(draw):
+    """Obstacles that break no rule; they may overlap and stick out."""
+    x, y = draw(places)
+    size = draw(st.integers(2, 30)) / 10
+    kind = draw(st.sampled_from(["box", "ring", "triangle", "star", "circle", "wall", "bent"]))
+    name = draw(st.sampled_from([None, "desk", "pillar"]))
+    if kind == "circle":
+        return CircleObstacle((x, y), size, name)
+    if kind == "wall":
+        return WallObstacle(((x, y), (round(x + size, 4), draw(tenths))), 0.1, name)
+    if kind == "bent":
+        return WallObstacle(
+            ((x, y), (round(x + size, 4), y), (round(x + size, 4), round(y + 1, 4))), 0.2, name
+        )
+
+    def ring(*corners):
+        return tuple((round(x + size * u, 4), round(y + size * v, 4)) for u, v in corners)
+
+    box = ring((0, 0), (1, 0), (1, 1), (0, 1))
+    if kind == "ring":
+        return PolygonObstacle(box, (ring((0.2, 0.2), (0.8, 0.2), (0.8, 0.7), (0.2, 0.7)),), name)
+    if kind == "triangle":
+        return PolygonObstacle(ring((0, 0), (1, 0.3), (0.4, 1)), (), name)
+    if kind == "star":
+        return PolygonObstacle(ring((0, 0), (0.5, 0.3), (1, 0), (0.7, 0.5), (1, 1), (0.2, 0.8)), (), name)
+    return PolygonObstacle(box, (), name)
+
+
+starts = st.one_of(
+    st.builds(DiscStart, places, st.integers(0, 20).map(lambda k: k / 10)),
+    st.builds(PointsStart, rings(places, 0, 3)),
+    st.just(UniformStart()),
+)
+json_values = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(-99, 99), st.text(max_size=4)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=2), st.dictionaries(st.text(max_size=4), inner, max_size=2)
+    ),
+    max_leaves=4,
+)
+backgrounds = st.builds(
+    Background,
+    path=st.sampled_from(["plan.png", "../plan.jpg"]),
+    pixels=st.tuples(st.integers(1, 4000), st.integers(1, 4000)),
+    scale=st.floats(1e-4, 10.0),
+    corner=anywhere,
+    turn=st.floats(-180.0, 180.0).map(lambda x: x + 0.0),
+    opacity=st.floats(0.0, 1.0).map(lambda x: x + 0.0),
+    shown=st.booleans(),
+)
+
+
+@st.composite
+def drafts(draw, of_shapes=None):
+    """Sketches of all kinds, many of them broken."""
+    held = draw(st.lists(shapes() if of_shapes is None else of_shapes, max_size=5))
+    notes = draw(st.lists(st.sampled_from(["", "", "ask Ada", "2 m high"]), min_size=5, max_size=5))
+    return Sketch(
+        name=draw(st.sampled_from(["Hall", "", "Büro 1"])),
+        description=draw(st.sampled_from(["", "One floor."])),
+        boundary=draw(st.one_of(st.none(), st.just(HALL), rings())),
+        obstacles=tuple(Item(k, shape, notes[k]) for k, shape in enumerate(held)),
+        starts=tuple(
+            draw(st.dictionaries(st.sampled_from(["corner", "a b", "start"]), starts, max_size=2)).items()
+        ),
+        background=draw(st.one_of(st.none(), backgrounds)),
+        extra=draw(st.dictionaries(st.sampled_from(["mine", "other"]), json_values, max_size=2)),
+        schema=draw(st.sampled_from([None, "map.schema.json"])),
+    )
+
+
+@st.composite
+def sound_sketches(draw, least=0, most=5):
+    """Sketches whose parts are sound, in a hall; starts may still be blocked."""
+    held = draw(st.lists(sound_shapes(), min_size=least, max_size=most))
+    return Sketch(
+        name="Hall",
+        boundary=HALL,
+        obstacles=tuple(Item(k, shape) for k, shape in enumerate(held)),
+        starts=draw(
+            st.sampled_from(
+                [
+                    (),
+                    (("corner", DiscStart((1.0, 1.0), 0.8)),),
+                    (("two", PointsStart(((1.0, 1.0), (2.0, 1.0)))), ("all", UniformStart())),
+                ]
+            )
+        ),
+    )
+
+
+@st.composite
+def selections(draw, sketch):
+    """Parts of a sketch."""
+    keys = [item.key for item in sketch.obstacles]
+    chosen = draw(st.sets(st.sampled_from(keys), max_size=4)) if keys else set()
+    named = [name for name, _ in sketch.starts if draw(st.booleans())]
+    handles = [vertex for owner in (BOUNDARY, *keys, *named) for vertex, _ in points_of(sketch, owner)]
+    picked = draw(st.sets(st.sampled_from(handles), max_size=3)) if handles and draw(st.booleans()) else set()
+    boundary = sketch.boundary is not None and draw(st.integers(0, 4)) == 0
+    return Selection(frozenset(chosen), frozenset(picked), frozenset(named), boundary)
+
+
+_SOME_LENGTHS = st.sampled_from([0.05, 0.1, 0.3, 1.0, 2.5])
+_SHIFTS = st.sampled_from([-1.3, -0.1, 0.0, 0.0333, 0.7, 3.0])
+
+
+@st.composite
+def changes(draw, sketch):
+    """A change of a sketch by anything that the editor can do; None where it cannot be done."""
+    selection = draw(selections(sketch))
+    owners = [*(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
+    owner = draw(st.sampled_from(owners)) if owners else BOUNDARY
+    a, b = draw(places), draw(places)
+    length, dx, dy = draw(_SOME_LENGTHS), draw(_SHIFTS), draw(_SHIFTS)
+    degrees = draw(st.sampled_from([90.0, -45.0, 30.0, 7.3, 180.0]))
+    factor = draw(st.sampled_from([0.5, 2.0, -1.0, 1.37]))
+    side = draw(st.sampled_from(arranging.SIDES))
+    axis = draw(st.sampled_from(["x", "y"]))
+    edges = [
+        Edge(each, ring, k, points[k])
+        for each in (BOUNDARY, *(item.key for item in sketch.obstacles))
+        for ring, points, _ in rings_of(sketch, each)
+        for k in range(len(points))
+    ]
+    edge = draw(st.sampled_from(edges)) if edges else Edge(BOUNDARY, 0, 0, a)
+    handles = sorted(selection.vertices, key=str) or [vertex for vertex, _ in points_of(sketch, owner)][:1]
+    key = owner if isinstance(owner, int) else 0
+    deeds = [
+        lambda: edits.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
+        lambda: edits.rectangle_drawn(sketch, a, b),
+        lambda: edits.circle_drawn(sketch, a, length),
+        lambda: edits.wall_drawn(sketch, [a, b], length),
+        lambda: edits.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
+        lambda: edits.disc_start_drawn(sketch, a, length),
+        lambda: edits.points_start_drawn(sketch, [a, b]),
+        lambda: edits.uniform_start_added(sketch),
+        lambda: edits.start_point_added(sketch, str(owner), a),
+        lambda: edits.moved(sketch, selection, dx, dy),
+        lambda: edits.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
+        lambda: edits.scaled(sketch, selection, factor, draw(st.sampled_from([None, 1.5])), a),
+        lambda: edits.resized(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
+        lambda: edits.placed(sketch, selection, a[0], None),
+        lambda: edits.mirrored(sketch, selection, axis),
+        lambda: edits.mirrored_across(sketch, selection, a, b),
+        lambda: edits.duplicated(sketch, selection, dx, dy),
+        lambda: edits.arrayed(sketch, selection, 2, 2, 1.0, 1.0),
+        lambda: edits.deleted(sketch, selection),
+        lambda: edits.renamed(sketch, owner, draw(st.sampled_from(["", "x", "start", "y" * 101]))),
+        lambda: edits.noted(sketch, selection, "a note"),
+        lambda: edits.titled(sketch, "another", "and its description"),
+        lambda: edits.widened(sketch, selection, length),
+        lambda: edits.sized(sketch, selection, length),
+        lambda: edits.raised(sketch, selection, draw(st.sampled_from(["top", "up", "down", "bottom"]))),
+        lambda: edits.start_first(sketch, str(owner)),
+        lambda: edits.start_replaced(sketch, str(owner), DiscStart(a, length)),
+        lambda: edits.made_polygons(sketch, selection),
+        lambda: edits.made_boundary(sketch, selection),
+        lambda: edits.underlaid(sketch, Background("plan.png", (40, 30))),
+        lambda: vertices.moved(sketch, selection, dx, dy),
+        lambda: vertices.put(sketch, dict.fromkeys(handles, a)),
+        lambda: vertices.inserted(sketch, edge),
+        lambda: vertices.extended(sketch, handles[0], a) if handles else None,
+        lambda: vertices.deleted(sketch, selection),
+        lambda: vertices.bevelled(sketch, selection, length),
+        lambda: vertices.bevelled(sketch, selection, 0.05, segments=4),
+        lambda: vertices.rounded_off(sketch, selection, length),
+        lambda: vertices.edge_moved(sketch, edge, dx, dy),
+        lambda: vertices.edge_pushed(sketch, edge, length),
+        lambda: vertices.hole_cut(sketch, key, [a, b, (a[0], b[1])]) if key in sketch.places else None,
+        lambda: vertices.hole_filled(sketch, key, 1) if key in sketch.places else None,
+        lambda: vertices.split(sketch, handles[0]) if handles else None,
+        lambda: vertices.joined(sketch, selection),
+        lambda: vertices.reversed_order(sketch, owner),
+        lambda: booleans.united(sketch, selection),
+        lambda: booleans.subtracted(sketch, selection),
+        lambda: booleans.intersected(sketch, selection),
+        lambda: booleans.excluded(sketch, selection),
+        lambda: booleans.divided(sketch, selection),
+        lambda: booleans.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
+        lambda: booleans.clipped(sketch, selection),
+        lambda: booleans.repaired(sketch, selection),
+        lambda: simplifying.simplified(sketch, selection, length),
+        lambda: simplifying.straightened(sketch, selection, 20.0),
+        lambda: arranging.aligned(sketch, selection, side),
+        lambda: arranging.aligned(sketch, selection, side, to_boundary=True),
+        lambda: arranging.distributed(sketch, selection, axis),
+        lambda: arranging.distributed(sketch, selection, axis, gap=0.5),
+        lambda: arranging.distributed_centres(sketch, selection, axis),
+        lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),
+    ]
+    try:
+        return draw(st.sampled_from(deeds))()
+    except MapError as error:
+        assert "\n" not in str(error) and str(error)
+        return None

@@ -1,0 +1,136 @@
+"""An editor without a display, and hands for it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pygame
+from driven_window import MODIFIERS, Driver
+
+from robocov.mapfile import load_map
+from robocov_app.demo.opening import display
+from robocov_app.editor.desk import Desk
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.opening import DirectReadings
+from robocov_app.editor.paper import FIRST_SHEET, Paper
+from robocov_app.editor.pasteboard import OwnPasteboard
+from robocov_app.editor.selection import Selection
+from robocov_app.editor.window import EditorWindow
+
+SIZE = (900, 600)
+
+
+def sheet(*shapes: Any, **more: Any) -> Sketch:
+    """Return a sketch of 10 x 10 m with these obstacles."""
+    return Sketch(boundary=FIRST_SHEET, **more).added(shapes)[0]
+
+
+def of_map(name: str) -> Sketch:
+    return Sketch.from_environment(load_map(name))
+
+
+def touched(path: Path, text: str) -> None:
+    path.write_text(text)
+    stat = path.stat()
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10_000_000))
+
+
+@contextmanager
+def opened_editor(
+    folder: Path,
+    sketch: Sketch | None = None,
+    *,
+    size: tuple[int, int] = SIZE,
+    scale: float = 1.0,
+    drafts: Path | None = None,
+    paper: Paper | None = None,
+    theme: str = "light",
+    readings: Any = None,
+) -> Iterator[Hands]:
+    """Open the editor without a display."""
+    with display(headless=True):
+        if paper is None:
+            paper = Paper(sketch if sketch is not None else sheet(), drafts)
+        desk = Desk(paper, readings or DirectReadings(), OwnPasteboard(), folder)
+        desk.theme = theme
+        hands = Hands(EditorWindow(desk, size, scale, drafts, patient=True))
+        hands.settle()
+        hands.frames(2)
+        try:
+            yield hands
+        finally:
+            if pygame.display.get_init():  # another window may have ended it
+                pygame.key.set_mods(0)
+            hands.window.close()
+            desk.paper.close(discard=False)
+
+
+class Hands(Driver):
+    """Does to an editor what people do."""
+
+    window: EditorWindow
+
+    def __init__(self, window: EditorWindow) -> None:
+        self.window = window
+        self.desk = window.desk
+        self.at = (5, 5)
+
+    def settle(self) -> None:
+        """Let what was posted arrive, also while a map is tried."""
+        if self.window.trial is None:
+            super().settle()
+        for _ in range(4 if self.window.trial is not None else 0):
+            self.window.frame(0.0)
+
+    @property
+    def sketch(self) -> Sketch:
+        return self.desk.sketch
+
+    @property
+    def shapes(self) -> list[Any]:
+        return [item.shape for item in self.desk.sketch.obstacles]
+
+    def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
+        return self.window.arena.to_pixel(point)
+
+    def hold(self, *names: str) -> None:
+        """Hold keys down, or none."""
+        pygame.key.set_mods(sum(MODIFIERS[name] for name in names))
+
+    def go(self, *points: tuple[float, float], held: int = 0) -> None:
+        """Move to places, m."""
+        for point in points:
+            self.move(*self.pixel(point), held=held)
+
+    def click_all(self, *points: tuple[float, float]) -> None:
+        """Click places one after the other, too slowly for double clicks."""
+        for point in points:
+            self.wait()
+            self.click_at(point)
+
+    def twice(self, point: tuple[float, float]) -> None:
+        """Click a place twice, quickly."""
+        self.wait()
+        self.click_at(point)
+        self.click_at(point)
+
+    def wait(self, seconds: float = 0.5) -> None:
+        self.window.frame(seconds)
+
+    def select(self, *keys: Any) -> None:
+        self.desk.select(Selection.of(*keys))
+        self.settle()
+
+    def command(self, text: str) -> None:
+        """Type a command into the palette."""
+        self.key("ctrl+k")
+        self.type(text)
+        self.key("return")
+
+    @property
+    def said(self) -> str:
+        return self.desk.message

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drawn_sketches import HALL, sound_sketches
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.errors import MapError
+from robocov.starts import DiscStart, UniformStart
+from robocov_app.editor.arranging import SIDES, aligned, distributed, distributed_centres
+from robocov_app.editor.document import BOUNDARY, Sketch
+from robocov_app.editor.edits import bounds_of
+from robocov_app.editor.selection import Selection, Vertex, place_of
+
+
+def box(x, y, width, height):
+    return PolygonObstacle(((x, y), (x + width, y), (x + width, y + height), (x, y + height)))
+
+
+@pytest.fixture
+def sketch() -> Sketch:
+    shapes = [box(1.0, 1.0, 2.0, 1.0), CircleObstacle((5.0, 4.0), 0.5), box(8.0, 2.0, 1.0, 4.0)]
+    starts = (("disc", DiscStart((10.0, 7.0), 0.5)), ("all", UniformStart()))
+    return Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0]
+
+
+def boxes(sketch, owners):
+    return np.array([bounds_of(sketch, Selection.of(owner)) for owner in owners])
+
+
+LEVELS = {
+    "left": lambda b: b[..., 0],
+    "centre": lambda b: (b[..., 0] + b[..., 2]) / 2,
+    "right": lambda b: b[..., 2],
+    "top": lambda b: b[..., 3],
+    "middle": lambda b: (b[..., 1] + b[..., 3]) / 2,
+    "bottom": lambda b: b[..., 1],
+}
+
+
+@given(sound_sketches(least=2), st.sampled_from(SIDES), st.booleans())
+def test_what_is_aligned_is_level_and_moves_along_one_axis(sketch, side, to_boundary):
+    keys = [item.key for item in sketch.obstacles]
+    before = boxes(sketch, keys)
+    change = aligned(sketch, Selection.of(*keys), side, to_boundary=to_boundary)
+    after = boxes(change.sketch, keys)
+    levels = LEVELS[side](after)
+    frame = np.array([*before[:, :2].min(axis=0), *before[:, 2:].max(axis=0)])
+    if to_boundary:
+        frame = np.array([0.0, 0.0, 12.0, 8.0])
+    np.testing.assert_allclose(levels, LEVELS[side](frame), atol=1.5e-4)
+    still = [1, 3] if side in SIDES[:3] else [0, 2]
+    np.testing.assert_allclose(after[:, still], before[:, still], atol=1e-9)
+    np.testing.assert_allclose(after[:, 2:] - after[:, :2], before[:, 2:] - before[:, :2], atol=2.1e-4)
+
+
+@given(sound_sketches(least=3), st.sampled_from(["x", "y"]))
+def test_gaps_become_equal(sketch, axis):
+    keys = [item.key for item in sketch.obstacles]
+    a = ("x", "y").index(axis)
+    before = boxes(sketch, keys)
+    order = sorted(range(len(keys)), key=lambda k: (before[k, a], before[k, a + 2]))
+    after = boxes(distributed(sketch, Selection.of(*keys), axis).sketch, keys)[order]
+    gaps = after[1:, a] - after[:-1, a + 2]
+    np.testing.assert_allclose(gaps, gaps.mean(), atol=4e-4)
+    np.testing.assert_allclose(after[0], before[order[0]])
+    np.testing.assert_allclose(after[-1], before[order[-1]], atol=4e-4)
+    np.testing.assert_allclose(after[:, 1 - a], before[order, 1 - a], atol=1e-9)
+    given_gap = boxes(distributed(sketch, Selection.of(*keys), axis, gap=0.25).sketch, keys)[order]
+    np.testing.assert_allclose(given_gap[1:, a] - given_gap[:-1, a + 2], 0.25, atol=4e-4)
+    centres = boxes(distributed_centres(sketch, Selection.of(*keys), axis).sketch, keys)
+    steps = np.diff(np.sort(LEVELS["centre" if a == 0 else "middle"](centres)))
+    np.testing.assert_allclose(steps, steps.mean(), atol=4e-4)
+
+
+def test_starts_are_aligned_too_and_the_boundary_stays(sketch):
+    change = aligned(sketch, Selection.of(0, "disc", "all"), "left")
+    assert change.sketch.start("disc") == DiscStart((1.5, 7.0), 0.5)
+    assert change.words == "2 things aligned at the left"
+    change = aligned(sketch, Selection.of(1, BOUNDARY), "middle")
+    assert change.sketch.item(1).shape.center == (5.0, 4.0)
+    change = aligned(sketch, Selection.of(1, BOUNDARY), "right")
+    assert change.sketch.item(1).shape.center == (11.5, 4.0)
+    assert change.sketch.boundary == HALL
+
+
+def test_single_vertices_are_aligned(sketch):
+    chosen = Selection(vertices=frozenset({Vertex(0, 0, 0), Vertex(2, 0, 1), Vertex(BOUNDARY, 0, 1)}))
+    change = aligned(sketch, chosen, "bottom")
+    assert [place_of(change.sketch, vertex)[1] for vertex in chosen.vertices] == [0.0] * 3
+    assert place_of(change.sketch, Vertex(0, 0, 0)) == (1.0, 0.0)
+    assert change.words == "3 vertices aligned at the bottom"
+    middle = aligned(sketch, chosen, "centre")
+    assert {place_of(middle.sketch, vertex)[0] for vertex in chosen.vertices} == {6.5}
+
+
+@pytest.mark.parametrize(
+    ("deed", "words"),
+    [
+        (lambda s: aligned(s, Selection.of(0), "left"), "two or more"),
+        (lambda s: aligned(s, Selection.of("all"), "left", to_boundary=True), "select obstacles or starts"),
+        (lambda s: aligned(s, Selection.of(0, 1), "up"), "one of left"),
+        (
+            lambda s: aligned(s, Selection(vertices=frozenset({Vertex(0, 0, 0)})), "left"),
+            "two or more vertices",
+        ),
+        (lambda s: distributed(s, Selection.of(0, 1), "x"), "three or more"),
+        (lambda s: distributed(s, Selection.of(0), "x", gap=1.0), "two or more"),
+        (lambda s: distributed(s, Selection.of(0, 1, 2), "z"), "an axis"),
+        (lambda s: distributed_centres(s, Selection.of(0, 1), "x"), "three or more"),
+    ],
+)
+def test_what_cannot_be_arranged_is_said(sketch, deed, words):
+    with pytest.raises(MapError, match=words):
+        deed(sketch)
+
+
+def test_there_must_be_a_boundary_to_align_with(sketch):
+    without, keys = Sketch().added([box(0.0, 0.0, 1.0, 1.0)])
+    with pytest.raises(MapError, match="no boundary"):
+        aligned(without, Selection.of(*keys), "left", to_boundary=True)

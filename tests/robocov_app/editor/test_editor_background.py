@@ -1,0 +1,133 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from drawn_sketches import anywhere, backgrounds
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.errors import MapError
+from robocov_app.editor.background import (
+    Background,
+    levelled,
+    picture_laid,
+    shifted,
+    to_scale,
+    turned,
+)
+
+PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
+
+
+@given(backgrounds, st.floats(-100, 5000), st.floats(-100, 5000))
+def test_pixels_and_places_belong_together(background, x, y):
+    place = background.place_of((x, y))
+    size = max(1.0, *map(abs, background.corner), *map(abs, place)) / background.scale
+    assert background.pixel_at(place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
+
+
+def test_pixels_count_downwards_from_the_upper_left_corner():
+    assert PLAN.place_of((0, 300)) == (1.0, 2.0)
+    assert PLAN.place_of((400, 0)) == (21.0, 17.0)
+    assert PLAN.corners == ((1.0, 2.0), (21.0, 2.0), (21.0, 17.0), (1.0, 17.0))
+    upright = replace(PLAN, turn=90.0)
+    assert upright.place_of((400, 300)) == pytest.approx((1.0, 22.0))
+
+
+@given(backgrounds)
+def test_a_document_gives_it_back(background):
+    assert Background.of_document(background.document()) == background
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"path": ""},
+        {"path": 3},
+        {"pixels": [0, 10]},
+        {"pixels": [1e3, 10.5]},
+        {"pixels": [10]},
+        {"pixels": [100_000, 100_000]},
+        {"scale": 0},
+        {"scale": "1"},
+        {"corner": [1, None]},
+        {"opacity": 1.5},
+        {"shown": 1},
+        {"turn": math.nan},
+        {"more": 1},
+    ],
+)
+def test_what_is_none_is_none(change):
+    assert Background.of_document({**PLAN.document(), **change}) is None
+    assert Background.of_document([]) is None
+
+
+def test_a_picture_is_laid_as_wide_as_asked():
+    background = picture_laid("plan.png", (400, 300), 10.0)
+    assert background.scale == 0.025
+    assert background.corners[2] == pytest.approx((10.0, 7.5))
+    with pytest.raises(MapError, match="million pixels"):
+        picture_laid("plan.png", (100_000, 1_000))
+    with pytest.raises(MapError, match="0 x 5 pixels"):
+        picture_laid("plan.png", (0, 5))
+
+
+places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
+
+
+@given(backgrounds, st.tuples(st.integers(0, 99), st.integers(0, 99)), st.sampled_from([0.1, 2.5, 40.0]))
+def test_two_clicked_points_come_to_be_so_far_apart(background, offset, metres):
+    background = replace(background, corner=(3.0, -2.0), scale=0.02)
+    a, b = background.place_of((0, 0)), background.place_of((offset[0] + 5, offset[1]))
+    pixel_a, pixel_b = background.pixel_at(a), background.pixel_at(b)
+    scaled = to_scale(background, a, b, metres)
+    assert math.dist(scaled.place_of(pixel_a), scaled.place_of(pixel_b)) == pytest.approx(metres)
+    assert scaled.place_of(pixel_a) == pytest.approx(a, abs=1e-6)
+    assert scaled.turn == background.turn
+
+
+def test_what_gives_no_scale_is_said():
+    for a, b, metres, words in [
+        ((1.0, 1.0), (1.01, 1.0), 3.0, "farther apart"),
+        ((1.0, 1.0), (5.0, 1.0), 0.0, "above 0 m"),
+        ((1.0, 1.0), (5.0, 1.0), math.inf, "above 0 m"),
+        ((1.0, 1.0), (5.0, 1.0), 1e9, "is 1e\\+09 m right"),
+    ]:
+        with pytest.raises(MapError, match=words):
+            to_scale(PLAN, a, b, metres)
+    with pytest.raises(MapError, match="farther apart"):
+        levelled(PLAN, (1.0, 1.0), (1.0, 1.0))
+
+
+@given(backgrounds, anywhere, st.floats(-720, 720))
+def test_turning_keeps_the_point_and_the_lengths(background, about, degrees):
+    background = replace(background, scale=0.02, corner=(1.0, 2.0))
+    about = (about[0] / 1e5, about[1] / 1e5)
+    after = turned(background, degrees, about)
+    assert after.place_of(background.pixel_at(about)) == pytest.approx(about, abs=1e-6)
+    assert -180.0 <= after.turn <= 180.0
+    a, b = background.place_of((0, 0)), after.place_of((0, 0))
+    assert math.dist(a, about) == pytest.approx(math.dist(b, about), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("b", "level"),
+    [((9.0, 1.5), "x"), ((1.5, 9.0), "y"), ((-9.0, 0.2), "x"), ((0.5, -9.0), "y")],
+)
+def test_a_plan_that_was_scanned_askew_becomes_level(b, level):
+    a = (1.0, 1.0)
+    background = replace(PLAN, turn=12.0)
+    after = levelled(background, a, b)
+    first, second = (after.place_of(background.pixel_at(place)) for place in (a, b))
+    assert first == pytest.approx(a)
+    k = 1 if level == "x" else 0
+    assert second[k] == pytest.approx(first[k], abs=1e-9)
+    assert abs(math.remainder(after.turn - background.turn, 360.0)) <= 45.0
+    # and it points the same way as before
+    assert (second[1 - k] > first[1 - k]) == (b[1 - k] > a[1 - k])
+
+
+def test_it_is_moved_by_two_points():
+    assert shifted(PLAN, (1.0, 1.0), (3.0, 0.5)).corner == (3.0, 1.5)

@@ -1,0 +1,231 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, sound_shapes, sound_sketches
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov_app.editor import booleans, edits
+from robocov_app.editor.document import Item, Sketch
+from robocov_app.editor.outlines import outlines
+from robocov_app.editor.problems import problems
+from robocov_app.editor.selection import Selection
+
+
+def covered(sketch: Sketch) -> shapely.Geometry:
+    return shapely.union_all([item.shape.polygon for item in sketch.obstacles])
+
+
+def box(x, y, width, height):
+    return PolygonObstacle(((x, y), (x + width, y), (x + width, y + height), (x, y + height)))
+
+
+WANTED = {
+    "united": lambda counts: counts >= 1,
+    "intersected": lambda counts: counts.min(axis=0) == counts.max(axis=0),
+    "excluded": lambda counts: counts % 2 == 1,
+}
+
+
+@settings(max_examples=150)
+@given(
+    st.lists(sound_shapes(), min_size=2, max_size=4),
+    st.sampled_from(["united", "subtracted", "intersected", "excluded", "divided"]),
+)
+def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shapes, name):
+    sketch, keys = Sketch("n", boundary=HALL).added(shapes)
+    raw = [shape.polygon for shape in shapes]
+    first, others = raw[0], shapely.union_all(raw[1:])
+    wanted = {
+        "united": shapely.union_all(raw),
+        "subtracted": first - others,
+        "intersected": shapely.intersection_all(raw),
+        "divided": first,
+    }
+    if name == "excluded":
+        wanted[name] = raw[0]
+        for shape in raw[1:]:
+            wanted[name] = wanted[name] ^ shape
+    perimeter = sum(shape.length for shape in raw)
+    try:
+        change = getattr(booleans, name)(sketch, Selection.of(*keys))
+    except MapError:
+        assert wanted[name].area < 1e-3 * perimeter
+        return
+    results = [change.sketch.item(key).shape for key in change.selection.items]
+    assert len(results) == len(change.sketch.obstacles)
+    # every vertex may move by half of a tenth of a millimetre each way, and crumbs go
+    assert sum(shape.polygon.area for shape in results) == pytest.approx(
+        wanted[name].area, abs=2e-4 * perimeter
+    )
+    for shape in results:
+        assert isinstance(shape, PolygonObstacle)
+        assert shape.polygon.is_valid
+        assert shape.name == shapes[0].name
+        for ring in (shape.vertices, *shape.holes):
+            assert ring[0] != ring[-1]
+            assert all(value == round(value, 4) for point in ring for value in point)
+    assert not [problem for problem in problems(change.sketch) if problem.grave and problem.of in keys]
+    # by places: in as many of the shapes as it takes, but for a hair's breadth at the edges
+    rng = np.random.default_rng(0)
+    low_x, low_y, high_x, high_y = shapely.union_all(raw).bounds
+    points = shapely.points(rng.uniform((low_x, low_y), (high_x, high_y), size=(200, 2)))
+    edges = shapely.union_all([shape.boundary for shape in raw])
+    points = points[shapely.distance(edges, points) > 1e-3]
+    inside = np.array([shapely.contains(shape, points) for shape in raw])
+    expected = {
+        "united": inside.any(axis=0),
+        "subtracted": inside[0] & ~inside[1:].any(axis=0),
+        "intersected": inside.all(axis=0),
+        "excluded": inside.sum(axis=0) % 2 == 1,
+        "divided": inside[0],
+    }[name]
+    np.testing.assert_array_equal(shapely.contains(covered(change.sketch), points), expected)
+
+
+def test_holes_stay():
+    frame = PolygonObstacle(
+        ((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)),
+        (((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)),),
+        "f",
+    )
+    sketch, (a, b) = Sketch(boundary=HALL).added([frame, box(4.5, 2.5, 2.0, 1.0)])
+    change = booleans.united(sketch, Selection.of(a, b))
+    (item,) = change.sketch.obstacles
+    assert len(item.shape.holes) == 1
+    assert item.shape.polygon.area == pytest.approx(12.0 + 1.5)
+    assert change.words == "2 obstacles united"
+    cut = booleans.subtracted(change.sketch.added([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
+    assert cut.selection
+    # from a plate, a smaller one cuts a hole
+    sketch, keys = Sketch().added([box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
+    (item,) = booleans.subtracted(sketch, Selection.of(*keys)).sketch.obstacles
+    assert len(item.shape.holes) == 1
+    assert item.shape.polygon.area == pytest.approx(16.0 - np.pi, abs=5e-3)
+
+
+def test_the_result_takes_the_place_of_the_lowest():
+    sketch = Sketch(
+        obstacles=(
+            Item(5, CircleObstacle((9.0, 9.0), 0.5, "other")),
+            Item(3, replace(box(0.0, 0.0, 3.0, 1.0), name="desk"), "oak"),
+            Item(9, CircleObstacle((9.0, 1.0), 0.5, "another")),
+            Item(4, replace(box(1.0, -1.0, 1.0, 3.0), name="knife")),
+        )
+    )
+    change = booleans.subtracted(sketch, Selection.of(4, 3))
+    assert change.words == "1 obstacle cut out of polygon “desk”"
+    keys = [item.key for item in change.sketch.obstacles]
+    assert keys[:2] == [5, 3]
+    assert keys[3] == 9
+    left, right = change.sketch.obstacles[1:3]
+    assert (left.shape.name, left.note, right.shape.name, right.note) == ("desk", "oak", "desk", "oak")
+    assert change.selection == Selection.of(left.key, right.key)
+    assert len({*keys}) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "shapes", "words"),
+    [
+        ("united", [box(0.0, 0.0, 1.0, 1.0)], "select two or more obstacles to unite"),
+        ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(2.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
+        ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(1.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
+        ("subtracted", [box(0.2, 0.2, 0.5, 0.5), box(0.0, 0.0, 1.0, 1.0)], "nothing is left of polygon"),
+        ("excluded", [box(0.0, 0.0, 1.0, 1.0)] * 2, "nothing is left: they cover the same"),
+        ("united", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
+    ],
+)
+def test_what_cannot_be_is_said(name, shapes, words):
+    sketch, keys = Sketch().added(shapes)
+    with pytest.raises(MapError, match=words):
+        getattr(booleans, name)(sketch, Selection.of(*keys))
+
+
+@given(sound_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
+def test_an_offset_is_as_far_away_as_asked(shape, by):
+    sketch, (key,) = Sketch().added([shape])
+    before = shape.polygon
+    try:
+        change = booleans.offset(sketch, Selection.of(key), by)
+    except MapError as error:
+        assert "nothing would be left" in str(error)
+        assert by < 0
+        assert before.buffer(by).area < 0.01
+        return
+    after = covered(change.sketch)
+    if by > 0:
+        assert after.buffer(2e-3).covers(before.buffer(by * 0.99))
+        # sharp corners are cut off half as far again, which leaves two farther out; holes may close
+        outline = shapely.Polygon(before.exterior)
+        assert outline.buffer(2.0 * by + 2e-3).covers(after)
+    else:
+        assert before.buffer(by * 0.99 + 2e-3).covers(after.buffer(-1e-3))
+    assert after.area > 0.0
+    if isinstance(shape, CircleObstacle):
+        assert change.sketch.item(key).shape.radius == pytest.approx(shape.radius + by, abs=1e-4)
+
+
+def test_what_sticks_out_is_cut_off():
+    shapes = [
+        CircleObstacle((5.0, 4.0), 1.0, "inside"),
+        CircleObstacle((12.0, 4.0), 1.0, "half"),
+        CircleObstacle((30.0, 4.0), 1.0, "outside"),
+    ]
+    sketch, _ = Sketch(boundary=HALL).added(shapes)
+    change = booleans.clipped(sketch, Selection())
+    assert change.words == "2 obstacles cut off at the boundary"
+    inside, half = change.sketch.obstacles
+    assert inside is sketch.obstacles[0]
+    assert half.shape.polygon.area == pytest.approx(np.pi / 2, abs=5e-3)
+    assert shapely.Polygon(HALL).covers(half.geometry)
+    with pytest.raises(MapError, match="nothing sticks out"):
+        booleans.clipped(change.sketch, Selection())
+    with pytest.raises(MapError, match="boundary must be sound"):
+        booleans.clipped(replace(sketch, boundary=None), Selection())
+
+
+def test_crossing_outlines_are_repaired():
+    bow_tie = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
+    sketch = Sketch("n", boundary=((0.0, 0.0), (8.0, 8.0), (8.0, 0.0), (0.0, 8.0), (0.0, 7.0)))
+    sketch, keys = sketch.added([PolygonObstacle(bow_tie, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)])
+    change = booleans.repaired(sketch, Selection())
+    assert change.words == "2 outlines repaired"
+    assert not [problem for problem in problems(change.sketch) if problem.grave]
+    assert sum(item.geometry.area for item in change.sketch.obstacles[:2]) == pytest.approx(2.0)
+    assert change.sketch.obstacles[-1] is sketch.obstacles[-1]
+    assert change.selection.boundary
+    with pytest.raises(MapError, match="nothing to repair"):
+        booleans.repaired(change.sketch, Selection())
+    # of what is selected only
+    only = booleans.repaired(sketch, Selection.of(keys[0]))
+    assert only.sketch.boundary == sketch.boundary
+
+
+@given(sound_sketches(least=1))
+def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
+    keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
+    assume(keys)
+    change = edits.made_polygons(sketch, Selection.of(*keys))
+    assert all(isinstance(item.shape, PolygonObstacle) for item in change.sketch.obstacles)
+    difference = covered(change.sketch) ^ covered(sketch)
+    assert difference.area <= 1e-4 * sum(item.geometry.length for item in sketch.obstacles)
+
+
+def test_outlines_are_valid_on_their_grid():
+    # a spike thinner than the grid, a crumb, and a hole no wider than a millimetre
+    spike = shapely.Polygon([(0, 0), (1, 0), (1, 0.5), (1.3, 0.50001), (1, 0.50002), (1, 1), (0, 1)])
+    (shape,) = outlines(spike)
+    assert shape.polygon.is_valid
+    assert len(shape.vertices) == 4
+    assert outlines(shapely.box(0, 0, 0.0005, 5.0)) == ()
+    slit = shapely.box(0, 0, 1, 1) - shapely.box(0.5, 0.2, 0.5004, 0.8)
+    assert outlines(slit)[0].holes == ()
+    assert outlines(shapely.LineString([(0, 0), (1, 1)])) == ()
+    collinear = shapely.Polygon([(0, 0), (0.5, 0), (1, 0), (1, 1), (0, 1)])
+    assert len(outlines(collinear)[0].vertices) == 4

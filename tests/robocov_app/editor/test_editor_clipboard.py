@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+from drawn_sketches import HALL, drafts, sound_sketches
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.mapfile import dump_map, load_map
+from robocov.starts import DiscStart, UniformStart
+from robocov_app.editor import edits
+from robocov_app.editor.clipboard import copied, pasted
+from robocov_app.editor.document import Sketch, sketch_text
+from robocov_app.editor.selection import Selection
+
+BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
+PILLAR = CircleObstacle((6.0, 4.0), 0.5)
+
+
+@settings(max_examples=80)
+@given(st.one_of(drafts(), sound_sketches(least=1)))
+def test_what_is_copied_comes_back(sketch):
+    everything = Selection.all(sketch)
+    assume(everything)
+    text = copied(sketch, everything)
+    json.loads(text)
+    change = pasted(Sketch(), text)
+    after = change.sketch
+    assert [item.shape for item in after.obstacles] == [item.shape for item in sketch.obstacles]
+    assert [item.note for item in after.obstacles] == [item.note for item in sketch.obstacles]
+    assert after.starts == sketch.starts
+    assert after.boundary == sketch.boundary
+    assert change.selection == Selection.all(after)
+    # between windows: the same text says the same of what was pasted
+    assert json.loads(copied(after, change.selection))["obstacles"] == json.loads(text)["obstacles"]
+
+
+@given(sound_sketches(least=1), st.sampled_from([(0.0, 0.0), (3.25, -1.5)]))
+def test_it_comes_where_the_cursor_is(sketch, at):
+    whole = Selection(frozenset(item.key for item in sketch.obstacles))
+    change = pasted(sketch, copied(sketch, whole), at)
+    low_x, low_y, high_x, high_y = edits.bounds_of(change.sketch, change.selection)
+    assert ((low_x + high_x) / 2, (low_y + high_y) / 2) == pytest.approx(at, abs=2e-4)
+    assert len(change.sketch.obstacles) == 2 * len(sketch.obstacles)
+    assert change.sketch.obstacles[: len(sketch.obstacles)] == sketch.obstacles
+    assert not change.selection.items & whole.items
+
+
+def test_names_of_starts_stay_apart_and_a_second_boundary_is_a_polygon():
+    sketch, _ = Sketch(boundary=HALL, starts=(("corner", DiscStart((1.0, 1.0), 0.8)),)).added([BOX])
+    change = pasted(sketch, copied(sketch, Selection.all(sketch)))
+    assert [name for name, _ in change.sketch.starts] == ["corner", "corner 2"]
+    assert change.sketch.boundary == HALL
+    assert change.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
+    assert change.words == "3 things pasted"
+
+
+def test_copying_nothing_is_said():
+    with pytest.raises(MapError, match="to copy"):
+        copied(Sketch(), Selection())
+    with pytest.raises(MapError, match="to copy"):
+        copied(Sketch(), Selection.of(99))
+
+
+def test_other_texts_can_be_pasted_too():
+    circle = pasted(Sketch(), '{"kind": "circle", "center": [1, 2], "radius": 0.5}')
+    assert circle.sketch.obstacles[0].shape == CircleObstacle((1.0, 2.0), 0.5)
+    two = pasted(
+        Sketch(),
+        '[{"kind": "wall", "points": [[0, 0], [1, 0]], "width": 0.1},'
+        ' {"kind": "circle", "center": [1, 2], "radius": 1}]',
+    )
+    assert two.words == "2 obstacles pasted"
+    assert isinstance(two.sketch.obstacles[0].shape, WallObstacle)
+    ring = pasted(Sketch(), " [[0, 0], [1, 0], [0.333333, 1]]")
+    assert ring.sketch.obstacles[0].shape == PolygonObstacle(((0.0, 0.0), (1.0, 0.0), (0.3333, 1.0)))
+    rooms = pasted(Sketch(), dump_map(load_map("rooms")))
+    assert len(rooms.sketch.obstacles) == len(load_map("rooms").obstacles)
+    assert rooms.sketch.boundary == load_map("rooms").boundary
+    draft = pasted(Sketch(), sketch_text(Sketch(starts=(("a", UniformStart()),))))
+    assert draft.sketch.starts == (("a", UniformStart()),)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "  \n",
+        "hello",
+        "https://example.org/[1]",
+        "{",
+        "[]",
+        "{}",
+        "[1, 2]",
+        "[[1, 2], 3]",
+        "[" * 5000,
+        '{"format": "robocov-clipboard"}',
+        '{"format": "robocov-clipboard", "version": 9}',
+        '{"format": "robocov-clipboard", "version": 1}',
+        '{"format": "other"}',
+        '{"kind": "circle"}',
+        '{"kind": "circle", "center": [1e300, 2], "radius": 0.5}',
+        '{"kind": "circle", "center": [NaN, 2], "radius": 0.5}',
+        '{"kind": "circle", "kind": "wall"}',
+    ],
+)
+def test_what_cannot_be_pasted_is_said_in_a_sentence(text):
+    with pytest.raises(MapError) as caught:
+        pasted(Sketch(boundary=HALL), text)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_pasted_or_refused(text):
+    try:
+        pasted(Sketch(), text)
+    except MapError as error:
+        assert "\n" not in str(error)

@@ -1,0 +1,317 @@
+from __future__ import annotations
+
+import difflib
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, anywhere, drafts, floats, json_values, shapes, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov_app.editor import vertices
+from robocov_app.editor.annotations import annotated, taken_apart
+from robocov_app.editor.background import Background
+from robocov_app.editor.document import (
+    BOUNDARY,
+    Item,
+    Sketch,
+    draft_document,
+    geometry_of,
+    parse_sketch,
+    sketch_of,
+    sketch_text,
+)
+from robocov_app.editor.selection import points_of
+
+EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
+
+
+# there and back
+
+
+@settings(max_examples=150)
+@given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), sound_sketches()))
+def test_a_sketch_comes_back_from_its_document(sketch):
+    document = draft_document(sketch)
+    again = sketch_of(json.loads(json.dumps(document)), "again")
+    assert again == sketch
+    assert draft_document(again) == document
+    assert list(draft_document(again)) == list(document)
+    assert hash(again) == hash(sketch)
+
+
+@settings(max_examples=60)
+@given(st.one_of(drafts(), sound_sketches()))
+def test_a_sketch_comes_back_from_its_text(sketch):
+    text = sketch_text(sketch)
+    assert parse_sketch(text.encode(), "again") == sketch
+    assert sketch_text(parse_sketch(text, "again")) == text
+
+
+@pytest.mark.parametrize("name", bundled_maps())
+def test_bundled_maps_pass_through_unchanged(name):
+    environment = load_map(name)
+    sketch = Sketch.from_environment(environment)
+    assert sketch.environment() == environment
+    assert list(sketch.environment().starts) == list(environment.starts)
+    assert draft_document(sketch) == to_json(environment)
+    assert sketch_text(sketch) == dump_map(environment)
+
+
+@given(sound_sketches())
+def test_what_runs_is_what_a_saved_map_is(sketch):
+    try:
+        environment = sketch.environment("here")
+    except MapError as error:
+        with pytest.raises(MapError, match="here") as caught:
+            parse_map(sketch_text(sketch), "here")
+        assert str(caught.value).split(": ", 1)[1] == str(error).split(": ", 1)[1]
+    else:
+        assert parse_map(sketch_text(sketch), "here") == environment
+
+
+def test_keys_are_not_in_the_file():
+    sketch = Sketch(
+        obstacles=(Item(7, CircleObstacle((1.0, 1.0), 0.5), "old"), Item(3, WallObstacle((), 0.1)))
+    )
+    again = sketch_of(draft_document(sketch))
+    assert [item.key for item in again.obstacles] == [0, 1]
+    assert again == sketch.renumbered()
+
+
+def test_a_number_too_long_for_a_map_is_still_a_draft():
+    sketch = Sketch(boundary=((0.0, 0.0), (1e300, 0.0), (0.0, 1e-300)))
+    assert sketch_of(json.loads(json.dumps(draft_document(sketch)))) == sketch
+    with pytest.raises(MapError, match="boundary"):
+        sketch.environment()
+
+
+# what is no draft
+
+
+@pytest.mark.parametrize(
+    ("document", "words"),
+    [
+        ([], "a JSON object with a map was wanted"),
+        ({"format": "geojson"}, 'format: "geojson"'),
+        ({**EMPTY, "version": 2}, "newer robocov"),
+        ({**EMPTY, "name": 3}, "name: 3, but a text was wanted"),
+        ({**EMPTY, "nmae": "x"}, "unknown key 'nmae': did you mean 'name'"),
+        ({**EMPTY, "boundary": "x"}, 'boundary: "x", but a list of points'),
+        ({**EMPTY, "boundary": [[0, 0], [1, "2"]]}, r"boundary\[1\]\[1\]: \"2\", but a number"),
+        ({**EMPTY, "boundary": [[0, 0, 0]]}, r"boundary\[0\]: .*but a point"),
+        ({**EMPTY, "boundary": [[0, True]]}, r"boundary\[0\]\[1\]: true, but a number"),
+        ({**EMPTY, "obstacles": {}}, "obstacles: {}, but a list of obstacles"),
+        ({**EMPTY, "obstacles": [3]}, r"obstacles\[0\]: 3, but an object whose kind"),
+        ({**EMPTY, "obstacles": [{"kind": "box"}]}, r"obstacles\[0\]\.kind: \"box\""),
+        ({**EMPTY, "obstacles": [{"kind": "circle", "center": [0, 0]}]}, r"obstacles\[0\]\.radius: missing"),
+        ({**EMPTY, "obstacles": [{"kind": "wall", "points": [], "width": 1, "x": 1}]}, "unknown key 'x'"),
+        ({**EMPTY, "starts": {"a": {"kind": "disc"}}}, r"starts\.a\.center: missing"),
+        ({**EMPTY, "starts": []}, "starts: \\[\\], but an object"),
+        ({**EMPTY, "extra": 1}, "extra: 1, but an object"),
+        ({**EMPTY, "boundary": [[0, float("nan")]]}, "finite"),
+    ],
+)
+def test_what_is_made_differently_is_refused_with_its_place(document, words):
+    with pytest.raises(MapError, match=words) as caught:
+        sketch_of(document, "mine.json")
+    assert str(caught.value).startswith("mine.json: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_errors_in_text_have_lines():
+    text = '{\n "format": "robocov-map",\n "version": 1,\n "boundary": [[0, "x"]]\n}'
+    with pytest.raises(MapError, match=r"mine.json:4:19: boundary\[0\]\[1\]"):
+        parse_sketch(text, "mine.json")
+    with pytest.raises(MapError, match=r"mine\.json:1:1: .*not JSON"):
+        parse_sketch("# a map", "mine.json")
+
+
+def test_almost_nothing_is_a_draft():
+    sketch = sketch_of({"format": "robocov-map", "version": 1})
+    assert sketch == Sketch(name="")
+    assert sketch.bounds is None
+
+
+# files that compare well
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_moving_a_vertex_changes_one_line(data):
+    sketch = data.draw(sound_sketches(least=1))
+    owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
+    vertex, _ = data.draw(st.sampled_from(points_of(sketch, owner)))
+    to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))
+    moved = (to[0] / 10000, to[1] / 10000)
+    before = sketch_text(sketch).splitlines()
+    after = sketch_text(vertices.put(sketch, {vertex: moved}).sketch).splitlines()
+    changed = [line for line in difflib.ndiff(before, after) if line[:2] in ("- ", "+ ")]
+    assert len(changed) <= 2
+    assert len(before) == len(after)
+
+
+def test_numbers_have_no_noise():
+    sketch = Sketch(boundary=((0.1 + 0.2, -0.0), (3.0, 1e-17), (0.5, 2.0)))
+    (line,) = [line for line in sketch_text(sketch).splitlines() if "boundary" in line]
+    assert line == '  "boundary": [[0.3, 0], [3, 0], [0.5, 2]],'
+
+
+# notes and what else lies in the free keys
+
+
+def noted() -> Sketch:
+    items = (
+        Item(0, CircleObstacle((1.0, 1.0), 0.5, "pillar"), "ask Ada"),
+        Item(1, CircleObstacle((3.0, 1.0), 0.5)),
+        Item(2, CircleObstacle((5.0, 1.0), 0.5), "no name"),
+    )
+    return Sketch("n", boundary=HALL, obstacles=items, background=Background("plan.png", (40, 30)))
+
+
+def test_notes_are_free_keys_of_a_map_that_runs():
+    environment = noted().environment()
+    assert environment.extra["editor"]["notes"] == [
+        {"obstacle": 0, "name": "pillar", "note": "ask Ada"},
+        {"obstacle": 2, "note": "no name"},
+    ]
+    assert environment.extra["editor"]["background"]["path"] == "plan.png"
+    assert Sketch.from_environment(environment) == noted()
+
+
+def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
+    document = draft_document(noted())
+    first, second, third = document["obstacles"]
+    document["obstacles"] = [second, third, first]
+    notes = [item.note for item in sketch_of(document).obstacles]
+    assert notes[2] == "ask Ada"
+    # one without a name is where it was
+    document["obstacles"] = [first]
+    again = sketch_of(document)
+    assert [item.note for item in again.obstacles] == ["ask Ada"]
+    # nothing is lost, even so
+    assert "no name" in json.dumps(again.extra)
+    assert sketch_of(draft_document(again)) == again
+
+
+@pytest.mark.parametrize(
+    "foreign",
+    [
+        "vim",
+        {"tab": 4},
+        {"notes": "mine"},
+        {"notes": [1]},
+        {"background": {"path": "x"}},
+        {"notes": [], "background": {"path": "plan.png"}},
+        {"notes": [{"obstacle": 0, "note": "x", "by": "somebody"}]},
+    ],
+)
+def test_what_others_keep_stays_untouched(foreign):
+    document = {**EMPTY, "boundary": [[0, 0], [1, 0], [0, 1]], "extra": {"editor": foreign, "mine": 1}}
+    sketch = sketch_of(document)
+    assert sketch.extra == {"editor": foreign, "mine": 1}
+    assert draft_document(sketch)["extra"] == document["extra"]
+    ours = replace(sketch, obstacles=noted().obstacles, background=noted().background)
+    again = sketch_of(json.loads(json.dumps(draft_document(ours))))
+    assert again == ours
+    assert again.extra == sketch.extra
+
+
+@given(st.dictionaries(st.sampled_from(["editor", "editor 2", "mine"]), json_values))
+def test_free_keys_with_notes_come_apart_again(extra):
+    notes, background, others = taken_apart(annotated(extra, {1: "x"}, ["a", "b"], None), ["a", "b"])
+    assert (notes, background) == ({1: "x"}, None)
+    # an empty object of the editor's own is none
+    assert {**others, **{key: {} for key in extra if key not in others}} == extra
+
+
+# shapes and parts
+
+
+@given(shapes())
+def test_every_shape_has_a_valid_geometry(shape):
+    geometry = geometry_of(shape)
+    assert geometry.is_valid
+    points = shapely.get_coordinates(geometry)
+    assert np.isfinite(points).all()
+
+
+def test_geometry_of_sound_shapes_is_theirs():
+    for shape in (
+        CircleObstacle((1.0, 2.0), 0.5),
+        WallObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.1),
+        PolygonObstacle(HALL, (((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)),)),
+    ):
+        assert geometry_of(shape).equals(shape.polygon)
+    bow_tie = PolygonObstacle(((0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)))
+    assert geometry_of(bow_tie).area == pytest.approx(2.0)
+    assert geometry_of(PolygonObstacle(())).is_empty
+
+
+def test_what_no_map_could_hold_covers_nothing():
+    # a circle of 1e12 m would be a polygon of millions of sides
+    for shape in (
+        CircleObstacle((1.0, 1.0), 1e12),
+        CircleObstacle((1e9, 1.0), 1.0),
+        PolygonObstacle(((0.0, 0.0), (1e200, 0.0), (0.0, 1e200))),
+        WallObstacle(((0.0, 0.0), (1.0, 0.0)), 1e100),
+        WallObstacle(((0.0, 0.0), (1e100, 0.0)), 1.0),
+    ):
+        assert geometry_of(shape).area == 0.0
+    holed = PolygonObstacle(HALL, (((1.0, 1.0), (1e200, 0.0), (1.0, 2.0)),))
+    assert geometry_of(holed).area == pytest.approx(96.0)
+
+
+def test_parts_are_found_by_key():
+    sketch, (a, b) = Sketch().added([CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")])
+    assert sketch.item(b).note == "note"
+    assert sketch.fresh_key > max(a, b)
+    wider = sketch.with_shapes({b: WallObstacle(HALL, 0.2)})
+    assert wider.item(a) is sketch.item(a)
+    assert wider.item(b).shape == WallObstacle(HALL, 0.2)
+    assert wider.item(b).note == "note"
+    assert sketch.without([a]).obstacles == (sketch.item(b),)
+    with pytest.raises(KeyError):
+        sketch.item(99)
+    sketch = sketch.with_start("s", UniformStart()).with_start("t", UniformStart())
+    sketch = sketch.with_start("s", DiscStart((0.0, 0.0), 1.0))
+    assert sketch.starts == (("s", DiscStart((0.0, 0.0), 1.0)), ("t", UniformStart()))
+    assert sketch.start("t") == UniformStart()
+
+
+def test_bounds_hold_everything():
+    sketch = Sketch(
+        boundary=HALL,
+        obstacles=(Item(0, CircleObstacle((-1.0, 3.0), 2.0)),),
+        starts=(("a", DiscStart((12.0, 8.0), 1.0)), ("b", PointsStart(((3.0, -4.0),)))),
+        background=Background("p.png", (100, 100), 0.2, (0.0, 0.0)),
+    )
+    assert sketch.bounds == pytest.approx((-3.0, -4.0, 20.0, 20.0))
+    hidden = replace(sketch, background=replace(sketch.background, shown=False))
+    assert hidden.bounds == pytest.approx((-3.0, -4.0, 13.0, 9.0))
+
+
+def test_a_pickled_item_leaves_out_what_can_be_derived():
+    item = Item(0, CircleObstacle((1.0, 1.0), 0.5), "x")
+    bare = pickle.dumps(item)
+    assert item.geometry.area > 0.0
+    assert pickle.dumps(item) == bare
+    assert pickle.loads(bare) == item
+
+
+def test_an_environment_becomes_the_sketch_of_the_same_map():
+    environment = Environment(
+        "e", HALL, (CircleObstacle((1.0, 1.0), 0.5),), {"a": UniformStart()}, "d", {"k": 1}
+    )
+    sketch = Sketch.from_environment(environment)
+    assert (sketch.name, sketch.description, sketch.boundary) == ("e", "d", HALL)
+    assert sketch.extra == {"k": 1}
+    assert sketch.unchecked() == environment

@@ -1,0 +1,366 @@
+"""Documents opened, saved and left, with all the questions; and how the editor is opened."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pygame
+import pytest
+from called import complaint
+from driven_editor import Hands, opened_editor, sheet, touched
+from PIL import Image
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.errors import InputError
+from robocov.mapfile import load_map, save_map
+from robocov_app.cli import main
+from robocov_app.demo.settings import FOLDER
+from robocov_app.editor import edits
+from robocov_app.editor.asking import FileQuestion, Picker, Question
+from robocov_app.editor.drafts import FOLDER as DRAFTS
+from robocov_app.editor.drafts import left_behind
+from robocov_app.editor.opening import EditorOpening, offer
+from robocov_app.editor.paper import Paper
+
+
+@pytest.fixture
+def hands(tmp_path: Path) -> Iterator[Hands]:
+    with opened_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0)), drafts=tmp_path / "drafts") as driver:
+        yield driver
+
+
+def asked(hands: Hands) -> str:
+    return hands.desk.asked.title if hands.desk.asked is not None else ""
+
+
+def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
+    hands.key("ctrl+s")
+    assert asked(hands) == "Save as" and hands.desk.asked.text == "untitled.json"
+    hands.key("ctrl+backspace")
+    hands.type("plan")
+    hands.key("return")
+    assert hands.desk.asked is None and load_map(tmp_path / "plan.json").obstacles
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+s")
+    assert hands.desk.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
+    assert hands.desk.recent == [str(tmp_path / "plan.json")]
+
+
+def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path: Path) -> None:
+    (tmp_path / "mine.json").write_text("{}")
+    hands.key("ctrl+shift+s")
+    hands.key("ctrl+backspace")
+    hands.type("mine.json")
+    hands.key("return")
+    assert asked(hands) == "Replace the file?"
+    hands.key("escape")
+    assert (tmp_path / "mine.json").read_text() == "{}"
+    hands.key("ctrl+shift+s")
+    hands.key("ctrl+backspace")
+    hands.type("mine.json")
+    hands.key("return")
+    hands.key("r")
+    assert load_map(tmp_path / "mine.json").obstacles
+
+
+def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
+    hands.desk.change(edits.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.window.frame(0.0)
+    hands.key("ctrl+s")
+    hands.key("return")
+    assert "as a draft" in hands.said
+    assert Paper.opened(tmp_path / "untitled.json", None).history.sketch == hands.sketch.renumbered()
+
+
+def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    for name in ("nowhere/plan.json", "a\0b"):
+        hands.key("ctrl+s")
+        hands.key("ctrl+backspace")
+        hands.desk.asked.text = name
+        hands.key("return")
+        assert hands.desk.trouble and hands.desk.paper.unsaved, name
+
+
+def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+n")
+    assert asked(hands) == "Save the changes?"
+    hands.key("escape")
+    assert len(hands.shapes) == 2
+    hands.post(pygame.QUIT)
+    hands.settle()
+    assert asked(hands) == "Save the changes?" and not hands.window.closed
+    hands.key("s")
+    assert asked(hands) == "Save as"
+    hands.key("return")
+    assert hands.window.closed and (tmp_path / "untitled.json").exists()
+
+
+def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path: Path) -> None:
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+n")
+    hands.key("d")
+    assert hands.shapes == [] and hands.desk.paper.title == "Untitled"
+    assert left_behind(tmp_path / "drafts") == ()
+
+
+def test_answers_are_clicked_too(hands: Hands) -> None:
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+n")
+    hands.window.draw()
+    boxes = {k: box for box, k in hands.window.dialogs._boxes}
+    hands.click(*boxes[2].center)
+    assert hands.desk.asked is None and len(hands.shapes) == 2
+    hands.key("ctrl+n")
+    hands.window.draw()
+    hands.click(*boxes[1].center)
+    assert hands.shapes == []
+
+
+def test_the_mouse_over_a_list_that_has_gone_chooses_nothing_in_the_question_after_it(hands: Hands) -> None:
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+shift+o")
+    hands.window.draw()
+    box = max((box for box, k in hands.window.dialogs._boxes if k == 7), key=lambda box: box.width)
+    hands.post(pygame.KEYDOWN, key=pygame.K_RETURN, mod=0, unicode="\r", scancode=0)
+    hands.post(pygame.MOUSEMOTION, pos=box.center, rel=(1, 1), buttons=(0, 0, 0))
+    hands.settle()
+    assert asked(hands) == "Save the changes?" and hands.desk.asked.chosen == 0
+
+
+def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: Path) -> None:
+    save_map(load_map("l-shape"), tmp_path / "ell.json")
+    hands.key("ctrl+o")
+    assert isinstance(hands.desk.asked, FileQuestion)
+    hands.type("ell")
+    hands.key("tab")
+    hands.key("return")
+    assert hands.desk.paper.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
+    hands.key("ctrl+shift+o")
+    assert isinstance(hands.desk.asked, Picker)
+    hands.type("rooms")
+    hands.key("return")
+    assert hands.desk.paper.path is None and len(hands.shapes) == 18
+    hands.key("ctrl+o")
+    hands.type("missing.txt")
+    hands.key("return")
+    assert hands.desk.trouble and len(hands.shapes) == 18
+    (tmp_path / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": 3}')
+    hands.key("ctrl+o")
+    hands.type("bad.json")
+    hands.key("return")
+    assert hands.desk.trouble and "bad.json" in hands.said and len(hands.shapes) == 18
+
+
+def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Path) -> None:
+    hands.key("ctrl+s")
+    hands.key("return")
+    path = tmp_path / "untitled.json"
+    document = json.loads(path.read_text())
+    document["obstacles"] = []
+    touched(path, json.dumps(document))
+    hands.window.frame(2.0)
+    hands.window.frame(2.0)
+    assert asked(hands) == "The file has changed"
+    hands.key("r")
+    assert hands.shapes == [] and not hands.desk.paper.unsaved
+    hands.key("ctrl+z")
+    assert len(hands.shapes) == 1
+    touched(path, json.dumps({**document, "name": "Again"}))
+    hands.window.frame(2.0)
+    hands.window.frame(2.0)
+    hands.key("k")
+    assert len(hands.shapes) == 1 and hands.desk.paper.unsaved
+    hands.key("ctrl+s")
+    assert len(load_map(path).obstacles) == 1
+    path.unlink()
+    hands.window.frame(2.0)
+    hands.window.frame(2.0)
+    assert "no longer there" in hands.said
+
+
+def test_a_picture_is_laid_under_by_its_path_from_the_map(hands: Hands, tmp_path: Path) -> None:
+    Image.new("RGB", (400, 200)).save(tmp_path / "plan.png")
+    hands.key("ctrl+s")
+    hands.key("return")
+    hands.key("ctrl+b")
+    hands.type("plan.png")
+    hands.key("return")
+    assert hands.sketch.background.path == "plan.png"
+    (tmp_path / "no.png").write_text("no picture")
+    hands.key("ctrl+b")
+    hands.type("no.png")
+    hands.key("return")
+    assert hands.desk.trouble and "not a picture" in hands.said
+    hands.window.do("background:none")
+    assert hands.sketch.background is None
+
+
+def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
+    hands: Hands, tmp_path: Path
+) -> None:
+    hands.key("ctrl+e")
+    assert hands.desk.asked.text == "untitled.svg"
+    hands.key("return")
+    first = (tmp_path / "untitled.svg").read_text()
+    assert "<svg" in first and "exported" in hands.said and hands.desk.paper.path is None
+    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.key("ctrl+e")
+    hands.key("return")
+    assert asked(hands) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
+    hands.key("r")
+    assert (tmp_path / "untitled.svg").read_text() != first
+    hands.key("ctrl+e")
+    hands.key("ctrl+backspace")
+    hands.type("plan.xyz")
+    hands.key("return")
+    assert hands.desk.trouble and "unknown format" in hands.said
+    hands.desk.change(edits.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.key("ctrl+e")
+    assert hands.desk.trouble and hands.desk.asked is None
+
+
+def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
+    hands.key("ctrl+s")
+    hands.key("ctrl+backspace")
+    hands.type("plan.svg")
+    hands.key("return")
+    assert (tmp_path / "plan.svg.json").exists() and not (tmp_path / "plan.svg").exists()
+
+
+# how it is opened
+
+
+@pytest.fixture
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(FOLDER, str(tmp_path / "settings"))
+    monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    return tmp_path
+
+
+def opening(folder: Path, path: Path | None = None, **more: object) -> EditorOpening:
+    return EditorOpening(path, folder, size=(900, 600), scale=1.0, **more)
+
+
+def test_settings_are_remembered(places: Path) -> None:
+    with opening(places).window() as window:
+        window.desk.theme = "dark"
+        window.desk.attempt(lambda: window.desk.command("grid 0.25"))
+        window.desk.snaps.discard("edges")
+        window.panel.show_tab("snap")
+        window.documents.remember(places / "x.json")
+        window.documents.leaving = True
+    with opening(places).window() as window:
+        desk = window.desk
+        assert (desk.theme, desk.grid, window.panel.tab) == ("dark", 0.25, "snap")
+        assert "edges" not in desk.snaps and desk.recent == [str(places / "x.json")]
+
+
+def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
+    lost = Paper(sheet(), places / "drafts")
+    lost.history.do(edits.circle_drawn(lost.history.sketch, (5, 5), 1.0))
+    lost.keep()
+    lost.flush()
+    lost.close(discard=False)
+    with opening(places).window() as window:
+        assert isinstance(window.desk.asked, Question) and "Recover" in window.desk.asked.title
+        window.dialogs.key("r")
+        assert len(window.desk.sketch.obstacles) == 1 and window.desk.paper.unsaved
+    # the window went without a decision: it is offered again
+    with opening(places).window() as window:
+        assert window.desk.asked is not None
+        window.dialogs.key("l")
+        offer(window, left_behind(places / "drafts"))
+        window.dialogs.key("d")
+        window.documents.leaving = True
+    assert left_behind(places / "drafts") == ()
+
+
+def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -> None:
+    paper = Paper.new(places / "drafts")
+    paper.save(places / "plan.json")
+    paper.flush()
+    with (
+        pytest.raises(InputError, match="another editor has it open"),
+        opening(places, places / "plan.json").window(),
+    ):
+        pass
+    with opening(places).window() as window:
+        window.desk.attempt(lambda: window.documents.open(places / "plan.json"))
+        assert window.desk.trouble and "another editor" in window.desk.message
+        window.documents.leaving = True
+    paper.close(discard=True)
+
+
+def test_a_new_name_is_a_new_map(places: Path) -> None:
+    with opening(places, places / "fresh.json").window() as window:
+        assert window.desk.paper.title == "fresh.json" and not window.desk.paper.unsaved
+        window.desk.attempt(window.documents.save)
+        window.documents.leaving = True
+    assert load_map(places / "fresh.json").area == 100.0
+
+
+def test_pictures_without_a_display(places: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Image.new("RGB", (60, 40), (200, 0, 0)).save(places / "plan.png")
+    target = places / "shot.png"
+    words = ["edit", "rooms", "--screenshot", str(target), "--size", "900x600", "--scale", "1"]
+    assert (
+        main([*words, "--page", "problems", "--theme", "dark", "--background", str(places / "plan.png")]) == 0
+    )
+    assert capsys.readouterr().out == f"saved {target}\n"
+    with Image.open(target) as picture:
+        assert picture.size == (900, 600)
+
+
+def test_without_a_display_one_line_says_so(places: Path, monkeypatch, capsys) -> None:
+    for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    line = complaint(capsys, "edit", "rooms")
+    assert line.startswith("no display: the editor needs one") and "--screenshot" in line
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["roms"], "did you mean 'rooms'"),
+        (["nothing.dxf"], "no such file"),
+        (["--scale", "9"], "--scale"),
+        (["--size", "10x10"], "--size"),
+        (["--screenshot", "x.jpg"], "ending in .png"),
+    ],
+)
+def test_bad_options_are_one_line(places: Path, capsys, words: list[str], wanted: str) -> None:
+    assert wanted in complaint(capsys, "edit", *words)
+
+
+def test_a_broken_file_is_told_before_a_window_opens(places: Path, capsys) -> None:
+    (places / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
+    assert "boundery" in complaint(capsys, "edit", str(places / "bad.json"))
+    (places / "draft.json").write_text(
+        json.dumps({"format": "robocov-map", "version": 1, "name": "d", "boundary": [[0, 0], [1, 1]]})
+    )
+    target = places / "shot.png"
+    assert main(["edit", str(places / "draft.json"), "--screenshot", str(target)]) == 0
+
+
+def test_a_map_of_another_format_is_imported_with_its_report(places: Path) -> None:
+    plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
+    (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
+    with opening(places, places / "flat.json").window() as window:
+        assert window.desk.paper.path is None and window.desk.paper.unsaved
+        assert window.desk.asked is not None and "flat.json" in window.desk.asked.title
+        assert window.desk.sketch.boundary is not None
+        window.documents.leaving = True
+
+
+def test_the_polygon_that_was_drawn_is_in_the_file(hands: Hands, tmp_path: Path) -> None:
+    hands.key("p")
+    hands.click_all((1, 1), (3, 1), (3, 3))
+    hands.key("return")
+    hands.key("ctrl+s")
+    hands.key("return")
+    assert PolygonObstacle(((1, 1), (3, 1), (3, 3))) in load_map(tmp_path / "untitled.json").obstacles

@@ -1,0 +1,395 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, places, sound_shapes, sound_sketches
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely import affinity
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov_app.editor import edits
+from robocov_app.editor.affine import Affine
+from robocov_app.editor.background import Background
+from robocov_app.editor.document import BOUNDARY, Sketch
+from robocov_app.editor.plane import cos_sin, ring_near, rounded, tenths
+from robocov_app.editor.selection import Selection, Vertex
+
+BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
+PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")
+WALL = WallObstacle(((5.0, 0.0), (5.0, 2.4), (7.0, 2.4)), 0.1)
+STARTS = (
+    ("corner", DiscStart((1.0, 5.0), 0.8)),
+    ("two", PointsStart(((9.0, 1.0), (10.0, 1.0)))),
+    ("all", UniformStart()),
+)
+
+
+@pytest.fixture
+def sketch() -> Sketch:
+    return Sketch("Hall", boundary=HALL, starts=STARTS).added([BOX, PILLAR, WALL])[0]
+
+
+ALL = Selection(frozenset({0, 1, 2}), frozenset(), frozenset({"corner", "two", "all"}), True)
+
+
+# drawing
+
+
+def test_what_is_drawn_lies_on_top_and_is_selected(sketch):
+    change = edits.circle_drawn(sketch, (2.00004, 3.0), 0.70001)
+    item = change.sketch.obstacles[-1]
+    assert item.shape == CircleObstacle((2.0, 3.0), 0.7)
+    assert change.selection == Selection.of(item.key)
+    assert change.words == "circle drawn"
+    wall = edits.wall_drawn(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
+    assert wall.sketch.obstacles[-1].shape == WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15)
+    box = edits.rectangle_drawn(sketch, (3.0, 2.0), (1.0, 5.0))
+    assert box.sketch.obstacles[-1].shape.vertices == ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
+    ring = edits.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
+    assert ring.sketch.obstacles[-1].shape.vertices == ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    crossing = edits.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
+    assert len(crossing.sketch.obstacles) == 4
+
+
+def test_boundary_and_starts_are_drawn(sketch):
+    ring = [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0)]
+    assert edits.boundary_drawn(Sketch(), ring).words == "boundary drawn"
+    change = edits.boundary_drawn(sketch, ring)
+    assert change.sketch.boundary == tuple(ring)
+    assert change.selection == Selection(boundary=True)
+    assert change.words == "boundary drawn anew"
+    change = edits.disc_start_drawn(sketch, (2.0, 2.0), 0.5)
+    assert change.sketch.starts[-1] == ("start", DiscStart((2.0, 2.0), 0.5))
+    change = edits.disc_start_drawn(change.sketch, (2.0, 2.0), 0.5)
+    assert change.sketch.starts[-1][0] == "start 2"
+    assert change.selection == Selection.of("start 2")
+    change = edits.points_start_drawn(sketch, [(1.0, 1.0), (2.0, 1.0), (1.0, 1.00001)], "mine")
+    assert change.sketch.starts[-1] == ("mine", PointsStart(((1.0, 1.0), (2.0, 1.0))))
+    change = edits.start_point_added(change.sketch, "mine", (3.0, 1.0))
+    assert change.sketch.start("mine") == PointsStart(((1.0, 1.0), (2.0, 1.0), (3.0, 1.0)))
+    assert edits.uniform_start_added(sketch).sketch.start("start") == UniformStart()
+
+
+@pytest.mark.parametrize(
+    ("deed", "words"),
+    [
+        (lambda s: edits.polygon_drawn(s, [(0, 0), (1, 1)]), "three corners"),
+        (lambda s: edits.polygon_drawn(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
+        (lambda s: edits.rectangle_drawn(s, (0, 0), (0, 3)), "a width and a height"),
+        (lambda s: edits.circle_drawn(s, (0, 0), 0.0), "needs a radius"),
+        (lambda s: edits.circle_drawn(s, (math.nan, 0), 1.0), "too far away"),
+        (lambda s: edits.circle_drawn(s, (1e8, 0), 1.0), "too far away"),
+        (lambda s: edits.wall_drawn(s, [(1, 1), (1, 1)], 0.1), "two points that are apart"),
+        (lambda s: edits.wall_drawn(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
+        (lambda s: edits.boundary_drawn(s, [(1, 1), (2, 1)]), "three corners"),
+        (lambda s: edits.disc_start_drawn(s, (1, 1), 0.0), "needs a radius"),
+        (lambda s: edits.disc_start_drawn(s, (1, 1), 1.0, "corner"), "a start “corner” already"),
+        (lambda s: edits.points_start_drawn(s, []), "a place for a robot"),
+        (lambda s: edits.start_point_added(s, "corner", (1, 1)), "made of places"),
+        (lambda s: edits.start_point_added(s, "two", (9.0, 1.0)), "a robot's place already"),
+        (lambda s: edits.moved(s, Selection(), 1, 1), "select something"),
+        (lambda s: edits.moved(s, ALL, 1e9, 1), "too far away"),
+        (lambda s: edits.moved(s, ALL, math.nan, 1), "too far away"),
+        (lambda s: edits.rotated(s, ALL, math.inf), "an angle"),
+        (lambda s: edits.scaled(s, ALL, 0.0), "a factor that is not 0"),
+        (lambda s: edits.scaled(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
+        (lambda s: edits.resized(s, Selection.of(0), None, None), "a width or a height"),
+        (lambda s: edits.resized(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
+        (lambda s: edits.resized(s, Selection.of("all"), 1.0, None), "select something"),
+        (lambda s: edits.mirrored(s, ALL, "z"), "an axis x or y"),
+        (lambda s: edits.mirrored_across(s, ALL, (1, 1), (1, 1)), "two points that are apart"),
+        (lambda s: edits.duplicated(s, Selection(boundary=True)), "obstacles or starts to copy"),
+        (lambda s: edits.arrayed(s, ALL, 1, 1, 1.0, 1.0), "two columns or rows"),
+        (lambda s: edits.arrayed(s, ALL, 1000, 1000, 1.0, 1.0), "more than 10000"),
+        (lambda s: edits.deleted(s, Selection()), "select something"),
+        (lambda s: edits.renamed(s, "corner", " "), "a start needs a name"),
+        (lambda s: edits.renamed(s, "corner", "two"), "a start “two” already"),
+        (lambda s: edits.renamed(s, 0, "x" * 101), "at most 100 characters"),
+        (lambda s: edits.renamed(s, 0, "a\x00b"), "text on one line"),
+        (lambda s: edits.renamed(s, BOUNDARY, "b"), "boundary has no name"),
+        (lambda s: edits.noted(s, Selection.of("corner"), "x"), "select obstacles"),
+        (lambda s: edits.titled(s, ""), "a map needs a name"),
+        (lambda s: edits.titled(s, None, "x" * 10001), "at most 10000"),
+        (lambda s: edits.widened(s, Selection.of(0), 0.2), "select walls"),
+        (lambda s: edits.widened(s, ALL, -0.2), "at least 1 mm"),
+        (lambda s: edits.sized(s, Selection.of(0), 0.2), "select circles"),
+        (lambda s: edits.raised(s, ALL, "left"), "top, up, down or bottom"),
+        (lambda s: edits.start_first(s, "none"), "no start “none”"),
+        (lambda s: edits.made_polygons(s, Selection.of(0)), "select circles or walls"),
+        (lambda s: edits.made_boundary(s, Selection.of(1)), "select one polygon"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_sentence(sketch, deed, words):
+    with pytest.raises(MapError, match=words) as caught:
+        deed(sketch)
+    assert "\n" not in str(caught.value)
+
+
+# placing
+
+
+def everything(sketch: Sketch) -> shapely.Geometry:
+    shapes = [item.shape.polygon for item in sketch.obstacles]
+    return shapely.GeometryCollection([*shapes, shapely.Polygon(sketch.boundary)])
+
+
+def apart(a: shapely.Geometry, b: shapely.Geometry) -> float:
+    """The largest distance between corresponding vertices."""
+    first, second = shapely.get_coordinates(a), shapely.get_coordinates(b)
+    assert len(first) == len(second)
+    return float(np.abs(first - second).max())
+
+
+@given(sound_sketches(least=1), st.sampled_from([0.0, 1.0, -2.7, 0.1234]), places)
+def test_moving_is_what_shapely_says(sketch, dx, about):
+    change = edits.moved(sketch, Selection.all(sketch), dx, 0.5)
+    expected = affinity.translate(everything(sketch), dx, 0.5)
+    assert apart(everything(change.sketch), expected) <= 1e-4
+    back = edits.moved(change.sketch, change.selection, -dx, -0.5).sketch
+    assert back == sketch
+
+
+@given(sound_sketches(least=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), places)
+def test_turning_is_what_shapely_says(sketch, degrees, about):
+    polygons = [item.key for item in sketch.obstacles if isinstance(item.shape, PolygonObstacle)]
+    change = edits.rotated(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
+    for key in polygons:
+        expected = affinity.rotate(sketch.item(key).shape.polygon, degrees, origin=about)
+        assert apart(change.sketch.item(key).shape.polygon, expected) <= 1e-4
+    whole = Selection(frozenset(item.key for item in sketch.obstacles))
+    quarter = sketch
+    for _ in range(4):
+        quarter = edits.rotated(quarter, whole, 90.0, about).sketch
+    assert quarter == sketch, "a whole turn in quarters is exact"
+
+
+def test_circles_walls_and_starts_turn_too(sketch):
+    change = edits.rotated(sketch, ALL, 90.0, (0.0, 0.0))
+    assert change.sketch.item(1).shape == replace(PILLAR, center=(-4.0, 6.0))
+    assert change.sketch.item(2).shape.points == ((0.0, 5.0), (-2.4, 5.0), (-2.4, 7.0))
+    assert change.sketch.start("corner") == DiscStart((-5.0, 1.0), 0.8)
+    assert change.sketch.start("two") == PointsStart(((-1.0, 9.0), (-1.0, 10.0)))
+    assert change.sketch.start("all") == UniformStart()
+    assert change.sketch.boundary == ((0.0, 0.0), (0.0, 12.0), (-8.0, 12.0), (-8.0, 0.0))
+    # about its middle by default
+    assert edits.rotated(sketch, Selection.of(0), 90.0).sketch.item(0).shape.vertices == (
+        (2.5, 0.5),
+        (2.5, 2.5),
+        (1.5, 2.5),
+        (1.5, 0.5),
+    )
+
+
+def test_scaling_both_ways_grows_radii_and_widths(sketch):
+    change = edits.scaled(sketch, ALL, 2.0, about=(0.0, 0.0))
+    assert change.sketch.item(1).shape == CircleObstacle((12.0, 8.0), 1.0, "pillar")
+    assert change.sketch.item(2).shape == WallObstacle(((10.0, 0.0), (10.0, 4.8), (14.0, 4.8)), 0.2)
+    assert change.sketch.start("corner") == DiscStart((2.0, 10.0), 1.6)
+    assert everything(change.sketch).area == pytest.approx(4.0 * everything(sketch).area, rel=1e-3)
+
+
+def test_stretching_makes_polygons_of_circles_and_keeps_the_width_of_walls(sketch):
+    change = edits.scaled(sketch, Selection.of(0, 1, 2), 2.0, 1.0, (0.0, 0.0))
+    ellipse = change.sketch.item(1).shape
+    assert isinstance(ellipse, PolygonObstacle)
+    assert ellipse.name == "pillar"
+    assert ellipse.polygon.area == pytest.approx(2.0 * PILLAR.polygon.area, rel=1e-3)
+    assert change.sketch.item(2).shape.width == 0.1
+    mirrored = edits.scaled(sketch, Selection.of(1), -1.0, 1.0, (0.0, 0.0))
+    assert mirrored.sketch.item(1).shape == replace(PILLAR, center=(-6.0, 4.0))
+
+
+@given(sound_shapes(), st.sampled_from([0.2, 1.0, 3.7]), st.sampled_from([0.5, 2.0]))
+def test_a_typed_size_is_the_size(shape, width, height):
+    sketch, (key,) = Sketch().added([shape])
+    before = edits.bounds_of(sketch, Selection.of(key))
+    for wanted in ((width, height), (width, None), (None, height)):
+        try:
+            change = edits.resized(sketch, Selection.of(key), *wanted)
+        except MapError as error:
+            # a level wall is as high as it is wide
+            assert isinstance(shape, WallObstacle)
+            assert "walls keep their width" in str(error)
+            continue
+        low_x, low_y, high_x, high_y = edits.bounds_of(change.sketch, change.selection)
+        if wanted[0] is not None:
+            assert high_x - low_x == pytest.approx(wanted[0], abs=3e-4)
+        if wanted[1] is not None:
+            assert high_y - low_y == pytest.approx(wanted[1], abs=3e-4)
+        if None not in wanted:
+            assert (low_x, low_y) == pytest.approx(before[:2], abs=3e-4)
+
+
+def test_a_typed_place_is_the_place(sketch):
+    change = edits.placed(sketch, Selection.of(0), 4.0, None)
+    assert edits.bounds_of(change.sketch, change.selection) == (4.0, 1.0, 6.0, 2.0)
+    change = edits.placed(sketch, Selection.of(1, "corner"), 0.0, 0.0)
+    assert edits.bounds_of(change.sketch, change.selection)[:2] == pytest.approx((0.0, 0.0), abs=1e-4)
+
+
+@given(sound_sketches(least=1), st.sampled_from(["x", "y"]), places, places)
+def test_mirroring_twice_is_nothing(sketch, axis, a, b):
+    whole = Selection.all(sketch)
+    twice = edits.mirrored(edits.mirrored(sketch, whole, axis, 1.5).sketch, whole, axis, 1.5).sketch
+    assert twice == sketch
+    if math.dist(a, b) > 0.1:
+        once = edits.mirrored_across(sketch, whole, a, b).sketch
+        for item in sketch.obstacles:
+            assert once.item(item.key).geometry.area == pytest.approx(item.geometry.area, abs=0.01)
+        twice = edits.mirrored_across(once, whole, a, b).sketch
+        assert apart(everything(twice), everything(sketch)) <= 2e-4
+
+
+def test_mirroring_keeps_the_line():
+    affine = Affine.mirror((1.0, 0.0), (3.0, 2.0))
+    for point in ((1.0, 0.0), (2.0, 1.0), (3.0, 2.0)):
+        assert affine.point(point) == point
+    assert affine.point((3.0, 0.0)) == (1.0, 2.0)
+    assert affine.factor == 1.0
+
+
+def test_single_vertices_go_along_unless_their_owner_does(sketch):
+    corner = Vertex(0, 0, 2)
+    change = edits.moved(sketch, Selection(frozenset({1}), frozenset({corner})), 1.0, 0.0)
+    assert change.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
+    assert change.sketch.item(1).shape.center == (7.0, 4.0)
+    once = edits.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
+    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).shape(BOX)
+    turned = edits.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
+    assert turned.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
+
+
+def test_copies(sketch):
+    noted = edits.noted(sketch, Selection.of(0), "oak").sketch
+    change = edits.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
+    copy = change.sketch.obstacles[-1]
+    assert copy.shape == Affine.shift(1.0, 0.5).shape(BOX)
+    assert copy.note == "oak"
+    assert change.sketch.start("corner 2") == DiscStart((2.0, 5.5), 0.8)
+    assert change.selection == Selection.of(copy.key, "corner 2", "all 2")
+    again = edits.duplicated(change.sketch, change.selection)
+    assert "corner 3" in dict(again.sketch.starts)
+    grid = edits.arrayed(sketch, Selection.of(1), 3, 2, 1.5, 2.0)
+    centers = [item.shape.center for item in grid.sketch.obstacles if isinstance(item.shape, CircleObstacle)]
+    assert centers == [(6.0, 4.0), (7.5, 4.0), (9.0, 4.0), (6.0, 6.0), (7.5, 6.0), (9.0, 6.0)]
+    assert len(grid.selection.items) == 6
+    assert grid.words == "circle “pillar” copied into 3 × 2"
+
+
+# the rest
+
+
+def test_deleting(sketch):
+    change = edits.deleted(
+        sketch, Selection(frozenset({0}), frozenset({Vertex(2, 0, 1)}), frozenset({"two"}))
+    )
+    assert [item.key for item in change.sketch.obstacles] == [1, 2]
+    assert change.sketch.item(2).shape.points == ((5.0, 0.0), (7.0, 2.4))
+    assert [name for name, _ in change.sketch.starts] == ["corner", "all"]
+    assert change.selection == Selection()
+    assert change.words == "3 things deleted"
+    assert edits.deleted(sketch, Selection(boundary=True)).sketch.boundary is None
+
+
+def test_names_and_notes(sketch):
+    assert edits.renamed(sketch, 2, " west\twall ").sketch.item(2).shape.name == "west wall"
+    change = edits.renamed(sketch, 0, "")
+    assert change.sketch.item(0).shape.name is None
+    assert change.words == "polygon “desk”: name taken away"
+    change = edits.renamed(sketch, "two", "pair")
+    assert [name for name, _ in change.sketch.starts] == ["corner", "pair", "all"]
+    assert change.selection == Selection.of("pair")
+    change = edits.noted(sketch, Selection.of(0, 2), " ask Ada ")
+    assert [item.note for item in change.sketch.obstacles] == ["ask Ada", "", "ask Ada"]
+    assert edits.noted(change.sketch, Selection.of(0), "").sketch.item(0).note == ""
+    change = edits.titled(sketch, "Office", "One floor.")
+    assert (change.sketch.name, change.sketch.description) == ("Office", "One floor.")
+    # halves of characters, which no file could hold, do not come in
+    assert edits.renamed(sketch, 0, "a\ud800b").sketch.item(0).shape.name == "ab"
+
+
+def test_widths_and_radii(sketch):
+    change = edits.widened(sketch, ALL, 0.25)
+    assert change.sketch.item(2).shape == replace(WALL, width=0.25)
+    assert change.words == "wall made 0.25 m wide"
+    change = edits.sized(sketch, ALL, 1.25)
+    assert change.sketch.item(1).shape.radius == 1.25
+    assert change.sketch.start("corner") == DiscStart((1.0, 5.0), 1.25)
+
+
+@pytest.mark.parametrize(
+    ("where", "order"),
+    [("top", [1, 2, 3, 0]), ("up", [1, 0, 2, 3]), ("down", [0, 1, 2, 3]), ("bottom", [0, 1, 2, 3])],
+)
+def test_order(where, order):
+    sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
+    assert [item.key for item in edits.raised(sketch, Selection.of(0), where).sketch.obstacles] == order
+
+
+def test_several_things_keep_their_order_among_each_other():
+    sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
+    for where, order in [("up", [0, 3, 1, 2]), ("down", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
+        change = edits.raised(sketch, Selection.of(1, 2), where)
+        assert [item.key for item in change.sketch.obstacles] == order
+    there = edits.raised(sketch, Selection.of(2, 3), "up")
+    assert there.sketch == sketch
+
+
+def test_starts_have_an_order_and_kinds(sketch):
+    assert edits.start_first(sketch, "all").sketch.starts[0][0] == "all"
+    change = edits.start_replaced(sketch, "corner", UniformStart())
+    assert change.sketch.starts[0] == ("corner", UniformStart())
+
+
+def test_a_polygon_becomes_the_boundary(sketch):
+    change = edits.made_boundary(sketch, Selection.of(0))
+    assert change.sketch.boundary == BOX.vertices
+    assert [item.key for item in change.sketch.obstacles] == [1, 2]
+    assert edits.underlaid(sketch, Background("p.png", (3, 4))).words == "picture laid under"
+
+
+def test_bounds(sketch):
+    assert edits.bounds_of(sketch, Selection.of(0)) == (1.0, 1.0, 3.0, 2.0)
+    assert edits.bounds_of(sketch, Selection.of(2)) == pytest.approx((4.95, 0.0, 7.0, 2.45))
+    assert edits.bounds_of(sketch, Selection.of("corner")) == pytest.approx((0.2, 4.2, 1.8, 5.8))
+    assert edits.bounds_of(sketch, Selection(vertices=frozenset({Vertex(0, 0, 0)}))) == (1.0, 1.0, 1.0, 1.0)
+    assert edits.bounds_of(sketch, Selection.of("all")) is None
+    assert edits.bounds_of(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
+
+
+# the plane
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_rounding_is_stable_and_the_same_everywhere(x, y):
+    point = rounded((x, y))
+    assert rounded(point) == point
+    (near,) = ring_near(np.array([[x, y]]))
+    assert ring_near(np.array([near])) == (near,)
+    assert near == pytest.approx(point, abs=1.001e-4)
+    assert tenths(x) == point[0]
+    assert math.copysign(1.0, ring_near(np.array([[-1e-9, 0.0]]))[0][0]) == 1.0
+
+
+@given(st.floats(-1e4, 1e4))
+def test_cosine_and_sine(degrees):
+    cos, sin = cos_sin(degrees)
+    assert (cos, sin) == pytest.approx(
+        (math.cos(math.radians(degrees)), math.sin(math.radians(degrees))), abs=1e-9
+    )
+    assert cos_sin(450.0) == (0.0, 1.0)
+
+
+def test_factors_of_maps():
+    assert Affine.turn(33.0, (1.0, 2.0)).factor == 1.0
+    assert Affine.stretch(2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
+    assert Affine.stretch(-2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
+    assert Affine.stretch(2.0, 1.0, (0.0, 0.0)).factor is None
+    assert Affine(1.0, 0.5, 0.0, 1.0).factor is None

@@ -1,0 +1,157 @@
+"""What was found out about a map, and what is being done, seen in the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_editor import Hands, of_map, opened_editor, sheet
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.starts import DiscStart, PointsStart
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.findings import STEM
+from robocov_app.editor.strips import map_words
+from robocov_app.view.theme import DARK, LIGHT
+
+NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
+CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
+
+
+def near(picture: np.ndarray, at: tuple[float, float], colour: tuple[int, int, int], within: int) -> int:
+    """Return how many pixels around one are of a colour."""
+    x, y = (round(value) for value in at)
+    part = picture[y - within : y + within + 1, x - within : x + within + 1]
+    return int((np.abs(part - np.array(colour)).max(axis=2) < 40).sum())
+
+
+def without_message(hands: Hands) -> np.ndarray:
+    hands.desk.message = ""
+    hands.move(5, 590)
+    hands.window.frame(0.0)
+    return hands.picture()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Path, theme: str) -> None:
+    red = (LIGHT if theme == "light" else DARK).trajectory
+    with opened_editor(tmp_path, sheet(*NARROW), theme=theme) as hands:
+        readout = hands.desk.readout
+        assert readout.gap.width == pytest.approx(0.15) and not readout.impassable.is_empty
+        at = hands.pixel((4.975, 5))
+        assert near(without_message(hands), at, red, 6) > 15
+        hands.command("radius 0.05")
+        assert near(without_message(hands), at, red, 6) == 0
+        hands.command("radius 0.1")
+        hands.key("alt+1")
+        assert near(without_message(hands), at, red, 6) == 0
+
+
+def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as hands:
+        hands.turn("map")
+        assert len(hands.desk.readout.components) == 2
+        assert not hands.desk.readout.sealed.is_empty
+        words = [entry.text for entry in hands.window.arena.strips._entries]
+        assert "cut off" in words
+
+
+def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: Path) -> None:
+    outside = CircleObstacle((30, 30), 1.0)
+    with opened_editor(tmp_path, sheet(CROSSED, outside)) as hands:
+        problems = hands.desk.problems
+        assert problems[0].grave and "cross" in problems[0].words
+        hands.window.arena.fit()
+        hands.frames(1)
+        spot = problems[0].where.representative_point()
+        x, y = hands.pixel((spot.x, spot.y))
+        at = x, y - STEM
+        assert near(without_message(hands), at, LIGHT.trajectory, 6) > 40
+        hands.click(*at)
+        assert hands.desk.problem is problems[0] and hands.said == problems[0].words
+        hands.turn("problems")
+        rows = hands.window.panel.problems._rows
+        assert len(rows) == len(problems)
+        last = rows[-1]
+        left, top, _, _ = hands.window.panel.list_box()
+        hands.window.arena.zoom(8.0, (100.0, 100.0))
+        hands.click(left + 60, top + last.top + last.height / 2)
+        assert hands.desk.problem is last.about
+        where = last.about.where.representative_point()
+        assert hands.window.arena.over(hands.pixel((where.x, where.y)))
+
+
+def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(CROSSED)) as hands:
+        assert map_words(hands.desk).endswith("draft: 1 problem")
+        hands.key("ctrl+a")
+        hands.key("delete")
+        assert map_words(hands.desk).startswith("● Untitled   ·   0 obstacles")
+
+
+def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, Sketch()) as hands:
+        assert "no boundary" in hands.desk.problems[0].words or hands.desk.problems[0].grave
+        for tool in hands.desk.tools:
+            hands.window.do(f"tool:{tool}")
+            hands.click_all((2, 2), (4, 2), (4, 4))
+            hands.key("escape", times=3)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_everything_at_once_is_drawn_at_every_scale_and_in_the_dark(tmp_path: Path, scale: float) -> None:
+    starts = (("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1)))))
+    size = round(900 * scale), round(600 * scale)
+    sketch = sheet(CROSSED, *NARROW, CircleObstacle((8, 8), 1.0), starts=starts)
+    with opened_editor(tmp_path, sketch, size=size, scale=scale, theme="dark") as hands:
+        hands.key("a")
+        hands.key("ctrl+a")
+        for tab in ("map", "object", "snap", "problems"):
+            hands.turn(tab)
+        picture = hands.picture()
+        assert picture.mean() < 110 and picture.std() > 15
+
+
+def test_lengths_stand_beside_the_cursor_and_what_is_typed_below_it(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet()) as hands:
+        hands.key("p")
+        hands.click_all((2, 2), (6, 2))
+        hands.go((6, 5))
+        before = hands.picture()
+        hands.type("3")
+        after = hands.picture()
+        x, y = (round(value) for value in hands.pixel((6, 5)))
+        assert np.abs(after - before)[y + 10 : y + 45, x + 10 : x + 100].max() > 60
+        # guides: an angle of 90° from the last corner
+        assert any(guide.kind == "angle" for guide in hands.desk.tool.guides)
+
+
+def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, of_map("rooms")) as hands:
+        hands.key("a")
+        for _ in range(100):
+            hands.window.frame(0.02)
+            if hands.window.arena.team is not None:
+                break
+        team = hands.window.arena.team
+        assert team is not None and len(team.places) == 6
+        hands.key("shift+=")
+        for _ in range(200):
+            hands.window.frame(0.02)
+            if hands.window.arena.team.robots == 7:
+                break
+        assert len(hands.window.arena.team.places) == 7
+
+
+def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0))) as hands:
+        assert not hands.desk.problems
+        hands.press(*hands.pixel((5, 5)))
+        hands.go((8, 5), (11.5, 5), held=1)
+        hands.frames(2)
+        assert "outside" in hands.desk.problems[0].words
+        hands.key("escape")
+        hands.release()
+        hands.frames(2)
+        assert not hands.desk.problems

@@ -1,0 +1,212 @@
+"""Thousands of random keys, clicks, drags and letters: the editor must bear them all."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pygame
+import pytest
+from driven_editor import Hands, of_map, opened_editor, sheet
+from driven_window import KEYS, MODIFIERS
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.starts import DiscStart, PointsStart
+from robocov_app.editor.actions import all_actions
+from robocov_app.editor.document import parse_sketch, sketch_text
+from robocov_app.editor.panel import TABS
+from robocov_app.editor.readout import readout
+from robocov_app.editor.typed import COMMANDS
+
+EVENTS, BATCH, DRAWN = 2_500, 6, 5
+"""Events of one seed, events between two frames, and frames of which one is drawn."""
+
+MOST = {
+    "screenshot": 2,
+    "save": 6,
+    "save:as": 4,
+    "fullscreen": 2,
+    "try": 3,
+    "quit": 6,
+    "open": 6,
+    "background": 4,
+}
+"""What is done so often at most, since it writes files or takes long."""
+
+KEYS_OF = [(action.name, key) for action in all_actions() for key in action.keys]
+WORDS = (
+    *(f"{word} {value}" for word in COMMANDS for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
+    *("3 x 2", "@1<45", "120cm", "+0.5 -0.5", "90", "𝔸 é ñ 中 🤖", "%s {x} <b> &", "..", "1e309", "-", "٣"),
+)
+SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))
+BUTTONS = (1, 1, 1, 1, 1, 2, 3, 3, 4, 8)
+SHEETS: dict[str, Callable[[], object]] = {
+    "plain": lambda: sheet(
+        PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), (((2.5, 2.5), (3, 2.5), (3, 3)),), "box"),
+        CircleObstacle((7, 7), 1.0),
+        WallObstacle(((1, 8), (3, 8), (3, 9)), 0.1),
+        WallObstacle(((3, 9), (5, 9)), 0.2),
+        starts=(("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1))))),
+    ),
+    "broken": lambda: sheet(
+        PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4))),
+        PolygonObstacle(((5, 5), (6, 6))),
+        WallObstacle(((1, 8), (1, 8)), 0.1),
+        CircleObstacle((50, 50), 1.0),
+    ),
+    "rooms": lambda: of_map("rooms"),
+}
+
+
+class SeldomReadings:
+    """Measures now and then: the readout has tests of its own."""
+
+    busy = False
+
+    def __init__(self) -> None:
+        self._asked, self._count = None, 0
+
+    def ask(self, sketch, radius) -> None:
+        self._asked = sketch, radius
+
+    def poll(self):
+        self._count += 1
+        if self._asked is None or self._count % 40:
+            return None
+        asked, self._asked = self._asked, None
+        return readout(*asked)
+
+    def close(self) -> None:
+        pass
+
+
+class Monkey:
+    """Does one random thing after the other."""
+
+    def __init__(self, hands: Hands, seed: int) -> None:
+        self.hands, self.random = hands, random.Random(seed)
+        self.done: dict[str, int] = {}
+        self.held = 0
+
+    def somewhere(self) -> tuple[int, int]:
+        width, height = self.hands.window.screen.get_size()
+        if self.random.random() < 0.25:
+            return self.random.randrange(width), self.random.randrange(height)
+        # near the map, where things are
+        x, y = self.hands.pixel((self.random.uniform(-1, 11), self.random.uniform(-1, 11)))
+        return int(min(max(x, 0), width - 1)), int(min(max(y, 0), height - 1))
+
+    def key(self) -> None:
+        name, key = self.random.choice(KEYS_OF)
+        self.done[name] = self.done.get(name, 0) + 1
+        if self.done[name] > MOST.get(name, 10**9):
+            return
+        plus = key == "+" or key.endswith("++")
+        *held, last = [*key[:-1].split("+"), "+"] if plus else key.split("+")
+        code = KEYS.get(last) or pygame.key.key_code(last)
+        text = last if len(last) == 1 and "ctrl" not in held else ""
+        mod = sum(MODIFIERS[each] for each in held if each)
+        self.hands.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
+        if text:
+            self.hands.post(pygame.TEXTINPUT, text=text)
+        if self.random.random() < 0.9:
+            self.hands.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
+
+    def letters(self) -> None:
+        for letter in self.random.choice(WORDS):
+            code = ord(letter) if letter.isascii() else 0
+            self.hands.post(pygame.KEYDOWN, key=code, mod=0, unicode=letter, scancode=0)
+            self.hands.post(pygame.TEXTINPUT, text=letter)
+        if self.random.random() < 0.7:
+            self.hands.post(pygame.KEYDOWN, key=pygame.K_RETURN, mod=0, unicode="\r", scancode=0)
+
+    def move(self) -> None:
+        at = self.somewhere()
+        rel = at[0] - self.hands.at[0], at[1] - self.hands.at[1]
+        pygame.mouse.set_pos(at)
+        self.hands.at = at
+        self.hands.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=(self.held == 1, 0, self.held == 3))
+
+    def press(self) -> None:
+        self.held = self.random.choice(BUTTONS)
+        self.hands.post(pygame.MOUSEBUTTONDOWN, pos=self.hands.at, button=self.held)
+
+    def release(self) -> None:
+        button = self.held if self.random.random() < 0.9 else self.random.choice(BUTTONS)
+        self.hands.post(pygame.MOUSEBUTTONUP, pos=self.hands.at, button=button)
+        self.held = 0
+
+    def wheel(self) -> None:
+        amount = self.random.choice((-3, -1, 1, 2))
+        self.hands.post(
+            pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False
+        )
+
+    def odd(self) -> None:
+        window = self.hands.window
+        which = self.random.randrange(6)
+        if which == 0:
+            size = self.random.choice(SIZES)
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+            self.hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+        elif which == 1:
+            self.hands.post(self.random.choice((pygame.WINDOWLEAVE, pygame.WINDOWFOCUSLOST)))
+        elif which == 2:
+            pygame.key.set_mods(self.random.choice((0, 0, *MODIFIERS.values())))
+        elif which == 3:
+            window.panel.show_tab(self.random.choice(TABS))
+        elif which == 4:
+            window.arena.fit()
+        else:
+            self.hands.post(pygame.KEYDOWN, key=pygame.K_ESCAPE, mod=0, unicode="", scancode=0)
+
+    def act(self) -> None:
+        dice = self.random.random()
+        if dice < 0.42:
+            self.move()
+        elif dice < 0.62:
+            (self.press if not self.held else self.release)()
+        elif dice < 0.87:
+            self.key()
+        elif dice < 0.91:
+            self.letters()
+        elif dice < 0.94:
+            self.wheel()
+        else:
+            self.odd()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", SHEETS)
+def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
+    readings = SeldomReadings()
+    with opened_editor(tmp_path, SHEETS[name](), drafts=tmp_path / "drafts", readings=readings) as hands:
+        monkey = Monkey(hands, seed)
+        for step in range(EVENTS // BATCH):
+            for _ in range(BATCH):
+                monkey.act()
+            window = hands.window
+            if window.trial is not None or step % DRAWN == 0:
+                window.frame(1 / 50)
+            else:
+                window.advance(1 / 50)
+            if window.closed:
+                window.closed = window.documents.leaving = False
+            if step % 50 == 0:
+                sketch = hands.sketch
+                assert parse_sketch(sketch_text(sketch), "map") == sketch.renumbered()
+                assert hands.desk.selection.within(sketch) == hands.desk.selection
+        # and back to the beginning, exactly
+        pygame.event.clear()
+        if hands.window.trial is not None:
+            hands.window.trial.ended = True
+            hands.window.frame(0.0)
+        history = hands.desk.paper.history
+        last = history.sketch
+        undone = 0
+        while history.undo() is not None:
+            undone += 1
+        for _ in range(undone):
+            history.redo()
+        assert history.sketch == last

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from drawn_sketches import changes, drafts, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov_app.editor import edits
+from robocov_app.editor.document import DECIMALS, Sketch, draft_document, sketch_of
+from robocov_app.editor.history import History
+from robocov_app.editor.selection import Change, Selection
+
+HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
+
+
+@settings(max_examples=120)
+@given(st.data())
+def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
+    history = History(data.draw(st.one_of(sound_sketches(least=2), drafts())))
+    was = [(history.sketch, history.selection)]
+    for _ in range(data.draw(st.integers(1, 6))):
+        change = data.draw(changes(history.sketch))
+        if change is not None and history.do(change):
+            was.append((history.sketch, history.selection))
+            # whatever an edit makes can be kept, and comes back
+            assert sketch_of(draft_document(change.sketch)) == change.sketch.renumbered()
+            assert change.selection == change.selection.within(change.sketch)
+            assert len(change.sketch.places) == len(change.sketch.obstacles)
+            assert change.words
+    words = history.past
+    for sketch, _ in reversed(was[:-1]):
+        assert history.undo() is not None
+        assert history.sketch == sketch
+    assert not history.can_undo
+    assert history.undo() is None
+    assert history.future == tuple(reversed(words))
+    for sketch, selection in was[1:]:
+        assert history.redo() is not None
+        assert (history.sketch, history.selection) == (sketch, selection)
+    assert not history.can_redo
+    assert history.past == words
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_coordinates_come_out_to_the_tenth_of_a_millimetre(data):
+    sketch = data.draw(sound_sketches(least=1))
+    change = data.draw(changes(sketch))
+    document = draft_document(change.sketch) if change is not None else {}
+
+    def walk(value):
+        if isinstance(value, list | tuple):
+            for each in value:
+                walk(each)
+        elif isinstance(value, dict):
+            for each in value.values():
+                walk(each)
+        elif isinstance(value, float):
+            assert value == round(value, DECIMALS)
+            assert len(f"{abs(value):.9f}".rstrip("0").partition(".")[2]) <= DECIMALS
+
+    walk([document.get("boundary", []), document.get("obstacles", []), document.get("starts", {})])
+
+
+def drawn(count: int) -> History:
+    history = History(Sketch(boundary=HALL))
+    for k in range(count):
+        history.do(edits.circle_drawn(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
+    return history
+
+
+def test_a_drag_is_one_step():
+    history = drawn(1)
+    selection = Selection.of(0)
+    before = history.sketch
+    for k in range(1, 30):
+        assert history.do(edits.moved(before, selection, 0.1 * k, 0.0), drag="drag 1")
+    assert history.past == ("circle moved", "circle drawn")
+    history.break_drag()
+    history.do(edits.moved(history.sketch, selection, 1.0, 0.0), drag="drag 1")
+    assert len(history.past) == 3
+    history.undo()
+    history.undo()
+    assert history.sketch == before
+    # and after undoing, the same drag begins anew
+    history.do(edits.moved(before, selection, 0.1, 0.0), drag="drag 1")
+    assert history.past == ("circle moved", "circle drawn")
+
+
+def test_a_drag_that_comes_back_is_none():
+    history = drawn(1)
+    before = history.sketch
+    history.mark_saved()
+    history.do(edits.moved(before, Selection.of(0), 1.0, 0.0), drag=1)
+    assert history.unsaved
+    history.do(edits.moved(before, Selection.of(0), 0.0, 0.0), drag=1)
+    assert history.past == ("circle drawn",)
+    assert history.sketch == before
+    assert not history.unsaved
+
+
+def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone():
+    history = drawn(2)
+    history.undo()
+    assert not history.do(Change(history.sketch, Selection.of(0), "nothing"))
+    assert history.can_redo
+    assert history.selection == Selection.of(0)
+    history.do(edits.circle_drawn(history.sketch, (5.0, 5.0), 1.0))
+    assert not history.can_redo
+
+
+def test_undo_has_no_limit():
+    history = drawn(3000)
+    first = history.sketch
+    count = 0
+    while history.undo():
+        count += 1
+    assert count == 3000
+    assert history.sketch == Sketch(boundary=HALL)
+    while history.redo():
+        count -= 1
+    assert count == 0
+    assert history.sketch == first
+
+
+def test_saved_is_what_the_file_holds_wherever_one_goes():
+    history = drawn(3)
+    assert history.unsaved
+    history.mark_saved()
+    assert not history.unsaved
+    history.undo()
+    assert history.unsaved
+    history.redo()
+    assert not history.unsaved
+    history.mark_unsaved()
+    assert history.unsaved
+    assert History(Sketch(), saved=False).unsaved
+    assert not History(Sketch()).unsaved
+
+
+def test_undoing_selects_what_was_selected():
+    history = drawn(2)
+    history.selection = Selection.of(0)
+    history.do(edits.deleted(history.sketch, Selection.of(0)))
+    assert history.selection == Selection()
+    back = history.undo()
+    assert back is not None
+    assert back.words == "circle deleted"
+    assert back.selection == history.selection == Selection.of(0)

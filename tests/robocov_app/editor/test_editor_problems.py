@@ -1,0 +1,273 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import shapely
+from drawn_sketches import HALL, drafts, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps, load_map
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov_app.editor.document import BOUNDARY, Sketch
+from robocov_app.editor.problems import problems, runnable
+
+
+def hall(*shapes, starts=(), **others) -> Sketch:
+    return (
+        Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0]
+        if not others
+        else replace(hall(*shapes, starts=starts), **others)
+    )
+
+
+def runs(sketch: Sketch) -> bool:
+    try:
+        sketch.environment()
+    except MapError:
+        return False
+    return True
+
+
+@settings(max_examples=200)
+@given(st.one_of(drafts(), sound_sketches()))
+def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
+    found = problems(sketch)
+    assert runnable(found) == runs(sketch), [problem.words for problem in found]
+    keys = {item.key for item in sketch.obstacles} | {name for name, _ in sketch.starts} | {BOUNDARY, None}
+    for problem in found:
+        assert problem.of in keys
+        assert problem.words.strip() and "\n" not in problem.words
+        if problem.where is not None:
+            assert not shapely.is_empty(problem.where)
+    graves = [problem.grave for problem in found]
+    assert graves == sorted(graves, reverse=True)
+
+
+@pytest.mark.parametrize("name", bundled_maps())
+def test_bundled_maps_have_nothing_grave(name):
+    assert runnable(problems(Sketch.from_environment(load_map(name))))
+
+
+BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
+BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("sketch", "words", "where", "of"),
+    [
+        (Sketch("n"), "there is no boundary: draw one round all that is free", None, BOUNDARY),
+        (hall(name=""), "the map has no name", None, None),
+        (hall(name="x" * 101), "the map has a name of 101 characters: at most 100 are possible", None, None),
+        (hall(boundary=()), "boundary: it has no corners: it needs three", None, BOUNDARY),
+        (
+            hall(boundary=((0.0, 0.0), (4.0, 0.0), (0.0, 0.0))),
+            "boundary: it has two corners: it needs three",
+            (2.0, 0.0),
+            BOUNDARY,
+        ),
+        (
+            hall(boundary=((0.0, 0.0), (4.0, 0.0), (2.0, 0.0))),
+            "boundary: it encloses nothing: its corners lie on one line",
+            (2.0, 0.0),
+            BOUNDARY,
+        ),
+        (
+            hall(boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))),
+            "boundary: it crosses or touches itself at (2, 2)",
+            (2.0, 2.0),
+            BOUNDARY,
+        ),
+        (
+            hall(boundary=((0.0, 0.0), (2e4, 0.0), (0.0, 5.0))),
+            "boundary: it is 20000 × 5 m large: at most 10 km are possible",
+            (1e4, 2.5),
+            BOUNDARY,
+        ),
+        (
+            hall(boundary=((0.0, 0.0), (1e8, 0.0), (0.0, 5.0))),
+            "boundary: (1e+08, 0) is too far away: maps reach 10000 km from their origin",
+            (1e8, 0.0),
+            BOUNDARY,
+        ),
+        (
+            hall(PolygonObstacle(BOW_TIE, (), "desk")),
+            "polygon “desk”: its outline crosses or touches itself at (2, 2)",
+            (2.0, 2.0),
+            0,
+        ),
+        (
+            hall(PolygonObstacle(((1.0, 1.0),))),
+            "polygon: its outline has one corner: it needs three",
+            (1.0, 1.0),
+            0,
+        ),
+        (
+            hall(PolygonObstacle(BOX, (((2.0, 2.0), (5.0, 2.0), (5.0, 2.5), (2.0, 2.5)),))),
+            "polygon: a hole sticks out of its outline",
+            (4.0, 2.25),
+            0,
+        ),
+        (
+            hall(
+                PolygonObstacle(
+                    BOX,
+                    (
+                        ((1.5, 1.5), (2.0, 1.5), (2.0, 2.0), (1.5, 2.0)),
+                        ((1.7, 1.7), (2.5, 1.7), (2.5, 2.5), (1.7, 2.5)),
+                    ),
+                )
+            ),
+            "polygon: a hole meets the outline or another hole: it must be apart from them",
+            (2.1, 2.1),
+            0,
+        ),
+        (
+            hall(PolygonObstacle(BOX, (((1.5, 1.5), (2.0, 1.5)),))),
+            "polygon: a hole has two corners: it needs three",
+            (1.75, 1.5),
+            0,
+        ),
+        (
+            hall(CircleObstacle((2.0, 3.0), 0.0, "")),
+            "circle: its radius is 0 m: at least 1 mm is possible",
+            (2.0, 3.0),
+            0,
+        ),
+        (hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle: has no name", None, 0),
+        (
+            hall(WallObstacle(((2.0, 3.0),), 0.1)),
+            "wall: it has no length: it needs two points that are apart",
+            (2.0, 3.0),
+            0,
+        ),
+        (
+            hall(WallObstacle(((2.0, 3.0), (4.0, 3.0)), -1.0)),
+            "wall: its width is -1 m: at least 1 mm is possible",
+            (2.0, 3.0),
+            0,
+        ),
+        (
+            hall(PolygonObstacle(((-1.0, -1.0), (20.0, -1.0), (20.0, 20.0), (-1.0, 20.0)))),
+            "no free space is left inside the boundary",
+            (6.0, 4.0),
+            BOUNDARY,
+        ),
+        (
+            hall(PolygonObstacle(BOX, (), "desk"), starts=(("a", PointsStart(((5.0, 5.0), (2.0, 2.0)))),)),
+            "start “a”: place 2 at (2, 2) is inside polygon “desk”",
+            (2.0, 2.0),
+            "a",
+        ),
+        (
+            hall(starts=(("a", PointsStart(((50.0, 5.0),))),)),
+            "start “a”: place 1 at (50, 5) is outside the boundary",
+            (50.0, 5.0),
+            "a",
+        ),
+        (
+            hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)),
+            "start “a”: the place (1, 1) is given twice: every robot needs its own",
+            (1.0, 1.0),
+            "a",
+        ),
+        (hall(starts=(("a", PointsStart(())),)), "start “a”: has no places: it needs one a robot", None, "a"),
+        (
+            hall(starts=(("", DiscStart((2.0, 2.0), 1.0)),)),
+            "a start has no name",
+            None,
+            "",
+        ),
+        (
+            hall(PolygonObstacle(BOX), starts=(("a", DiscStart((2.0, 2.0), 0.5)),)),
+            "start “a”: its disc has no room for a robot of radius 0.1 m",
+            (2.0, 2.0),
+            "a",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_where_it_is(sketch, words, where, of):
+    (found, *_) = [problem for problem in problems(sketch) if problem.grave and problem.words == words] or [
+        pytest.fail(str([problem.words for problem in problems(sketch)]))
+    ]
+    assert found.of == of
+    assert not runs(sketch)
+    if where is None:
+        assert found.where is None
+    else:
+        assert found.where.distance(shapely.Point(where)) < 1e-9
+
+
+def test_what_is_broken_keeps_nothing_else_from_being_found():
+    sketch = hall(
+        PolygonObstacle(BOW_TIE),
+        CircleObstacle((6.0, 6.0), 1.0),
+        WallObstacle((), 0.1),
+        starts=(("a", PointsStart(((6.0, 6.0),))), ("b", PointsStart(((1.5, 2.0), (2.0, 1.5))))),
+    )
+    words = [problem.words for problem in problems(sketch) if problem.grave]
+    assert words == [
+        "polygon: its outline crosses or touches itself at (2, 2)",
+        "wall: it has no length: it needs two points that are apart",
+        "start “a”: place 1 at (6, 6) is inside circle",
+        # of the bow tie's two halves, one place lies in one; the other is free
+        "start “b”: place 1 at (1.5, 2) is inside polygon",
+    ]
+
+
+def warned(sketch: Sketch, radius: float = 0.15) -> list[str]:
+    found = problems(sketch, radius)
+    assert not any(problem.grave for problem in found)
+    return [problem.words for problem in found]
+
+
+def test_warnings_of_what_may_be_a_mistake():
+    assert warned(hall()) == []
+    assert warned(hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
+        "circle “lamp” lies outside the boundary"
+    ]
+    # one that only touches from outside does nothing either
+    beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
+    assert warned(hall(beside)) == ["polygon lies outside the boundary"]
+    twice = CircleObstacle((5.0, 5.0), 1.0, "a")
+    assert warned(hall(twice, replace(twice, name="b"))) == [
+        "circle “b” lies on another one that is just the same"
+    ]
+    doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
+    assert warned(hall(doubled)) == ["polygon: two vertices lie in the same place, (1, 1)"]
+    ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
+    assert not [words for words in warned(hall(ended)) if "two vertices" in words]
+
+
+def test_sealed_rooms_and_pockets_are_told_of():
+    frame = PolygonObstacle(
+        ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0)), (((2.5, 2.5), (5.5, 2.5), (5.5, 5.5), (2.5, 5.5)),)
+    )
+    box = PolygonObstacle(
+        ((8.0, 2.0), (9.0, 2.0), (9.0, 3.0), (8.0, 3.0)), (((8.4, 2.4), (8.6, 2.4), (8.6, 2.6), (8.4, 2.6)),)
+    )
+    words = warned(hall(frame, box))
+    assert words == [
+        "the room of 9 m² round (4, 4) is sealed: no way leads in",
+        "1 sealed pocket is smaller than a robot, 0.04 m² together",
+    ]
+
+
+def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
+    room = PolygonObstacle(
+        ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0)), (((3.0, 3.0), (3.8, 3.0), (3.8, 3.8), (3.0, 3.8)),)
+    )
+    sketch = hall(
+        room, starts=(("a", DiscStart((3.4, 3.4), 0.2)), ("b", PointsStart(((1.0, 1.0), (1.5, 1.0)))))
+    )
+    assert not [words for words in warned(sketch, 0.2) if "start" in words]
+    words = [words for words in warned(sketch, 0.5) if "start" in words]
+    assert words[0] == "start “a”: its disc has no room for a robot of radius 0.5 m"
+    assert "0.5 m apart" in words[1]
+    assert warned(hall(starts=(("all", UniformStart()),)), 3.9) == []
+    assert warned(hall(starts=(("all", UniformStart()),)), 4.0) == [
+        "start “all”: the free space has no room for a robot of radius 4 m"
+    ]

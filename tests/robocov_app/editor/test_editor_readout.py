@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, drafts, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+from shapely import MultiPolygon
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.mapcheck import check_map
+from robocov.mapfile import bundled_maps, load_map
+from robocov.starts import DiscStart
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.problems import problems
+from robocov_app.editor.readout import reach_of, readout
+
+FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
+
+
+def doors(*widths: float) -> Sketch:
+    """A hall 12 m by 8 m in rooms side by side, with doors of some widths in their walls, at y = 4."""
+    shapes = []
+    for k, width in enumerate(widths):
+        x = 12.0 * (k + 1) / (len(widths) + 1)
+        shapes.append(WallObstacle(((x, -1.0), (x, 4.0 - width / 2)), 0.2))
+        shapes.append(WallObstacle(((x, 4.0 + width / 2), (x, 9.0)), 0.2))
+    return Sketch("Doors", boundary=HALL).added(shapes)[0]
+
+
+def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where the centre of a robot can be, by parts, on a raster; and where it sweeps."""
+    xs, ys = np.arange(cell / 2, 12.0, cell), np.arange(cell / 2, 8.0, cell)
+    x, y = np.meshgrid(xs, ys)
+    inside = shapely.contains_xy(free, x.ravel(), y.ravel()).reshape(x.shape)
+    distance = shapely.distance(free.boundary, shapely.points(x.ravel(), y.ravel())).reshape(x.shape)
+    centres = inside & (distance >= radius)
+    parts, _ = ndimage.label(centres, np.ones((3, 3)))
+    swept = ndimage.distance_transform_edt(~centres) * cell <= radius if centres.any() else centres
+    return parts, swept & inside
+
+
+@settings(max_examples=25)
+@given(sound_sketches(least=1, most=6), st.sampled_from([0.1, 0.25, 0.6]))
+def test_what_robots_reach_is_what_a_raster_says(sketch, radius):
+    free = sketch.unchecked().free
+    if free.is_empty:
+        return
+    cell = 0.05
+    parts, swept = rastered(free, radius, cell)
+    reached, untouched = reach_of(free, radius)
+    opened = shapely.union_all(reached)
+    perimeter = free.length
+    assert opened.area == pytest.approx(swept.sum() * cell**2, abs=2.0 * perimeter * cell)
+    # what a raster sees clearly of the parts is there
+    sizes = ndimage.sum_labels(np.ones_like(parts), parts, np.arange(1, parts.max() + 1))
+    assert len(reached) >= (sizes * cell**2 > 4 * cell).sum() - 1
+    assert free.buffer(1e-6).covers(opened)
+    assert (untouched - free).area < 1e-6
+    # no robot touches what it never touches
+    assert shapely.intersection(opened, untouched).area < 1e-3 * perimeter
+    # what is neither is crumbs: no point of them is farther from where robots are than their radius
+    crumbs = free - opened - untouched.buffer(2e-3)
+    for part in shapely.get_parts(crumbs):
+        if part.area > 1e-4:
+            points = shapely.points(shapely.get_coordinates(part))
+            assert shapely.distance(opened, points).max() <= radius + 2e-3
+
+
+@pytest.mark.parametrize(
+    ("width", "radius", "passes"),
+    [(0.9, 0.4, True), (0.9, 0.45, True), (0.9, 0.4501, False), (0.5, 0.3, False)],
+)
+def test_a_door_lets_pass_whom_it_lets_pass(width, radius, passes):
+    result = readout(doors(width), radius)
+    assert result.gap.width == pytest.approx(width)
+    assert result.components == pytest.approx([96.0 - 0.2 * (8.0 - width)])
+    assert len(result.reached) == (1 if passes else 2)
+    words = [problem.words for problem in result.problems]
+    if passes:
+        assert result.impassable.is_empty
+        assert result.sealed.is_empty
+        assert words == []
+    else:
+        # the door is marked, and nothing else; one of the two rooms is cut off
+        (mark,) = result.impassable.geoms
+        assert mark.distance(shapely.Point(6.0, 4.0)) == 0.0
+        assert math.pi * (width / 2) ** 2 * 0.99 <= mark.area <= width * (0.2 + 2 * radius)
+        assert result.sealed.area == pytest.approx(5.9 * 8.0, abs=0.5)
+        assert words[0] == (
+            f"the gap at (5.9, 4) is {width:.3g} m wide: too narrow for robots of radius {radius:g} m"
+        )
+        assert words[1].startswith(
+            f"robots of radius {radius:g} m cannot pass between 2 parts of the free space"
+        )
+        assert len(words) == 2
+
+
+def test_one_of_three_doors_is_too_narrow():
+    result = readout(doors(1.0, 0.5, 2.0), 0.3)
+    assert result.gap.width == pytest.approx(0.5)
+    (mark,) = result.impassable.geoms
+    assert mark.distance(shapely.Point(6.0, 4.0)) == 0.0
+    assert [round(area) for area in result.reached] == [46, 46]
+    assert result.vertices == 4 + 6 * 2
+
+
+def test_a_passage_that_leads_back_to_the_same_place_is_marked_too():
+    # two blocks 0.3 m apart in the middle of the hall: the way round is open
+    blocks = [
+        PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0))),
+        PolygonObstacle(((5.3, 3.0), (7.3, 3.0), (7.3, 5.0), (5.3, 5.0))),
+    ]
+    result = readout(Sketch(boundary=HALL).added(blocks)[0], 0.2)
+    assert len(result.reached) == 1
+    (mark,) = result.impassable.geoms
+    # the slot, and half a disc at either end
+    assert mark.area == pytest.approx(0.3 * 2.0 + math.pi * 0.15**2, abs=0.01)
+    # no more than a crack is taken for touching
+    closed = [blocks[0], PolygonObstacle(((5.0015, 3.0), (7.3, 3.0), (7.3, 5.0), (5.0015, 5.0)))]
+    result = readout(Sketch(boundary=HALL).added(closed)[0], 0.2)
+    assert result.impassable.is_empty
+    assert result.gap.width == pytest.approx(3.0)
+
+
+def test_niches_and_sealed_pockets_are_marked_but_not_corners():
+    niche = PolygonObstacle(
+        ((3.0, 0.0), (5.0, 0.0), (5.0, 3.0), (4.2, 3.0), (4.2, 1.0), (4.0, 1.0), (4.0, 3.0), (3.0, 3.0))
+    )
+    frame = PolygonObstacle(
+        ((8.0, 4.0), (9.0, 4.0), (9.0, 5.0), (8.0, 5.0)), (((8.4, 4.4), (8.6, 4.4), (8.6, 4.6), (8.4, 4.6)),)
+    )
+    pillar = CircleObstacle((10.0, 2.0), 0.5)
+    result = readout(Sketch(boundary=HALL).added([niche, frame, pillar])[0], 0.3)
+    marks = sorted(result.impassable.geoms, key=lambda part: part.centroid.x)
+    assert len(marks) == 2
+    assert marks[0].area == pytest.approx(0.2 * 2.0, abs=0.03)
+    assert marks[1].area == pytest.approx(0.04, abs=0.002)
+    assert len(result.reached) == 1
+    assert readout(Sketch(boundary=HALL), 0.3).impassable.is_empty
+
+
+def test_where_no_robot_fits_it_is_said():
+    result = readout(Sketch("n", boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 0.3), (0.0, 0.3))), 0.2)
+    assert result.reached == ()
+    assert result.impassable.area == pytest.approx(2.7)
+    assert "no robot of radius 0.2 m fits anywhere" in [problem.words for problem in result.problems]
+
+
+@pytest.mark.parametrize("name", ["rooms", "office", "gaps", "cave", "museum"])
+def test_it_says_what_check_says(name):
+    environment = load_map(name)
+    report, result = check_map(environment, 0.1), readout(Sketch.from_environment(environment), 0.1)
+    assert result.free_area == report.free_area
+    assert result.components == report.components
+    assert result.gap == report.narrowest_gap
+    assert sum(result.reached) <= report.free_area
+    assert name in bundled_maps()
+
+
+@settings(max_examples=50)
+@given(drafts(), st.sampled_from([0.05, 0.3]))
+def test_every_draft_can_be_read_out(sketch, radius):
+    result = readout(sketch, radius)
+    assert isinstance(result.impassable, MultiPolygon)
+    assert result.free_area == pytest.approx(sum(result.components))
+    assert sum(result.reached) <= result.free_area + 1e-6
+    assert [problem.words for problem in result.problems][: len(problems(sketch, radius))] == [
+        problem.words for problem in problems(sketch, radius)
+    ]
+    assert math.isfinite(result.seconds)
+
+
+def test_broken_parts_count_as_far_as_they_are_sound():
+    assert readout(Sketch()).free_area == 0.0
+    bow_tie = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
+    result = readout(Sketch("n", boundary=HALL).added([bow_tie, WallObstacle((), 0.1)])[0])
+    assert result.free_area == pytest.approx(96.0 - 2.0)
+    crossing = readout(Sketch("n", boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))))
+    assert crossing.components == pytest.approx((4.0, 4.0))
+
+
+@pytest.mark.parametrize("huge", [1e5, 1e12, 1e300])
+def test_sizes_that_no_map_has_take_no_time(huge):
+    shapes = [CircleObstacle((1.0, 1.0), huge), WallObstacle(((1.0, 1.0), (huge, 1.0)), huge)]
+    sketch = Sketch("n", boundary=HALL, starts=(("a", DiscStart((huge, 1.0), huge)),)).added(shapes)[0]
+    result = readout(sketch)
+    assert result.free_area == pytest.approx(96.0)
+    assert len([problem for problem in result.problems if problem.grave]) >= 3
+    far = readout(replace(sketch, boundary=((0.0, 0.0), (huge, 0.0), (0.0, huge))))
+    assert far.free_area == 0.0
+    assert result.seconds + far.seconds < 5.0

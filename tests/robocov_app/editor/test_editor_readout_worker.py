@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_sketches import HALL, changes, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov_app.editor import edits, readout_process
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.readout import readout
+from robocov_app.editor.readout_messages import Question
+from robocov_app.editor.readout_worker import ReadoutWorker
+from robocov_app.editor.selection import Selection
+
+PATIENCE = 60.0
+"""Seconds after which nothing will come any more."""
+
+SKETCH, _ = Sketch("Hall", boundary=HALL).added(
+    [CircleObstacle((3.0, 3.0), 1.0), WallObstacle(((6.0, -1.0), (6.0, 7.7)), 0.2)]
+)
+
+
+def crowded(count: int) -> Sketch:
+    rng = np.random.default_rng(0)
+    side = int(np.ceil(np.sqrt(count)))
+    shapes = []
+    for k in range(count):
+        x, y = 1.0 + 1.2 * (k % side), 1.0 + 1.2 * (k // side)
+        if k % 3 == 0:
+            shapes.append(CircleObstacle((x, y), round(float(rng.uniform(0.1, 0.45)), 3)))
+        elif k % 3 == 1:
+            shapes.append(
+                WallObstacle(((x - 0.3, y), (x + 0.3, round(y + float(rng.uniform(-0.3, 0.3)), 3))), 0.1)
+            )
+        else:
+            turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))
+            ring = np.round(np.column_stack([np.cos(turn), np.sin(turn)]) * 0.4 + (x, y), 4)
+            shapes.append(PolygonObstacle(tuple((u, v) for u, v in ring.tolist())))
+    far = 1.2 * side + 2.0
+    return Sketch("crowded", boundary=((0.0, 0.0), (far, 0.0), (far, far), (0.0, far))).added(shapes)[0]
+
+
+def answered(worker: ReadoutWorker):
+    end = time.monotonic() + PATIENCE
+    result = None
+    while time.monotonic() < end:
+        result = worker.poll() or result
+        if not worker.busy:
+            return result
+        time.sleep(0.005)
+    raise AssertionError("no answer")
+
+
+def same(a, b) -> bool:
+    """Whether two readouts say the same."""
+    numbers = ("free_area", "components", "reached", "gap", "vertices", "radius")
+    words = [[problem.words for problem in each.problems] for each in (a, b)]
+    return (
+        all(getattr(a, name) == getattr(b, name) for name in numbers)
+        and a.impassable.equals(b.impassable)
+        and words[0] == words[1]
+    )
+
+
+def test_it_says_what_the_function_says_after_every_change():
+    history = [SKETCH]
+    history.append(edits.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)
+    history.append(history[-1].added([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
+    history.append(history[-1].without([0]))
+    history.append(edits.raised(history[-1], Selection.of(1), "top").sketch)
+    history.append(SKETCH)
+    with ReadoutWorker() as worker:
+        for sketch in history:
+            worker.ask(sketch, 0.2)
+            assert worker.busy
+            result = answered(worker)
+            assert same(result, readout(sketch, 0.2))
+            assert worker.trouble == ""
+        worker.ask(SKETCH, 0.2)
+        assert not worker.busy, "asked about the same again"
+        worker.ask(SKETCH, 0.1)
+        assert answered(worker).radius == 0.1
+
+
+@settings(max_examples=20)
+@given(st.data())
+def test_what_has_changed_is_enough_to_know_the_whole(data):
+    process = readout_process.Process(None, None)
+    sketch, known = data.draw(sound_sketches(least=1)), {}
+    questions = []
+    for number in range(4):
+        questions.append(Question.about(number, sketch, 0.2, known))
+        known = {item.key: item for item in sketch.obstacles}
+        change = data.draw(changes(sketch))
+        assert all(item in sketch.obstacles for item in questions[-1].changed)
+        last = sketch
+        sketch = sketch if change is None else change.sketch
+    answer = process.answer(questions[:2])
+    assert answer.number == 1
+    answer = process.answer(questions[2:])
+    assert (answer.number, answer.trouble) == (3, "")
+    assert answer.readout.vertices == readout(last, 0.2).vertices
+    assert answer.readout.free_area == readout(last, 0.2).free_area
+
+
+def test_only_the_newest_question_counts():
+    sketch = crowded(100)
+    with ReadoutWorker() as worker:
+        began = time.perf_counter()
+        for k in range(200):
+            worker.ask(edits.moved(sketch, Selection.of(0), 0.001 * k, 0.0).sketch, 0.2)
+        assert time.perf_counter() - began < 2.0
+        result = answered(worker)
+        assert result.free_area == readout(edits.moved(sketch, Selection.of(0), 0.199, 0.0).sketch).free_area
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_process_that_was_killed_comes_back():
+    with ReadoutWorker() as worker:
+        worker.ask(SKETCH, 0.2)
+        first = answered(worker)
+        worker.ask(replace(SKETCH, name="other"), 0.2)
+        os.kill(worker._talk._process.pid, signal.SIGKILL)
+        while worker.busy:
+            worker.poll()
+            time.sleep(0.005)
+        # the question may have been answered before
+        assert worker.trouble in ("", "the process that measures the map has ended")
+        end = time.monotonic() + PATIENCE
+        while not worker._talk.ended and time.monotonic() < end:
+            time.sleep(0.005)
+        worker.ask(SKETCH, 0.2)
+        assert same(answered(worker), first)
+        assert worker.trouble == ""
+
+
+def test_what_fails_is_said_and_the_next_goes_on(monkeypatch, capsys):
+    process = readout_process.Process(None, None)
+    monkeypatch.setattr(readout_process, "readout", lambda sketch, radius: 1 / 0)
+    answer = process.answer([Question.about(1, SKETCH, 0.2, {})])
+    assert answer.readout is None
+    assert answer.trouble == "the map could not be measured: division by zero"
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    monkeypatch.undo()
+    known = {item.key: item for item in SKETCH.obstacles}
+    answer = process.answer([Question.about(2, SKETCH, 0.2, known)])
+    assert answer.readout.vertices == readout(SKETCH, 0.2).vertices
+
+
+def test_nothing_is_there_before_one_asks():
+    worker = ReadoutWorker()
+    assert worker.poll() is None
+    assert not worker.busy
+    worker.close()
+    worker.close()
+
+
+def test_asking_and_polling_among_many_obstacles_takes_no_frame():
+    sketch = crowded(400)
+    keys = [item.key for item in sketch.obstacles]
+    with ReadoutWorker() as worker:
+        worker.ask(sketch)
+        answered(worker)
+        taken = []
+        for k in range(60):
+            sketch = edits.moved(sketch, Selection.of(keys[k]), 0.001, 0.0).sketch
+            began = time.perf_counter()
+            worker.ask(sketch)
+            worker.poll()
+            taken.append(time.perf_counter() - began)
+            time.sleep(0.01)
+        result = answered(worker)
+    assert result.vertices > 1200
+    # a frame is 16 ms; machines that do something else as well may miss a few
+    assert np.median(taken) < 0.004

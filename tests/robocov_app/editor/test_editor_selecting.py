@@ -1,0 +1,261 @@
+"""Selecting, moving, turning, scaling, copying, and editing vertices with the mouse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from driven_editor import Hands, opened_editor, sheet
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.starts import DiscStart
+from robocov_app.editor.document import BOUNDARY
+from robocov_app.editor.grips import grip_at, grips, handled
+from robocov_app.editor.selection import Selection, Vertex
+
+SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
+PILLAR = CircleObstacle((7, 7), 1.0)
+WALL = WallObstacle(((6, 1), (6, 3), (8, 3)), 0.2)
+
+
+@pytest.fixture
+def hands(tmp_path: Path) -> Iterator[Hands]:
+    start = (("corner", DiscStart((1, 8.5), 0.6)),)
+    with opened_editor(tmp_path, sheet(SQUARE, PILLAR, WALL, starts=start)) as driver:
+        yield driver
+
+
+def grip(hands: Hands, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
+    """Return the pixel of a grip."""
+    (found,) = (each for each in hands.desk.grips if each.kind == kind and each.side == side)
+    return hands.pixel(found.at)
+
+
+def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(hands: Hands) -> None:
+    hands.click_all((3, 3))
+    assert hands.desk.selection == Selection.of(0)
+    hands.hold("shift")
+    hands.click_all((7, 7))
+    assert hands.desk.selection == Selection.of(0, 1)
+    hands.click_all((3, 3))
+    hands.hold()
+    assert hands.desk.selection == Selection.of(1)
+    hands.click_all((9, 5))
+    assert not hands.desk.selection
+    hands.click_all((1, 8.5))
+    assert hands.desk.selection == Selection.of("corner")
+    hands.click_all((10, 5))
+    assert hands.desk.selection == Selection.of(BOUNDARY)
+
+
+def test_a_box_takes_what_lies_in_it_and_leftwards_what_it_touches(hands: Hands) -> None:
+    hands.drag_at((1.5, 1.5), (3, 3), (5, 5))
+    assert hands.desk.selection == Selection.of(0)
+    hands.key("escape")
+    hands.drag_at((3, 1.5), (4, 4), (7.5, 5))
+    assert hands.desk.selection == Selection()
+    hands.drag_at((7.5, 5), (4, 4), (3, 1.5))
+    assert hands.desk.selection == Selection.of(0, 2)
+
+
+def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
+    hands.drag_at((3, 3), (3.5, 3.2), (4, 3.5), (5, 3))
+    assert hands.shapes[0].vertices == ((4, 2), (6, 2), (6, 4), (4, 4))
+    assert hands.shapes[0].name == "box" and hands.desk.selection == Selection.of(0)
+    hands.key("ctrl+z")
+    assert hands.shapes[0] == SQUARE
+    assert not hands.desk.paper.history.can_undo
+    hands.key("ctrl+y")
+    assert hands.shapes[0].vertices[0] == (4, 2)
+
+
+def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(hands: Hands) -> None:
+    before = hands.sketch
+    hands.press(*hands.pixel((3, 3)))
+    hands.go((4, 4), (5, 5), held=1)
+    assert hands.desk.pending is not None
+    hands.key("escape")
+    hands.go((6, 6), held=1)
+    hands.release()
+    assert hands.sketch is before and hands.desk.pending is None
+
+
+def test_alt_drag_copies(hands: Hands) -> None:
+    hands.hold("alt")
+    hands.drag_at((7, 7), (7.5, 5), (9, 5))
+    hands.hold()
+    assert hands.shapes[1] == PILLAR and hands.shapes[3] == CircleObstacle((9, 5), 1.0)
+    assert hands.desk.selection == Selection(items=frozenset({hands.sketch.obstacles[3].key}))
+
+
+def test_a_drag_takes_a_typed_distance(hands: Hands) -> None:
+    hands.press(*hands.pixel((3, 3)))
+    hands.go((3.6, 3.1), (4, 3), held=1)
+    hands.type("0.25 -0.5")
+    hands.key("return")
+    hands.release()
+    assert hands.shapes[0].vertices[0] == (2.25, 1.5)
+
+
+def test_a_vertex_is_dragged_alone_and_several_together(hands: Hands) -> None:
+    hands.click_all((3, 3))
+    hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
+    assert hands.shapes[0].vertices == ((2, 2), (4, 2), (5, 5), (2, 4))
+    assert hands.desk.selection.vertices == {Vertex(0, 0, 2)}
+    hands.hold("shift")
+    hands.click_all((4, 2))
+    hands.hold()
+    assert len(hands.desk.selection.vertices) == 2
+    hands.drag_at((4, 2), (4.5, 2), (5, 2))
+    assert hands.shapes[0].vertices == ((2, 2), (5, 2), (6, 5), (2, 4))
+
+
+def test_a_double_click_on_an_edge_inserts_a_vertex_and_delete_removes_it(hands: Hands) -> None:
+    hands.click_all((3, 3))
+    hands.twice((3, 4))
+    assert (3, 4) in hands.shapes[0].vertices and len(hands.shapes[0].vertices) == 5
+    hands.key("delete")
+    assert hands.shapes[0].vertices == SQUARE.vertices
+
+
+def test_corners_are_cut_off_and_rounded(hands: Hands) -> None:
+    hands.click_all((3, 3), (4, 4))
+    hands.key("shift+b")
+    assert set(hands.shapes[0].vertices) >= {(4, 3.8), (3.8, 4)}
+    hands.key("ctrl+z")
+    hands.command("round 0.5")
+    assert len(hands.shapes[0].vertices) > 6
+
+
+def test_a_box_around_some_vertices_of_what_is_selected_takes_them(hands: Hands) -> None:
+    hands.click_all((3, 3))
+    hands.drag_at((4.6, 1.4), (4.2, 3), (3.6, 4.6))
+    assert hands.desk.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
+    hands.key("escape")
+    assert hands.desk.selection == Selection.of(0)
+
+
+def test_the_rim_of_a_circle_and_of_a_start_are_dragged(hands: Hands) -> None:
+    hands.click_all((7, 7))
+    hands.drag_at((8, 7), (8.2, 7), (8.5, 7))
+    assert hands.shapes[1] == CircleObstacle((7, 7), 1.5)
+    hands.click_all((1, 8.5))
+    hands.drag_at((1, 9.1), (1, 9.2), (1, 9.4))
+    assert hands.sketch.start("corner") == DiscStart((1, 8.5), 0.9)
+
+
+def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
+    hands.select(2)
+    x, y = grip(hands, "turn")
+    hands.press(x, y)
+    hands.move(x + 60, y + 20, held=1)
+    hands.type("90")
+    hands.key("return")
+    hands.release()
+    middle_x, middle_y = 7.0, 2.0
+    turned = {
+        (round(middle_x - (b - middle_y), 4), round(middle_y + a - middle_x, 4)) for a, b in WALL.points
+    }
+    bounds = hands.sketch.item(2).geometry.bounds
+    assert bounds[2] - bounds[0] == pytest.approx(2.1, abs=1e-3)
+    assert len(turned) == len(hands.shapes[2].points)
+
+
+def test_shift_turns_in_steps(hands: Hands) -> None:
+    hands.select(0)
+    x, y = grip(hands, "turn")
+    hands.hold("shift")
+    cx, cy = hands.pixel((3, 3))
+    hands.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
+    hands.hold()
+    assert hands.shapes[0].vertices != SQUARE.vertices
+    (ax, ay), (bx, by) = hands.shapes[0].vertices[:2]
+    import math
+
+    angle = math.degrees(math.atan2(by - ay, bx - ax))
+    assert angle / 15 == pytest.approx(round(angle / 15), abs=1e-2)
+
+
+def test_corners_and_sides_of_the_box_scale(hands: Hands) -> None:
+    hands.select(0)
+    x, y = grip(hands, "scale", (1, 0))
+    one = hands.pixel((1, 0))[0] - hands.pixel((0, 0))[0]
+    hands.drag((x, y), (x + one / 2, y), (x + one, y))
+    assert hands.shapes[0].vertices == ((2, 2), (5, 2), (5, 4), (2, 4))
+    x, y = grip(hands, "scale", (1, 1))
+    hands.hold("shift")
+    hands.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
+    hands.hold()
+    low_x, low_y, high_x, high_y = hands.sketch.item(0).geometry.bounds
+    assert (low_x, low_y) == (2, 2)
+    assert (high_x - low_x) / (high_y - low_y) == pytest.approx(1.5, rel=1e-3)
+
+
+def test_a_circle_stays_a_circle_when_it_is_scaled(hands: Hands) -> None:
+    hands.select(1)
+    x, y = grip(hands, "scale", (1, 0))
+    hands.drag((x, y), (x + 20, y), (x + 40, y + 5))
+    assert isinstance(hands.shapes[1], CircleObstacle) and hands.shapes[1].radius > 1.0
+
+
+def test_arrows_nudge_by_the_grid_and_shift_ten_times_as_far(hands: Hands) -> None:
+    hands.select(0)
+    hands.key("right", times=3)
+    hands.key("up")
+    hands.key("shift+left")
+    assert hands.shapes[0].vertices[0] == (1.3, 2.1)
+    hands.key("ctrl+z")
+    assert hands.shapes[0] == SQUARE  # pressed in a row, they are one
+
+
+def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
+    lower, upper = (
+        PolygonObstacle(((1, 1), (6, 1), (6, 6), (1, 6))),
+        PolygonObstacle(((2, 2), (4, 2), (4, 4))),
+    )
+    with opened_editor(tmp_path, sheet(lower, upper)) as hands:
+        hands.click_all((3.5, 2.5))
+        assert hands.desk.selection == Selection.of(1)
+        hands.click_all((3.5, 2.5))
+        assert hands.desk.selection == Selection.of(0)
+        hands.click_all((3.5, 2.5))
+        assert hands.desk.selection == Selection.of(1)
+
+
+def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
+    from robocov_app.editor import drags, edits
+
+    ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(drags.MANY_POINTS + 10))
+    with opened_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as hands:
+        wanted = edits.moved(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
+        hands.select(0, 1)
+        hands.press(*hands.pixel((3, 3)))
+        hands.go((3.5, 3.2), (4, 3.5), held=1)
+        assert hands.desk.pending is None and hands.desk.selector.drag.offset == pytest.approx((1.0, 0.5))
+        hands.release()
+        assert hands.shapes == [item.shape for item in wanted.obstacles]
+
+
+def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
+    assert handled(Selection()) == () and handled(Selection.of(0, 1)) == ()
+    assert handled(Selection.of(2)) == (2,)
+    assert handled(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
+    found = grips(hands.sketch, Selection.of(0), 0.01)
+    assert sum(each.kind == "vertex" for each in found) == 4
+    assert sum(each.kind == "scale" for each in found) == 8
+    assert grip_at(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
+    assert grip_at(found, (3, 3), 0.2) is None
+
+
+def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
+    selector = hands.desk.selector
+    hands.go((9, 5))
+    assert selector.shape_of_cursor(hands.desk) == "arrow"
+    hands.go((3, 3))
+    assert selector.shape_of_cursor(hands.desk) == "hand"
+    hands.select(0)
+    hands.go((3, 3.01))
+    assert selector.shape_of_cursor(hands.desk) == "move"
+    hands.move(*grip(hands, "scale", (1, 1)))
+    assert selector.shape_of_cursor(hands.desk) == "rising"

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, places, sound_sketches
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.starts import DiscStart, PointsStart, UniformStart
+from robocov_app.editor.document import BOUNDARY, Sketch
+from robocov_app.editor.selection import (
+    Edge,
+    Selection,
+    Vertex,
+    called,
+    edge_at,
+    in_box,
+    owner_at,
+    owners_at,
+    place_of,
+    points_of,
+    ring_points,
+    rings_of,
+    vertex_at,
+    vertices_in_box,
+)
+
+LOW = PolygonObstacle(
+    ((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)), (((2.0, 2.0), (3.0, 2.0), (3.0, 3.0)),)
+)
+HIGH = CircleObstacle((4.0, 4.0), 2.0, "lamp")
+WALL = WallObstacle(((8.0, 1.0), (11.0, 1.0)), 0.1)
+STARTS = (
+    ("disc", DiscStart((4.5, 2.0), 1.0)),
+    ("two", PointsStart(((8.0, 6.0), (9.0, 6.0)))),
+    ("all", UniformStart()),
+)
+
+
+@pytest.fixture
+def sketch() -> Sketch:
+    return Sketch("Hall", boundary=HALL, starts=STARTS).added([LOW, HIGH, WALL])[0]
+
+
+def test_a_click_takes_the_topmost(sketch):
+    assert owner_at(sketch, (4.0, 4.0), 0.1) == 1
+    assert owners_at(sketch, (4.0, 4.0), 0.1) == (1, 0)
+    assert owner_at(sketch, (1.2, 1.2), 0.1) == 0
+    # through a hole there is nothing, but near its edge there is
+    assert owner_at(sketch, (2.7, 2.3), 0.05) is None
+    assert owner_at(sketch, (2.7, 2.05), 0.1) == 0
+
+
+def test_starts_lie_above_at_their_centre_and_rim_but_not_inside(sketch):
+    assert owner_at(sketch, (4.5, 2.0), 0.1) == "disc"
+    assert owner_at(sketch, (4.5, 1.02), 0.1) == "disc"
+    assert owners_at(sketch, (4.5, 1.5), 0.1) == (0, "disc")
+    assert owner_at(sketch, (5.3, 2.0), 0.1) == "disc"
+    assert owner_at(sketch, (8.05, 6.0), 0.1) == "two"
+
+
+def test_what_is_near_is_taken_where_nothing_covers(sketch):
+    assert owner_at(sketch, (9.0, 1.1), 0.1) == 2
+    assert owner_at(sketch, (9.0, 1.2), 0.1) is None
+    assert owner_at(sketch, (12.0, 6.0), 0.1) == BOUNDARY
+    assert owner_at(sketch, (11.95, 6.0), 0.1) == BOUNDARY
+    assert owner_at(sketch, (10.0, 5.0), 0.1) is None
+    assert owner_at(Sketch(), (0.0, 0.0), 1.0) is None
+
+
+@given(sound_sketches(least=2), places, st.sampled_from([0.05, 0.5]))
+def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
+    owners = [BOUNDARY, *(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
+    handles = [(math.dist(point, at), vertex) for owner in owners for vertex, at in points_of(sketch, owner)]
+    nearest = min((away for away, _ in handles), default=math.inf)
+    found = vertex_at(sketch, point, reach, owners)
+    if nearest > reach:
+        assert found is None
+    else:
+        assert math.dist(point, place_of(sketch, found)) == nearest
+    lines = [
+        shapely.LineString([*points, *points[:1]] if closed else points)
+        for owner in owners
+        for _, points, closed in rings_of(sketch, owner)
+    ]
+    nearest = min(line.distance(shapely.Point(point)) for line in lines)
+    edge = edge_at(sketch, point, reach, owners)
+    if nearest > reach:
+        assert edge is None
+    else:
+        assert math.dist(point, edge.point) == pytest.approx(nearest, abs=1e-9)
+        ring = ring_points(sketch, edge.of)[edge.ring]
+        a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
+        assert shapely.LineString([a, b]).distance(shapely.Point(edge.point)) < 1e-9
+
+
+def test_handles(sketch):
+    assert [at for _, at in points_of(sketch, 1)] == [
+        (4.0, 4.0),
+        (6.0, 4.0),
+        (4.0, 6.0),
+        (2.0, 4.0),
+        (4.0, 2.0),
+    ]
+    assert points_of(sketch, 0)[4] == (Vertex(0, 1, 0), (2.0, 2.0))
+    assert [vertex.index for vertex, _ in points_of(sketch, "disc")] == [0, 1, 2, 3, 4]
+    assert points_of(sketch, "two")[1] == (Vertex("two", 0, 1), (9.0, 6.0))
+    assert points_of(sketch, "all") == ()
+    assert len(points_of(sketch, BOUNDARY)) == 4
+    assert points_of(sketch, 77) == points_of(sketch, "none") == ()
+    assert [closed for _, _, closed in rings_of(sketch, 2)] == [False]
+    assert rings_of(sketch, 1) == rings_of(sketch, "disc") == ()
+    with pytest.raises(MapError, match="no such vertex"):
+        place_of(sketch, Vertex(0, 0, 4))
+
+
+def test_boxes(sketch):
+    assert in_box(sketch, (0.5, 0.5), (5.4, 5.5)) == Selection(frozenset({0}))
+    everything = in_box(sketch, (13.0, 9.0), (-1.0, -1.0))
+    assert everything == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}), boundary=True)
+    touched = in_box(sketch, (4.9, 0.5), (8.5, 6.5), touched=True)
+    assert touched == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}))
+    # a disc that the corner of the box does not reach
+    assert not in_box(sketch, (5.3, 2.8), (6.0, 3.0), touched=True).starts
+    assert in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), touched=True) == Selection()
+    corners = vertices_in_box(sketch, (0.0, 0.0), (2.5, 2.5), [0, BOUNDARY, 2])
+    assert corners.vertices == {Vertex(0, 0, 0), Vertex(0, 1, 0), Vertex(BOUNDARY, 0, 0)}
+
+
+@given(sound_sketches(least=1), places, places)
+def test_boxes_hold_what_shapely_says(sketch, a, b):
+    box = shapely.box(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))
+    inside = {item.key for item in sketch.obstacles if box.covers(item.shape.polygon.envelope)}
+    assert in_box(sketch, a, b).items == inside
+    touched = {item.key for item in sketch.obstacles if box.intersects(item.shape.polygon)}
+    assert in_box(sketch, a, b, touched=True).items == touched
+
+
+def test_selections_add_up(sketch):
+    a = Selection.of(0, "disc", BOUNDARY)
+    assert a == Selection(frozenset({0}), frozenset(), frozenset({"disc"}), True)
+    assert a.owners == {0, "disc", BOUNDARY}
+    b = Selection.of(1, "disc")
+    assert a.plus(b) == Selection.of(0, 1, "disc", BOUNDARY)
+    assert a.toggled(b) == Selection.of(0, 1, BOUNDARY)
+    assert a.toggled(a) == Selection()
+    assert not Selection()
+    assert Selection(vertices=frozenset({Vertex(0, 0, 0)}))
+    assert Selection.all(sketch).owners == {0, 1, 2, "disc", "two", "all", BOUNDARY}
+    gone = Selection(frozenset({0, 9}), frozenset({Vertex(0, 0, 3), Vertex(0, 0, 4)}), frozenset({"x"}), True)
+    assert gone.within(sketch) == Selection(frozenset({0}), frozenset({Vertex(0, 0, 3)}), frozenset(), True)
+    assert not gone.within(Sketch())
+
+
+def test_selections_in_words(sketch):
+    vertex = frozenset({Vertex(0, 0, 0), Vertex(0, 0, 1)})
+    words = {
+        "nothing": Selection(),
+        "circle “lamp”": Selection.of(1),
+        "polygon": Selection.of(0),
+        "2 obstacles": Selection.of(0, 1),
+        "start “disc”": Selection.of("disc"),
+        "2 starts": Selection.of("disc", "two"),
+        "boundary": Selection(boundary=True),
+        "2 vertices": Selection(vertices=vertex),
+        "vertex": Selection(vertices=frozenset({Vertex(0, 0, 0)})),
+        "3 things": Selection.of(0, 1, "disc"),
+    }
+    for expected, selection in words.items():
+        assert selection.words(sketch) == expected
+    assert called(sketch, BOUNDARY) == "boundary"
+
+
+def test_picking_among_a_thousand_is_quick():
+    rng = np.random.default_rng(0)
+    shapes = [CircleObstacle((float(x), float(y)), 0.3) for x, y in rng.uniform(0, 50, (1000, 2))]
+    sketch, keys = Sketch(boundary=HALL).added(shapes)
+    owner_at(sketch, (0.0, 0.0), 0.1)
+    began = time.perf_counter()
+    for x, y in rng.uniform(0, 50, (50, 2)).tolist():
+        owner_at(sketch, (x, y), 0.1)
+        vertex_at(sketch, (x, y), 0.1, keys)
+        edge_at(sketch, (x, y), 0.1, keys)
+        in_box(sketch, (x, y), (x + 5, y + 5), touched=True)
+    # a frame is 16 ms; this leaves much room for machines that do something else as well
+    assert (time.perf_counter() - began) / 50 < 0.016
+
+
+def test_edges_are_values():
+    assert Edge(0, 0, 1, (1.0, 2.0)) == Edge(0, 0, 1, (1.0, 2.0))
+    assert len({Vertex(0, 0, 0), Vertex(0, 0, 0), Vertex("0", 0, 0)}) == 2

@@ -1,0 +1,196 @@
+"""The page under the editor: what is drawn in patches is what is drawn as a whole, pixel by pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+import shapely
+from driven_editor import of_map, sheet
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov_app.demo.film import pixels
+from robocov_app.demo.opening import display
+from robocov_app.editor import edits
+from robocov_app.editor.background import Background
+from robocov_app.editor.drawn_rings import Outlines, name_place, outline_of
+from robocov_app.editor.selection import Selection
+from robocov_app.editor.sheet import Sheet, View, beyond, grid_steps, outside_colour
+from robocov_app.view.camera import Camera
+from robocov_app.view.theme import DARK, LIGHT
+
+SIZE = (420, 360)
+BOX = (10.0, 30.0, 400.0, 300.0)
+SHAPES = (
+    PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)), (((2, 2), (3, 2), (3, 3)),), "court"),
+    CircleObstacle((7, 7), 1.2, "pillar"),
+    WallObstacle(((5, 0), (5, 5), (9, 5)), 0.2),
+    PolygonObstacle(((6, 2), (9, 1), (8, 4))),
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def screen() -> Iterator[None]:
+    with display(headless=True):
+        pygame.display.set_mode(SIZE)
+        yield
+
+
+def view(center: tuple[float, float] = (5.0, 5.0), zoom: float = 28.0, **more: object) -> View:
+    known = {"theme": LIGHT, "scale": 1.0, "shown": frozenset({"grid", "names", "picture"}), "grid": 0.5}
+    known |= more
+    return View(Camera(center, zoom, BOX), size=SIZE, folder=Path(), **known)
+
+
+def drawn(page: pygame.Surface, at: View) -> np.ndarray:
+    left, top, width, height = at.clip
+    return pixels(page)[top : top + height, left : left + width].copy()
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(0, 5), st.integers(-40, 40), st.integers(-40, 40)), max_size=8),
+    st.booleans(),
+)
+def test_patches_and_scrolling_give_the_same_page_as_drawing_anew(steps, dark: bool) -> None:
+    sketch = sheet(*SHAPES)
+    theme = DARK if dark else LIGHT
+    kept, center = Sheet(), (5.0, 5.0)
+    kept.page(view(center, theme=theme), sketch)
+    for kind, x, y in steps:
+        lifted: frozenset[int] = frozenset()
+        if kind == 0:
+            center = center[0] + x / 28.0, center[1] + y / 28.0
+        elif kind == 1:
+            sketch = edits.moved(sketch, Selection.of(y % 4), x / 40, y / 40).sketch
+        elif kind == 2:
+            sketch = edits.circle_drawn(sketch, (5 + x / 10, 5 + y / 10), 0.5).sketch
+        elif kind == 3 and len(sketch.obstacles) > 4:
+            sketch = edits.deleted(sketch, Selection.of(sketch.obstacles[-1].key)).sketch
+        elif kind == 4:
+            lifted = frozenset({x % 4})
+        else:
+            sketch = edits.moved(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
+        at = view(center, theme=theme)
+        page = drawn(kept.page(at, sketch, lifted), at)
+        anew = drawn(Sheet().page(at, sketch, lifted), at)
+        # a smooth line that is cut by a patch's edge may differ by a shade in its pixels there
+        apart = np.abs(page.astype(int) - anew.astype(int)).max(axis=2)
+        assert (apart > 40).sum() <= 6, (kind, x, y)
+
+
+def test_only_what_changed_is_drawn_anew() -> None:
+    sketch = sheet(*SHAPES)
+    page = Sheet()
+    page.page(view(), sketch)
+    assert (page.full, page.patched, page.scrolled) == (1, 0, 0)
+    page.page(view(), sketch)
+    moved = edits.moved(sketch, Selection.of(1), 0.1, 0.0).sketch
+    page.page(view(), moved)
+    assert page.full == 1 and page.patched == 1
+    page.page(view((5.0 + 3 / 28.0, 5.0)), moved)
+    assert page.full == 1 and page.scrolled == 1
+    page.page(view(zoom=40.0), moved)
+    assert page.full == 2
+    page.page(view(zoom=40.0, theme=DARK), moved)
+    assert page.full == 3
+
+
+def test_what_is_lifted_is_not_on_the_page() -> None:
+    sketch = sheet(*SHAPES)
+    at = view()
+    x, y = (round(value) for value in at.camera.to_pixels(np.array([7.0, 6.5])))
+    page = Sheet()
+    assert page.page(at, sketch).get_at((x, y))[:3] == LIGHT.obstacle
+    assert page.page(at, sketch, frozenset({1})).get_at((x, y))[:3] != LIGHT.obstacle
+
+
+def test_a_hole_shows_what_lies_below() -> None:
+    at = view(shown=frozenset())
+    page = Sheet().page(at, sheet(*SHAPES))
+
+    def colour(point: tuple[float, float]) -> tuple[int, ...]:
+        x, y = at.camera.to_pixels(np.array(point))
+        return tuple(page.get_at((round(x), round(y))))[:3]
+
+    assert colour((2.8, 2.3)) == LIGHT.background
+    assert colour((1.5, 1.5)) == LIGHT.obstacle
+    assert colour((11.0, 5.0)) == outside_colour(LIGHT)
+
+
+def test_what_the_hull_adds_is_told_apart() -> None:
+    sketch = of_map("l-shape")
+    area = beyond(sketch)
+    assert area is not None and area.area > 1.0
+    assert beyond(sheet()).is_empty
+    assert beyond(replace(sketch, boundary=None)) is None
+    assert beyond(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))) is None
+
+
+def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:
+    Image.new("RGB", (100, 100), (250, 10, 10)).save(tmp_path / "red.png")
+    laid = Background(str(tmp_path / "red.png"), (100, 100), 0.1, opacity=1.0)
+    for turn in (0.0, 90.0):
+        corner = (0.0, 0.0) if turn == 0.0 else (10.0, 0.0)
+        sketch = replace(sheet(*SHAPES), background=replace(laid, turn=turn, corner=corner))
+        at = view(shown=frozenset({"picture"}))
+        page = Sheet().page(at, sketch)
+        x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
+        assert page.get_at((round(x), round(y)))[0] > 200 > 60 > page.get_at((round(x), round(y)))[1]
+        x, y = at.camera.to_pixels(np.array([1.5, 1.5]))
+        mixed = page.get_at((round(x), round(y)))
+        assert mixed[1] > 40  # the picture shines through
+    hidden = Sheet().page(view(shown=frozenset()), sketch)
+    x, y = at.camera.to_pixels(np.array([1.0, 8.0]))
+    assert hidden.get_at((round(x), round(y)))[:3] == LIGHT.background
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "L", "I;16", "P", "1"])
+def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
+    Image.new(mode, (40, 30)).save(tmp_path / "one.png")
+    page = Sheet()
+    sketch = replace(sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
+    page.page(view(), sketch)
+    assert page.underlaid.trouble == ""
+
+
+def test_a_picture_that_cannot_be_read_is_told_and_all_else_is_drawn(tmp_path: Path) -> None:
+    (tmp_path / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
+    page = Sheet()
+    sketch = replace(sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
+    page.page(view(), sketch)
+    assert "bad.png" in page.underlaid.trouble
+
+
+def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
+    for grid in (0.01, 0.1, 0.25, 1.0, 5.0):
+        for zoom in (0.5, 3.0, 28.0, 400.0, 9000.0):
+            fine, coarse = grid_steps(grid, zoom, 1.0)
+            assert fine * zoom >= 10.9 or fine == grid
+            assert abs(fine / grid - round(fine / grid)) < 1e-6 * fine / grid
+            assert abs(coarse / fine - round(coarse / fine)) < 1e-6 * coarse / fine
+            assert coarse * zoom >= 54
+
+
+def test_names_stand_where_there_is_room() -> None:
+    ring = shapely.Polygon([(0, 0), (6, 0), (6, 1), (1, 1), (1, 6), (0, 6)])
+    x, y, room, high = name_place(ring)
+    assert ring.contains(shapely.Point(x, y)) and 1.0 - 1e-9 <= room <= 6.0 + 1e-9 and high >= 1.0 - 1e-9
+    assert name_place(shapely.Polygon())[2] == 0.0
+
+
+def test_outlines_are_made_once_for_each_obstacle() -> None:
+    outlines, sketch = Outlines(), sheet(*SHAPES)
+    first = outlines.of(sketch.obstacles[0])
+    moved = edits.moved(sketch, Selection.of(1), 1, 0).sketch
+    assert outlines.of(moved.obstacles[0]) is first and first.has_holes
+    assert len(outlines.touching(moved, (0.9, 0.9, 1.1, 1.1))) == 1
+    line = outline_of(shapely.LineString([(0, 0), (1, 1)]))
+    assert not line.rings and len(line.lines) == 1

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.selection import Selection, ring_points
+from robocov_app.editor.simplifying import simplified, straightened
+
+
+def wobbly(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):
+    """A ring that goes round a middle, so that it does not cross itself."""
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, count))
+    away = radius * (1.0 + 0.2 * np.sin(3 * angle)) + rng.uniform(-noise, noise, count)
+    points = np.column_stack([np.cos(angle), np.sin(angle)]) * away[:, None] + 5.0
+    return tuple((round(x, 4), round(y, 4)) for x, y in points.tolist())
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**6), st.integers(8, 120), st.sampled_from([0.001, 0.02, 0.1, 0.5, 2.0]))
+def test_no_vertex_that_is_left_out_is_far_from_the_new_outline(seed, count, tolerance):
+    ring = wobbly(count, seed)
+    sketch, (key,) = Sketch().added([PolygonObstacle(ring)])
+    try:
+        change = simplified(sketch, Selection.of(key), tolerance)
+    except MapError as error:
+        assert "no vertex can be left out" in str(error)
+        return
+    after = change.sketch.item(key).shape
+    assert len(after.vertices) < len(ring)
+    assert after.polygon.is_valid
+    outline = after.polygon.exterior
+    assert max(outline.distance(shapely.Point(point)) for point in ring) <= tolerance + 1e-9
+    # in the order in which they were, none moved
+    places = [ring.index(point) for point in after.vertices]
+    assert places == sorted(places)
+
+
+def test_holes_do_not_come_to_cross_their_outline():
+    # a thin frame: a coarse tolerance would let the hole stick out
+    outer, inner = wobbly(120, 0, 3.0, 0.0), wobbly(120, 1, 2.9, 0.0)
+    sketch, (key,) = Sketch().added([PolygonObstacle(outer, (inner,))])
+    assert sketch.item(key).shape.polygon.is_valid
+    change = simplified(sketch, Selection.of(key), 2.0)
+    assert change.sketch.item(key).shape.polygon.is_valid
+    assert len(ring_points(change.sketch, key)[1]) < 120
+
+
+def test_walls_keep_their_ends_and_the_boundary_is_asked_for():
+    line = tuple((k / 10, 0.001 * (k % 2)) for k in range(40))
+    sketch, (key,) = Sketch(boundary=(*HALL[:2], (12.0, 4.0), *HALL[2:])).added([WallObstacle(line, 0.1)])
+    change = simplified(sketch, Selection(), 0.01)
+    assert change.sketch.item(key).shape.points == (line[0], line[-1])
+    assert change.words == "38 vertices left out"
+    assert change.sketch.boundary == sketch.boundary
+    change = simplified(sketch, Selection(boundary=True), 0.01)
+    assert set(change.sketch.boundary) == set(HALL)
+    assert change.words == "1 vertex left out"
+
+
+def test_traced_plans_become_straight():
+    traced = ((1.0, 1.02), (4.03, 0.98), (3.98, 3.0), (0.99, 3.04))
+    sketch, (key,) = Sketch(boundary=HALL).added([PolygonObstacle(traced)])
+    change = straightened(sketch, Selection.of(key))
+    assert change.sketch.item(key).shape.vertices == (
+        (0.995, 1.0),
+        (4.005, 1.0),
+        (4.005, 3.02),
+        (0.995, 3.02),
+    )
+    assert change.words == "1 outline straightened"
+    with pytest.raises(MapError, match="not so already"):
+        straightened(change.sketch, Selection.of(key))
+    # several edges in a row come to lie on one line, slanted ones stay
+    wall = WallObstacle(((0.0, 0.0), (2.0, 0.04), (4.0, 0.0), (6.0, 2.0), (6.02, 5.0)), 0.1)
+    sketch, (key,) = Sketch().added([wall])
+    assert straightened(sketch, Selection.of(key)).sketch.item(key).shape.points == (
+        (0.0, 0.02),
+        (2.0, 0.02),
+        (4.0, 0.02),
+        (6.01, 2.0),
+        (6.01, 5.0),
+    )
+
+
+@given(sound_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
+def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
+    try:
+        change = straightened(sketch, Selection(), degrees)
+    except MapError:
+        return
+    slope = math.tan(math.radians(degrees))
+    for item in sketch.obstacles:
+        if isinstance(item.shape, CircleObstacle):
+            assert change.sketch.item(item.key) is item
+            continue
+        for before, after in zip(
+            ring_points(sketch, item.key), ring_points(change.sketch, item.key), strict=True
+        ):
+            assert len(before) == len(after)
+            if before == after:
+                continue
+            for k in range(len(before) - 1):
+                dx, dy = np.abs(np.subtract(before[k + 1], before[k]))
+                if 0.0 < dy <= slope * dx:
+                    assert after[k][1] == after[k + 1][1]
+                if 0.0 < dx <= slope * dy:
+                    assert after[k][0] == after[k + 1][0]
+
+
+@pytest.mark.parametrize(
+    ("deed", "words"),
+    [
+        (lambda s: simplified(s, Selection.of(0), 0.1), "select polygons, walls or the boundary"),
+        (lambda s: simplified(s, Selection(boundary=True), math.nan), "a tolerance"),
+        (lambda s: simplified(s, Selection(boundary=True), 0.1), "no vertex can be left out"),
+        (lambda s: straightened(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
+    ],
+)
+def test_what_cannot_be_done_is_said(deed, words):
+    sketch, _ = Sketch(boundary=HALL).added([CircleObstacle((1.0, 1.0), 0.5)])
+    with pytest.raises(MapError, match=words):
+        deed(sketch)

@@ -1,0 +1,65 @@
+"""What tools share: directions, lengths and places in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov_app.editor.tool import (
+    ANGLE,
+    Aim,
+    Tool,
+    apart,
+    bearing_words,
+    held,
+    length_words,
+    straightened,
+    swept,
+)
+
+NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
+POINTS = st.tuples(NUMBERS, NUMBERS)
+
+
+@given(POINTS, POINTS)
+def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, point) -> None:
+    to = straightened(origin, point)
+    if apart(origin, to) > 1e-3:
+        angle = np.degrees(np.arctan2(to[1] - origin[1], to[0] - origin[0]))
+        assert abs(angle / ANGLE - round(angle / ANGLE)) < 1e-3
+    # no other line at a round angle comes nearer
+    directions = np.radians(np.arange(0, 180, ANGLE))
+    across = np.abs(
+        (point[0] - origin[0]) * np.sin(directions) - (point[1] - origin[1]) * np.cos(directions)
+    ).min()
+    assert apart(point, to) <= across + 1e-6
+
+
+def test_shift_holds_the_angle_and_nothing_else_does() -> None:
+    aim = Aim((3.0, 0.2), (3.0, 0.1), 0.1)
+    assert held(aim, (0.0, 0.0)) == (3.0, 0.2)
+    shifted = Aim((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
+    assert held(shifted, (0.0, 0.0)) == (3.0, 0.0)
+    assert held(shifted, None) == (3.0, 0.2)
+
+
+def test_lengths_and_angles_are_told_as_people_write_them() -> None:
+    assert bearing_words((0, 0), (-1, 0)) == "1.00 m  ∠ 180°"
+    assert bearing_words((0, 0), (1, 1)) == "1.41 m  ∠ 45°"
+    assert bearing_words((0, 0), (1, -1e-9)) == "1.00 m  ∠ 0°"
+    assert length_words(0.05) == "5.0 cm"
+
+
+@given(st.lists(POINTS, min_size=3, max_size=8))
+def test_the_area_of_a_ring_does_not_depend_on_where_it_begins_or_which_way_it_runs(ring) -> None:
+    area = swept(ring)
+    assert abs(swept(ring[1:] + ring[:1]) - area) < 1e-6 * (1 + area)
+    assert abs(swept(ring[::-1]) - area) < 1e-6 * (1 + area)
+
+
+def test_a_plain_tool_does_nothing() -> None:
+    tool = Tool()
+    assert not tool.busy and tool.origin is None and tool.drawn == ()
+    assert not tool.finish(None) and not tool.back(None) and not tool.cancel(None)
+    assert tool.preview(None) is None

@@ -1,0 +1,138 @@
+"""Trying a map in the demo, in the same window, and back with nothing lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pygame
+from driven_editor import Hands, of_map, opened_editor, sheet
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.starts import DiscStart
+from robocov_app.editor import edits
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.selection import Selection
+from robocov_app.editor.trying import brought_back
+
+PILLAR = CircleObstacle((7, 7), 1.0)
+
+
+def tried(hands: Hands):
+    hands.key("f5")
+    trial = hands.window.trial
+    assert trial is not None
+    return trial
+
+
+def test_back_with_nothing_lost(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(PILLAR, starts=(("s", DiscStart((2, 2), 1.0)),))) as hands:
+        hands.key("r")
+        hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
+        hands.key("v")
+        hands.window.arena.zoom(2.0, (200.0, 200.0))
+        hands.window.frame(0.0)
+        before, camera, selection = hands.sketch, hands.window.arena.camera, hands.desk.selection
+        picture = hands.picture()
+        trial = tried(hands)
+        assert trial.desk.session.environment == before.environment()
+        assert trial.desk.session.scenario.start_name == "s"
+        hands.frames(10)
+        assert trial.desk.session.time > 0.0
+        hands.key("f5")
+        assert hands.window.trial is None
+        assert hands.sketch is before and hands.window.arena.camera == camera
+        assert hands.desk.selection == selection
+        hands.desk.message = ""
+        hands.window.frame(0.0)
+        arena = np.s_[40:500, :500]
+        apart = np.abs(hands.picture() - picture)[arena].max(axis=2)
+        assert (apart > 40).mean() < 0.05  # but for the message, as it was
+        hands.key("ctrl+z")
+        assert len(hands.shapes) == 1
+
+
+def test_escape_leads_back_but_first_closes_what_is_open(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, of_map("square")) as hands:
+        trial = tried(hands)
+        hands.key("f1")
+        assert trial.help
+        hands.key("escape")
+        assert hands.window.trial is trial and not trial.help
+        hands.key("w")
+        hands.key("escape")
+        assert hands.window.trial is trial
+        hands.key("escape")
+        assert hands.window.trial is None
+
+
+def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
+    crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
+    with opened_editor(tmp_path, sheet(crossed)) as hands:
+        hands.key("f5")
+        assert hands.window.trial is None and hands.desk.trouble and hands.said
+    with opened_editor(tmp_path, Sketch(boundary=None)) as hands:
+        hands.key("f5")
+        assert hands.window.trial is None and hands.desk.trouble
+    with opened_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as hands:
+        hands.desk.robots = 50
+        hands.key("f5")
+        assert hands.window.trial is None and "room for about" in hands.said
+
+
+def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(PILLAR)) as hands:
+        hands.desk.change(edits.noted(hands.sketch, Selection.of(0), "old oak"))
+        trial = tried(hands)
+        hands.key("c")
+        x, y = trial.arena.to_pixel((3.0, 3.0))
+        to_x, _ = trial.arena.to_pixel((3.5, 3.0))
+        hands.drag((x, y), (x + 3, y), (to_x, y))
+        hands.key("f5")
+        assert len(hands.shapes) == 2 and hands.sketch.obstacles[0].note == "old oak"
+        hands.key("ctrl+z")
+        assert len(hands.shapes) == 1
+
+
+def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet(PILLAR)) as hands:
+        trial = tried(hands)
+        trial.desk.attempt(lambda: trial.desk.open_map("square"))
+        assert trial.desk.elsewhere and "Untitled" in trial.desk.maps()
+        hands.key("f5")
+        assert hands.shapes == [PILLAR]
+        trial = tried(hands)
+        trial.desk.attempt(lambda: trial.desk.open_map("rooms"))
+        trial.desk.attempt(lambda: trial.desk.open_map("Untitled"))
+        assert not trial.desk.elsewhere and len(trial.desk.session.environment.obstacles) == 1
+        hands.key("escape")
+
+
+def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet()) as hands:
+        hands.key("c")
+        hands.drag_at((4, 4), (4.5, 4), (5, 4))
+        tried(hands)
+        hands.post(pygame.QUIT)
+        hands.settle()
+        hands.settle()
+        assert hands.window.trial is None and hands.desk.asked is not None and not hands.window.closed
+        hands.key("d")
+        assert hands.window.closed
+
+
+def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, sheet()) as hands:
+        tried(hands)
+        hands.key("t")
+        hands.key("f5")
+        assert hands.desk.theme == "dark"
+
+
+def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
+    sketch = sheet(PILLAR, PILLAR)
+    environment = sketch.environment()
+    assert brought_back(sketch, environment, environment) is None
+    assert brought_back(sketch, environment, sketch.environment()) is None
+    other = of_map("rooms").environment()
+    assert brought_back(sketch, environment, other) is None

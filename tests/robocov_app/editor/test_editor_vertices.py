@@ -1,0 +1,319 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from drawn_sketches import HALL, sound_sketches
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov.starts import DiscStart, PointsStart
+from robocov_app.editor import vertices
+from robocov_app.editor.document import BOUNDARY, Sketch
+from robocov_app.editor.selection import Edge, Selection, Vertex, place_of, points_of, ring_points, rings_of
+
+HOLE = ((2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0))
+FRAME = PolygonObstacle(((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)), (HOLE,), "frame")
+PILLAR = CircleObstacle((8.0, 4.0), 0.5)
+WALL = WallObstacle(((6.0, 1.0), (9.0, 1.0), (9.0, 3.0)), 0.1, "west")
+STARTS = (("disc", DiscStart((10.0, 6.0), 1.0)), ("two", PointsStart(((7.0, 6.0), (8.0, 6.0)))))
+
+
+@pytest.fixture
+def sketch() -> Sketch:
+    return Sketch("Hall", boundary=HALL, starts=STARTS).added([FRAME, PILLAR, WALL])[0]
+
+
+def picked(*chosen: Vertex) -> Selection:
+    return Selection(vertices=frozenset(chosen))
+
+
+# moving
+
+
+@given(st.data())
+def test_a_vertex_that_is_put_is_there(data):
+    sketch = data.draw(sound_sketches(least=1))
+    owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
+    vertex, before = data.draw(st.sampled_from(points_of(sketch, owner)))
+    to = data.draw(st.tuples(st.integers(-5, 15), st.integers(-5, 15)))
+    place = (to[0] + 0.25, to[1] + 0.5)
+    change = vertices.put(sketch, {vertex: place})
+    circle = isinstance(sketch.item(owner).shape, CircleObstacle) if owner != BOUNDARY else False
+    if circle and vertex.index:
+        center = place_of(sketch, Vertex(owner, 0, 0))
+        assert place_of(change.sketch, Vertex(owner, 0, 0)) == center
+        assert change.sketch.item(owner).shape.radius == pytest.approx(math.dist(center, place), abs=1e-4)
+        return
+    assert place_of(change.sketch, vertex) == place
+    others = [other for other, _ in points_of(sketch, owner) if other != vertex]
+    if not circle:
+        assert all(place_of(change.sketch, other) == place_of(sketch, other) for other in others)
+    back = vertices.put(change.sketch, {vertex: before}).sketch
+    assert back == sketch
+
+
+def test_several_things_move_together(sketch):
+    chosen = picked(
+        Vertex(0, 0, 2),
+        Vertex(0, 1, 0),
+        Vertex(1, 0, 1),
+        Vertex(2, 0, 2),
+        Vertex(BOUNDARY, 0, 0),
+        Vertex("two", 0, 1),
+    )
+    change = vertices.moved(sketch, chosen, 0.5, -0.25)
+    assert change.words == "6 vertices moved"
+    assert change.selection == chosen
+    after = change.sketch
+    assert after.item(0).shape.vertices[2] == (5.5, 4.75)
+    assert after.item(0).shape.holes[0][0] == (2.5, 1.75)
+    assert after.item(1).shape == CircleObstacle((8.0, 4.0), round(math.hypot(1.0, 0.25), 4))
+    assert after.item(2).shape.points[2] == (9.5, 2.75)
+    assert after.boundary[0] == (0.5, -0.25)
+    assert after.start("two").positions == ((7.0, 6.0), (8.5, 5.75))
+
+
+def test_centre_and_rim_of_discs(sketch):
+    assert vertices.put(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).sketch.start("disc") == DiscStart(
+        (9.0, 5.0), 1.0
+    )
+    assert vertices.put(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).sketch.start("disc") == DiscStart(
+        (10.0, 6.0), 2.0
+    )
+    both = {Vertex(1, 0, 0): (1.0, 1.0), Vertex(1, 0, 1): (9.0, 9.0)}
+    assert vertices.put(sketch, both).sketch.item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
+
+
+@pytest.mark.parametrize(
+    ("deed", "words"),
+    [
+        (lambda s: vertices.moved(s, Selection.of(0), 1, 1), "select vertices"),
+        (lambda s: vertices.moved(s, picked(Vertex(0, 0, 9)), 1, 1), "no such vertex"),
+        (lambda s: vertices.moved(s, picked(Vertex(99, 0, 0)), 1, 1), "no such vertex"),
+        (lambda s: vertices.moved(s, picked(Vertex("none", 0, 0)), 1, 1), "no such vertex"),
+        (lambda s: vertices.put(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
+        (lambda s: vertices.inserted(s, Edge(2, 0, 2, (9.0, 2.0))), "no such edge"),
+        (lambda s: vertices.inserted(s, Edge(1, 0, 0, (9.0, 2.0))), "no such edge"),
+        (lambda s: vertices.extended(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),
+        (lambda s: vertices.extended(s, Vertex(0, 0, 1), (1.0, 1.0)), "no wall"),
+        (lambda s: vertices.deleted(s, Selection.of(0)), "select vertices"),
+        (lambda s: vertices.deleted(s, picked(Vertex(1, 0, 1))), "delete the circle itself"),
+        (lambda s: vertices.deleted(s, picked(Vertex("disc", 0, 1))), "delete the start itself"),
+        (lambda s: vertices.deleted(s, picked(Vertex(-1, 0, 1), Vertex(-1, 0, 2))), "three corners at least"),
+        (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 0.0), "length above 0"),
+        (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 4.5), "of an edge that is 4 m long"),
+        (
+            lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0), Vertex(0, 0, 1)), 2.5),
+            "5 m of .* both ends",
+        ),
+        (lambda s: vertices.bevelled(s, picked(Vertex(2, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.bevelled(s, picked(Vertex(1, 0, 0)), 0.1), "select corners"),
+        (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 0.1, segments=0), "segments"),
+        (lambda s: vertices.rounded_off(s, picked(Vertex(0, 0, 0)), -1.0), "radius above 0"),
+        (lambda s: vertices.hole_cut(s, 1, HOLE), "turn it into one first"),
+        (lambda s: vertices.hole_cut(s, 0, HOLE[:2]), "three corners"),
+        (lambda s: vertices.hole_cut(s, 0, [(4, 4), (8, 4), (4, 4.5)]), "inside the polygon"),
+        (lambda s: vertices.hole_cut(s, 0, HOLE), "apart from other holes"),
+        (
+            lambda s: vertices.hole_cut(s, 0, [(4, 4), (4.5, 4.5), (4.5, 4), (4, 4.5)]),
+            "enclose|crosses itself",
+        ),
+        (lambda s: vertices.hole_filled(s, 0, 2), "no such hole"),
+        (lambda s: vertices.split(s, Vertex(2, 0, 0)), "between its ends"),
+        (lambda s: vertices.split(s, Vertex(0, 0, 0)), "no wall"),
+        (lambda s: vertices.joined(s, Selection.of(0, 2)), "walls to join"),
+        (lambda s: vertices.joined(s, Selection.of(2)), "walls to join"),
+        (lambda s: vertices.reversed_order(s, 1), "no order"),
+    ],
+)
+def test_what_cannot_be_done_is_said(sketch, deed, words):
+    with pytest.raises(MapError, match=words) as caught:
+        deed(sketch)
+    assert "\n" not in str(caught.value)
+
+
+# inserting and deleting
+
+
+@given(st.data())
+def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
+    sketch = data.draw(sound_sketches(least=1))
+    edges = [
+        Edge(owner, ring, k, (0.0, 0.0))
+        for owner in (BOUNDARY, *(item.key for item in sketch.obstacles))
+        for ring, points, closed in rings_of(sketch, owner)
+        for k in range(len(points) - (not closed))
+    ]
+    edge = data.draw(st.sampled_from(edges))
+    ring = ring_points(sketch, edge.of)[edge.ring]
+    a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
+    middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+    change = vertices.inserted(sketch, edge, middle)
+    (new,) = change.selection.vertices
+    assert (new.of, new.ring, new.index) == (edge.of, edge.ring, edge.index + 1)
+    assert place_of(change.sketch, new) == pytest.approx(middle, abs=1e-4)
+    if edge.of != BOUNDARY:
+        difference = change.sketch.item(edge.of).geometry ^ sketch.item(edge.of).geometry
+        assert difference.area < 1e-3
+    assert vertices.deleted(change.sketch, change.selection).sketch == sketch
+
+
+def test_rings_with_too_few_vertices_go(sketch):
+    gone = vertices.deleted(sketch, picked(Vertex(0, 1, 0), Vertex(0, 1, 1)))
+    assert gone.sketch.item(0).shape.holes == ()
+    assert gone.words == "2 vertices deleted"
+    gone = vertices.deleted(sketch, picked(*(Vertex(0, 0, k) for k in (0, 1))))
+    assert 0 not in gone.sketch.places
+    gone = vertices.deleted(sketch, picked(Vertex(2, 0, 0), Vertex(2, 0, 1)))
+    assert 2 not in gone.sketch.places
+    gone = vertices.deleted(sketch, picked(Vertex("two", 0, 0)))
+    assert gone.sketch.start("two").positions == ((8.0, 6.0),)
+    gone = vertices.deleted(gone.sketch, picked(Vertex("two", 0, 0)))
+    assert "two" not in dict(gone.sketch.starts)
+    assert len(vertices.deleted(sketch, picked(Vertex(BOUNDARY, 0, 0))).sketch.boundary) == 3
+
+
+# corners
+
+
+@given(st.floats(20.0, 160.0), st.floats(0.1, 0.9), st.integers(1, 40))
+def test_a_bevel_is_as_long_as_asked_and_a_rounding_touches_both_edges(degrees, length, segments):
+    angle = math.radians(degrees)
+    corner = ((2.0, 0.0), (0.0, 0.0), (2.0 * math.cos(angle), 2.0 * math.sin(angle)))
+    sketch, (key,) = Sketch().added([WallObstacle(corner, 0.1)])
+    change = vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), length, segments=segments)
+    points = np.array(change.sketch.item(key).shape.points)
+    assert len(points) == segments + 3
+    np.testing.assert_allclose(points[1], (length, 0.0), atol=1e-4)
+    np.testing.assert_allclose(points[-2], (length * math.cos(angle), length * math.sin(angle)), atol=1e-4)
+    # the circle that touches both edges there: its centre lies on the bisector
+    radius = length * math.tan(angle / 2)
+    center = np.array([length, radius])
+    away = np.hypot(*(points[1:-1] - center).T)
+    np.testing.assert_allclose(away, radius, atol=2e-4)
+    # and the same asked for by its radius
+    rounded = vertices.rounded_off(sketch, picked(Vertex(key, 0, 1)), radius)
+    points = np.array(rounded.sketch.item(key).shape.points)
+    np.testing.assert_allclose(np.hypot(*(points[1:-1] - center).T), radius, atol=2e-4)
+    middles = (points[1:-2] + points[2:-1]) / 2
+    assert (radius - np.hypot(*(middles - center).T)).max() <= 1.2e-3
+
+
+def test_corners_of_rings_are_cut_all_at_once(sketch):
+    corners = picked(*(Vertex(0, 0, k) for k in range(4)), *(Vertex(0, 1, k) for k in range(4)))
+    change = vertices.bevelled(sketch, corners, 0.5)
+    shape = change.sketch.item(0).shape
+    assert change.words == "8 corners bevelled"
+    assert shape.polygon.is_valid
+    assert shape.polygon.area == pytest.approx(16.0 - 4 * 0.125 - (1.0 - 4 * 0.125))
+    assert len(shape.vertices) == 8
+    # cuts that meet in the middle of an edge leave one vertex there
+    assert len(shape.holes[0]) == 4
+    bounded = vertices.bevelled(sketch, picked(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
+    assert bounded == ((0.0, 1.0), (1.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
+    disc = (
+        vertices.rounded_off(sketch, picked(*(Vertex(0, 0, k) for k in range(4))), 2.0).sketch.item(0).shape
+    )
+    assert shapely.Polygon(disc.vertices).area == pytest.approx(math.pi * 4.0, abs=0.02)
+
+
+def test_what_has_no_angle_is_no_corner():
+    ring = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0))
+    sketch, (key,) = Sketch().added([PolygonObstacle(ring)])
+    with pytest.raises(MapError, match="select corners"):
+        vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), 0.1)
+    spike = WallObstacle(((0.0, 0.0), (1.0, 0.0), (0.2, 0.0)), 0.1)
+    sketch, (key,) = Sketch().added([spike])
+    with pytest.raises(MapError, match="turns right back"):
+        vertices.bevelled(sketch, picked(Vertex(key, 0, 1)), 0.1)
+
+
+# edges
+
+
+@given(sound_sketches(least=1), st.integers(0, 20), st.sampled_from([-0.2, 0.05, 0.7]))
+def test_a_pushed_edge_stays_parallel_and_its_neighbours_keep_their_directions(sketch, k, by):
+    ring = ring_points(sketch, sketch.obstacles[0].key)[0]
+    assume(isinstance(sketch.obstacles[0].shape, PolygonObstacle))
+    edge = Edge(sketch.obstacles[0].key, 0, k % len(ring), (0.0, 0.0))
+    after = ring_points(vertices.edge_pushed(sketch, edge, by).sketch, edge.of)[0]
+    count = len(ring)
+
+    def direction(points, index):
+        a, b = np.array(points[index % count]), np.array(points[(index + 1) % count])
+        return (b - a) / max(np.hypot(*(b - a)), 1e-12)
+
+    e = edge.index
+    a, b, c = (np.array(ring[i % count]) for i in (e, e + 1, e))
+    normal = np.array([-(b - a)[1], (b - a)[0]]) / np.hypot(*(b - a))
+    assert (np.array(after[e]) - c) @ normal == pytest.approx(by, abs=2e-4)
+    for other in (e - 1, e, e + 1):
+        if math.dist(after[other % count], after[(other + 1) % count]) > 0.1:
+            before, now = direction(ring, other), direction(after, other)
+            assert abs(before[0] * now[1] - before[1] * now[0]) < 5e-3
+
+
+def test_ends_of_walls_are_pushed_straight(sketch):
+    after = vertices.edge_pushed(sketch, Edge(2, 0, 0, (7.0, 1.0)), 0.5).sketch.item(2).shape
+    assert after.points == ((6.0, 1.5), (9.0, 1.5), (9.0, 3.0))
+    moved = vertices.edge_moved(sketch, Edge(2, 0, 1, (9.0, 2.0)), 0.5, 0.25).sketch.item(2).shape
+    assert moved.points == ((6.0, 1.0), (9.5, 1.25), (9.5, 3.25))
+    around = vertices.edge_moved(sketch, Edge(0, 0, 3, (1.0, 2.0)), -0.5, 0.0)
+    assert around.sketch.item(0).shape.vertices == ((0.5, 1.0), (5.0, 1.0), (5.0, 5.0), (0.5, 5.0))
+    assert around.words == "edge of polygon “frame” moved"
+
+
+# holes and walls
+
+
+def test_holes_are_cut_and_filled(sketch):
+    change = vertices.hole_cut(sketch, 0, [(3.5, 3.5), (4.5, 3.5), (4.0, 4.5)])
+    assert len(change.sketch.item(0).shape.holes) == 2
+    assert change.sketch.item(0).shape.polygon.is_valid
+    filled = vertices.hole_filled(change.sketch, 0, 1)
+    assert filled.sketch.item(0).shape.holes == (((3.5, 3.5), (4.5, 3.5), (4.0, 4.5)),)
+    assert vertices.hole_filled(filled.sketch, 0, 1).sketch.item(0).shape.holes == ()
+
+
+def test_a_wall_goes_on_is_cut_and_joined(sketch):
+    longer = vertices.extended(sketch, Vertex(2, 0, 2), (11.0, 3.0))
+    assert longer.sketch.item(2).shape.points[-1] == (11.0, 3.0)
+    assert longer.selection == picked(Vertex(2, 0, 3))
+    before = vertices.extended(sketch, Vertex(2, 0, 0), (6.0, 0.0))
+    assert before.sketch.item(2).shape.points[0] == (6.0, 0.0)
+    assert before.selection == picked(Vertex(2, 0, 0))
+    halves = vertices.split(longer.sketch, Vertex(2, 0, 1))
+    first, second = (halves.sketch.item(key).shape for key in sorted(halves.selection.items))
+    assert first.points == ((6.0, 1.0), (9.0, 1.0))
+    assert second.points == ((9.0, 1.0), (9.0, 3.0), (11.0, 3.0))
+    assert first.name == second.name == "west"
+    again = vertices.joined(halves.sketch, halves.selection)
+    assert again.sketch == longer.sketch
+    assert again.words == "2 walls joined"
+
+
+@given(st.permutations(range(4)), st.lists(st.booleans(), min_size=4, max_size=4))
+def test_walls_join_in_any_order_either_way_round(order, turned):
+    whole = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (3.0, 1.0), (3.0, 5.0)]
+    pieces = [whole[k : k + 2][:: -1 if turned[k] else 1] for k in order]
+    sketch, keys = Sketch().added([WallObstacle(tuple(piece), 0.1) for piece in pieces])
+    (item,) = vertices.joined(sketch, Selection.of(*keys)).sketch.obstacles
+    assert list(item.shape.points) in (whole, whole[::-1])
+
+
+def test_walls_that_are_apart_are_joined_where_they_are_nearest():
+    walls = [WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.1), WallObstacle(((5.0, 0.0), (2.0, 0.5)), 0.3, "b")]
+    sketch, keys = Sketch().added(walls)
+    (item,) = vertices.joined(sketch, Selection.of(*keys)).sketch.obstacles
+    assert item.shape == WallObstacle(((0.0, 0.0), (1.0, 0.0), (2.0, 0.5), (5.0, 0.0)), 0.1, "b")
+
+
+def test_the_order_is_turned_round(sketch):
+    change = vertices.reversed_order(sketch, 0)
+    assert change.sketch.item(0).shape.vertices == FRAME.vertices[::-1]
+    assert vertices.reversed_order(change.sketch, 0).sketch == sketch

@@ -1,0 +1,388 @@
+"""The editor's window: panel, keyboard, mouse, menus, palette, help, sizes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from driven_editor import Hands, of_map, opened_editor, sheet
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.starts import DiscStart
+from robocov_app.demo.layout import SMALLEST
+from robocov_app.editor.actions import told_actions
+from robocov_app.editor.document import Sketch
+from robocov_app.editor.edits import circle_drawn, polygon_drawn
+from robocov_app.editor.panel import TABS
+from robocov_app.editor.pasteboard import OwnPasteboard, SystemPasteboard
+from robocov_app.editor.selection import Selection, Vertex
+from robocov_app.editor.status import facts
+
+BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
+PILLAR = CircleObstacle((7, 7), 1.0)
+
+
+@pytest.fixture
+def hands(tmp_path: Path) -> Iterator[Hands]:
+    with opened_editor(tmp_path, sheet(BOX, PILLAR, starts=(("door", DiscStart((8, 2), 0.8)),))) as driver:
+        yield driver
+
+
+# the panel
+
+
+def test_every_button_does_what_its_action_does(hands: Hands) -> None:
+    hands.push("tool:wall")
+    assert hands.desk.tool.name == "wall"
+    hands.push("tool:select")
+    hands.select(0)
+    hands.turn("object")
+    hands.push("rotate:left")
+    assert hands.desk.paper.history.can_undo
+    hands.push("undo")
+    assert hands.shapes[0] == BOX
+    hands.push("help")
+    assert hands.window.help
+
+
+def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
+    hands.turn("map")
+    hands.write("title", "Our office")
+    hands.key("return")
+    assert hands.sketch.name == "Our office"
+    hands.write("radius", "0.25")
+    hands.key("return")
+    assert hands.desk.radius == 0.25 and hands.desk.readout.radius == 0.25
+    hands.write("robots", "nine")
+    hands.key("return")
+    assert hands.desk.trouble and hands.desk.robots == 6
+    hands.push("more")
+    assert hands.desk.robots == 7
+    hands.tick("show:robots")
+    assert "robots" in hands.desk.shown
+
+
+def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
+    hands.select(0)
+    hands.turn("object")
+    assert hands.widget("entry", "name").get_text() == "box"
+    hands.write("x", "3.5")
+    hands.key("return")
+    hands.write("wide", "120cm")
+    hands.key("return")
+    assert hands.sketch.item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
+    hands.write("note", "oak")
+    hands.key("return")
+    assert hands.sketch.item(0).note == "oak"
+    hands.select(1)
+    hands.write("size:radius", "0.5")
+    hands.key("return")
+    assert hands.shapes[1].radius == 0.5
+    hands.select("door")
+    hands.write("name", "entrance")
+    hands.key("return")
+    assert hands.desk.start_names == ["entrance"]
+
+
+def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
+    hands.turn("object")
+    vertex = frozenset({Vertex(0, 0, 1)})
+    for selection in (
+        Selection(),
+        Selection.of(0),
+        Selection.of(1),
+        Selection.of(0, 1),
+        Selection.of(-1),
+        Selection.of("door"),
+        Selection(vertices=vertex),
+        Selection(vertices=vertex | {Vertex(0, 0, 2)}),
+    ):
+        hands.desk.select(selection)
+        hands.frames(2, 0.2)
+
+
+def test_the_list_of_vertices_selects_and_scrolls(hands: Hands) -> None:
+    ring = tuple((5 + np.cos(a), 5 + np.sin(a)) for a in np.arange(0, 6.2, 0.1))
+    hands.desk.change(polygon_drawn(hands.sketch, ring))
+    hands.turn("object")
+    hands.frames(2, 0.2)
+    left, top = hands.window.panel.list_box()[:2]
+    hands.click(left + 50, top + 30)
+    assert hands.desk.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
+    hands.wheel(left + 50, top + 30, -3)
+    hands.frames(2, 0.2)
+    left, top = hands.window.panel.list_box()[:2]
+    hands.click(left + 50, top + 30)
+    (vertex,) = hands.desk.selection.vertices
+    assert vertex.index > 3
+
+
+def test_the_snap_page_switches_and_sets(hands: Hands) -> None:
+    hands.turn("snap")
+    hands.tick("snap:grid")
+    assert "grid" not in hands.desk.snaps
+    hands.tick("page:names")
+    assert "names" not in hands.desk.shown
+    hands.write("grid", "0.5")
+    hands.key("return")
+    assert hands.desk.grid == 0.5
+
+
+def test_pages_are_turned_by_keys(hands: Hands) -> None:
+    seen = []
+    for _ in TABS:
+        hands.key("ctrl+tab")
+        seen.append(hands.window.panel.tab)
+    assert sorted(seen) == sorted(TABS)
+    hands.key("h")
+    assert hands.window.layout.panel[2] == 0
+    hands.key("f2")  # the field of the map's name brings the panel back
+    assert hands.window.layout.panel[2] > 0 and hands.window.panel.typing
+    hands.type("New name")
+    hands.key("return")
+    assert hands.sketch.name == "New name"
+
+
+def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
+    hands.turn("map")
+    hands.write("title", "wall")
+    assert hands.desk.tool.name == "select" and hands.window.panel.typing
+    hands.key("escape")
+    assert not hands.window.panel.typing and hands.sketch.name == "Untitled"
+
+
+def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
+    for radius in (0.2, 0.3, 0.4):
+        hands.desk.change(circle_drawn(hands.sketch, (5, 5), radius))
+    hands.turn("history")
+    rows = hands.window.panel.history._rows
+    assert [row.about for row in rows] == [0, 1, 2, 3]
+    left, top, _, _ = hands.window.panel.list_box()
+
+    def click(row: int) -> None:
+        hands.wait()
+        hands.click(left + 60, top + 22 * row + 8)
+        hands.frames(1, 0.2)
+
+    click(2)
+    assert len(hands.shapes) == 3
+    assert [row.about for row in hands.window.panel.history._rows] == [-2, -1, 0, 1]
+    click(3)
+    assert len(hands.shapes) == 2
+    click(0)
+    assert len(hands.shapes) == 5
+
+
+# the mouse
+
+
+def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
+    at = hands.pixel((5, 5))
+    zoom = hands.window.arena.camera.zoom
+    hands.wheel(*at, 3)
+    assert hands.window.arena.camera.zoom > zoom * 1.3
+    assert hands.pixel((5, 5)) == pytest.approx(at, abs=1)
+    center = hands.window.arena.camera.center
+    hands.drag((300, 300), (330, 310), (360, 320), button=3)
+    moved = hands.window.arena.camera.center
+    assert moved[0] < center[0] and hands.window.menu is None
+    hands.key("f")
+    assert hands.window.arena.camera.zoom == pytest.approx(zoom)
+
+
+def test_space_and_the_pan_tool_move_the_sheet(hands: Hands) -> None:
+    center = hands.window.arena.camera.center
+    hands.key("g")
+    hands.drag((300, 300), (330, 310), (360, 320))
+    assert hands.window.arena.camera.center != center
+    hands.key("v")
+    before, center = hands.sketch, hands.window.arena.camera.center
+    hands.post(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
+    hands.settle()
+    hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
+    hands.post(pygame.KEYUP, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
+    hands.settle()
+    assert hands.sketch is before and hands.window.arena.camera.center != center
+    hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
+    assert hands.sketch is not before
+
+
+def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
+    for _ in range(80):
+        hands.key("ctrl+left")
+        hands.wheel(300, 300, -5)
+    low_x, low_y, high_x, high_y = hands.window.arena.camera.visible()
+    assert low_x < 10 and high_x > 0 and low_y < 10 and high_y > 0
+    hands.key("f")
+    hands.select(1)
+    hands.key("z")
+    low_x, _, high_x, _ = hands.window.arena.camera.visible()
+    assert high_x - low_x < 5
+
+
+def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
+    hands.click_at((3, 3), button=3)
+    menu = hands.window.menu
+    assert menu is not None and hands.desk.selection == Selection.of(0)
+    hands.window.draw()
+    names = [action.name if action else "" for action in menu.actions]
+    row = names.index("duplicate")
+    hands.key("down", times=sum(1 for name in names[: row + 1] if name))
+    hands.key("return")
+    assert len(hands.shapes) == 3 and hands.window.menu is None
+    hands.click_at((9.5, 5), button=3)
+    hands.window.draw()
+    assert not hands.desk.selection
+    assert "paste" in [action.name for action in hands.window.menu.actions if action]
+    box = hands.window.menu.box
+    hands.move(box.left + 30, box.top + 40)
+    hands.release()
+    assert hands.window.menu is None and hands.desk.selection  # "Select all"
+    hands.click_at((3, 3), button=3)
+    hands.key("escape")
+    assert hands.window.menu is None
+
+
+def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
+    hands.key("p")
+    hands.click_all((5, 1), (6, 1), (6, 2))
+    hands.click_at((6, 2), button=3)
+    assert len(hands.shapes) == 3 and hands.window.menu is None
+
+
+# palette, help, look
+
+
+def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
+    hands.select(0)
+    hands.key("ctrl+k")
+    hands.type("mirror left")
+    hands.key("return")
+    assert hands.desk.paper.history.can_undo
+    hands.command("rotate 90")
+    assert "turned" in hands.said or "rotated" in hands.said
+    hands.key("/")
+    assert hands.window.palette.open and hands.window.palette.text == ""
+    hands.key("escape")
+    hands.key("ctrl+k")
+    hands.key("return")
+    assert not hands.window.palette.open
+
+
+@pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
+def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatch) -> None:
+    from robocov_app.demo import overlays
+
+    words: set[str] = set()
+    real = overlays.label
+
+    def label(text, *rest):
+        words.add(text)
+        return real(text, *rest)
+
+    with opened_editor(tmp_path, size=size, scale=scale) as hands:
+        monkeypatch.setattr(overlays, "label", label)
+        hands.key("f1")
+    for action in told_actions():
+        if action.keys:
+            title = action.title.partition(":")[0] if action.group == "Tools" else action.title
+            assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
+
+
+def test_light_dark_and_every_size(hands: Hands) -> None:
+    hands.key("t")
+    assert hands.picture().mean() < 90
+    for size in (SMALLEST, (640, 480), (1600, 500), (700, 1200)):
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+        hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+        hands.settle()
+        hands.frames(2)
+        assert hands.window.layout.size == size
+        hands.key("f")
+        for tab in TABS:
+            hands.window.panel.show_tab(tab)
+            hands.frames(1, 0.2)
+
+
+def test_a_screenshot_is_saved(hands: Hands, tmp_path: Path) -> None:
+    hands.key("f12")
+    assert (tmp_path / "robocov-1.png").exists()
+
+
+def test_the_status_line_says_where_what_and_how(hands: Hands) -> None:
+    hands.go((3, 3))
+    hands.select(0)
+    said = facts(hands.desk, 60.0, None)
+    assert said[0].startswith("(3.0") and any("box" in each for each in said) and "60 fps" in said
+    hands.key("w")
+    assert any(each.startswith("Wall: click its points") for each in facts(hands.desk, 60.0, None))
+
+
+def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
+    hands.select(0)
+    hands.key("right")
+    hands.frames(1)
+    assert pygame.display.get_caption()[0] == "● Untitled · robocov edit"
+
+
+def test_clipboards_keep_texts() -> None:
+    own = OwnPasteboard()
+    assert own.get() == ""
+    own.put("text")
+    assert own.get() == "text"
+    without_display = SystemPasteboard()
+    pygame.display.quit()
+    without_display.put("text")
+    assert without_display.get() == "text"
+
+
+def test_dragging_one_of_a_thousand_obstacles_takes_less_than_a_frame(tmp_path: Path) -> None:
+    generator = np.random.default_rng(0)
+    rings = []
+    for k in range(1000):
+        angles = np.sort(generator.uniform(0, 2 * np.pi, 20))
+        points = np.column_stack([np.cos(angles), np.sin(angles)]) * generator.uniform(0.25, 0.42, (20, 1))
+        rings.append(np.round(points + (k % 32 + 0.5, k // 32 + 0.5), 4))
+    shapes = [PolygonObstacle(tuple(map(tuple, ring.tolist()))) for ring in rings]
+    sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).added(shapes)[0]
+    with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
+        window, sheet = hands.window, hands.window.arena.sheet
+        hands.desk.snapper.patient = False
+        spot = sketch.obstacles[500].geometry.representative_point()
+        x, y = hands.pixel((spot.x, spot.y))
+        hands.press(x, y)
+        full, times = sheet.full, []
+        for k in range(60):
+            at = round(x + 2 * k), round(y + k % 7)
+            hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
+            began = time.thread_time()
+            window.frame(1 / 60)
+            times.append(time.thread_time() - began)
+        assert hands.desk.pending is not None
+        assert sheet.full == full  # the thousand are not drawn again
+        assert np.median(times) < 1 / 60
+
+
+class NoReadings:
+    busy = False
+
+    def ask(self, sketch, radius) -> None:
+        pass
+
+    def poll(self) -> None:
+        return None
+
+
+def test_a_double_click_that_drags_still_drags(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, of_map("square")) as hands:
+        hands.key("r")
+        hands.drag_at((2, 2), (3, 3), (6, 6))
+        hands.key("v")
+        hands.wait()
+        hands.click_at((4, 4))
+        hands.drag_at((4, 4), (4.5, 4.5), (5, 4))  # at once
+        assert hands.sketch.obstacles[0].geometry.bounds == (3.0, 2.0, 7.0, 6.0)
