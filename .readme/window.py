@@ -1,19 +1,28 @@
-"""Draws what the README shows of `robocov demo`: window.png, window-dark.png and tour.mp4."""
+"""Draws what the README shows of the windows: window.png, editor.png, both in the dark, and tour.mp4."""
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import imageio_ffmpeg
+import pygame
 from PIL import Image
 
-from robocov.mapfile import load_map
+from robocov.mapfile import load_map, map_file
 from robocov_app.demo.film import pixels
 from robocov_app.demo.opening import HEADLESS_FPS, Opening
 from robocov_app.demo.scenario import Law, Scenario
 from robocov_app.demo.session import Session
+from robocov_app.editor.adding import rectangle_drawn
+from robocov_app.editor.opening import EditorOpening
+
+if TYPE_CHECKING:
+    from robocov_app.demo.window import Window
+    from robocov_app.editor.window import EditorWindow
 
 HERE = Path(__file__).parent
 SIZE = (1280, 720)
@@ -36,8 +45,34 @@ def picture(theme: str, name: str) -> None:
         desk.pass_time(60.0)  # what was said is old
         for _ in range(8):
             window.frame(0.0)
-        small = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
-        small.save(HERE / name, optimize=True)
+        keep(window, name)
+
+
+def editor(theme: str, name: str) -> None:
+    """Draw a show-case into a museum, and drag it until it is in line with the others."""
+    path = map_file("museum")
+    with EditorOpening(path, HERE, theme=theme, size=SIZE, headless=True).window() as window:
+        desk = window.desk
+        desk.change(rectangle_drawn(desk.sketch, (15.6, 7.0), (17.9, 7.6)))
+        window.panel.show_tab("object")
+        window.frame(0.5)
+        to = window.arena.to_pixel
+        hand = [(16.6, 7.3), (16.8, 7.0), (17.8, 5.0), (18.03, 4.33)]
+        points = [tuple(map(round, to(point))) for point in hand]
+        pygame.event.post(pygame.Event(pygame.MOUSEBUTTONDOWN, pos=points[0], button=1))
+        for before, point in itertools.pairwise(points):
+            rel = (point[0] - before[0], point[1] - before[1])
+            pygame.event.post(pygame.Event(pygame.MOUSEMOTION, pos=point, rel=rel, buttons=(1, 0, 0)))
+            window.frame(0.1)
+        for _ in range(8):
+            window.frame(0.1)
+        keep(window, name)
+
+
+def keep(window: Window | EditorWindow, name: str) -> None:
+    """Save what a window shows, as small as it can be."""
+    small = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
+    small.save(HERE / name, optimize=True)
 
 
 def film(name: str) -> None:
@@ -63,5 +98,7 @@ def film(name: str) -> None:
 if __name__ == "__main__":
     picture("light", "window.png")
     picture("dark", "window-dark.png")
+    editor("light", "editor.png")
+    editor("dark", "editor-dark.png")
     if "--film" in sys.argv[1:]:
         film("tour.mp4")
