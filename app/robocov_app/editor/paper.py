@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from robocov.mapfile import bundled_maps
 from robocov_app.editor import files
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.drafts import DraftKeeper
+from robocov_app.editor.edits import titled
 from robocov_app.editor.history import History
 from robocov_app.editor.selection import Change, Selection
 
@@ -130,9 +132,14 @@ class Paper:
         path = path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
         if is_bundled(path):
             raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")
-        sketch = self.history.sketch
+        sketch, named = self.history.sketch, None
+        if sketch.name == Sketch.name:  # nobody has named it: the file does
+            named = replace(titled(sketch, path.stem), selection=self.history.selection)
+            sketch = named.sketch
         before = self.disk if path == self.path else None
         self.disk = files.saved(sketch, path, before, over=over or (self._over and path == self.path))
+        if named is not None:
+            self.history.do(named)
         self.path, self.state, self._over = path, "same", False
         self.history.mark_saved()
         self._kept = sketch

@@ -41,6 +41,10 @@ def test_saving_and_opening_again(tmp_path: Path) -> None:
     again = Paper.opened(tmp_path / "plan.json", None)
     assert again.title == "plan.json" and not again.unsaved
     assert [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
+    assert again.history.sketch.name == paper.history.sketch.name == "plan"  # nobody had named it
+    paper.history.do(edits.titled(paper.history.sketch, "My plan"))
+    paper.save(tmp_path / "plan")
+    assert load_map(tmp_path / "plan.json").name == "My plan"
     paper.history.undo()
     assert paper.unsaved
     paper.history.redo()
