@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+from collections.abc import Callable
 from typing import TypeVar
 
 import tyro
@@ -13,7 +14,7 @@ from robocov.errors import InputError
 
 T = TypeVar("T")
 
-_WORDING = (
+_WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (
         r"^Error parsing (\S+): invalid literal for int\(\) with base 10: (.*)$",
         r"\1: \2, but a whole number was wanted",
@@ -21,12 +22,18 @@ _WORDING = (
     (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
     (
         r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
-        r"\2: \1, but one of \3 was wanted",
+        lambda match: f"{match[2]}: {match[1]}, but one of {_choices(match[3])} was wanted",
     ),
     (r"^Missing value for argument '(\S+)'\..*$", r"\1: a value was wanted"),
     (r"^Missing from robocov \w+: (\S+).*$", r"\1: this option is required"),
     (r"^Unrecognized options: (.*)$", r"unknown option \1"),
 )
+
+
+def _choices(text: str) -> str:
+    """Return choices without None; with it they come in any order, and are sorted then."""
+    choices = text.split(", ")
+    return ", ".join(sorted(set(choices) - {"'None'"}) if "'None'" in choices else choices)
 
 
 def parsed(kind: type[T], command: str, words: list[str]) -> T:

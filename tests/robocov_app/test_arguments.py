@@ -19,6 +19,8 @@ class Options:
     """How long."""
     kind: Literal["a", "b"] = "a"
     """Which."""
+    study: Literal["late", "early"] | None = None
+    """Or none."""
 
 
 def test_words_become_values() -> None:
@@ -32,6 +34,7 @@ def test_words_become_values() -> None:
         ("--count 1.5", "--count: '1.5', but a whole number was wanted"),
         ("--length far", "--length: 'far', but a number was wanted"),
         ("--kind c", "--kind: 'c', but one of 'a', 'b' was wanted"),
+        ("--study mid", "--study: 'mid', but one of 'early', 'late' was wanted"),
         ("--kount 3", "unknown option --kount, 3: did you mean --count?"),
         ("--count", "--count: a value was wanted"),
     ],

@@ -125,7 +125,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("--study full", "--out: a folder for the maps was wanted with --count and --study"),
         ("--study full --gap 0.7 --out maps", "--gap: 0.7, but --study says what its maps are like"),
         ("--study full --count 3 --out maps", "--count: 3, but --study says what its maps are like"),
-        ("--study half", "--study: 'half', but one of 'None', 'full', 'quick' was wanted"),
+        ("--study half", "--study: 'half', but one of 'full', 'quick' was wanted"),
         ("--plot sheet.gif", "sheet.gif: suffix '.gif', but .png, .svg or .pdf was wanted"),
         ("--plot none/sheet.png", "none/sheet.png: cannot be written: there is no folder none"),
         ("--out .", "--out: '.', but the name of a file was wanted"),

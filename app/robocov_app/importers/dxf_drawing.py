@@ -9,6 +9,7 @@ import numpy as np
 
 from robocov.errors import MapError, RobocovError, shown
 from robocov.mapmodels import FARTHEST
+from robocov.strictjson import one_line
 from robocov_app.importers.curves import TOLERANCE
 from robocov_app.importers.dxf_curves import Plane, ellipse, flat, spline
 from robocov_app.importers.limits import MAX_DEPTH
@@ -94,7 +95,8 @@ class DxfDrawing:
 
         total = count(space)
         if total > MOST_ENTITIES:
-            what = f"{total:.3g} entities to be drawn, blocks and all"
+            # of blocks in blocks it may be too many for a float
+            what = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
             raise MapError(f"{self.where}: {what}, but at most {MOST_ENTITIES} were wanted")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
@@ -108,7 +110,7 @@ class DxfDrawing:
             except RobocovError:
                 raise
             except Exception as error:  # of ezdxf, which raises what it likes on nonsense
-                self.shapes.leave_out("damaged shape", f"({entity.dxftype()[:20]}: {type(error).__name__})")
+                self.shapes.leave_out("damaged shape", f"({one_line(entity.dxftype())[:20]}: {type(error).__name__})")
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
         """Add an entity, or what a block holds; see `_draw`."""
@@ -135,7 +137,7 @@ class DxfDrawing:
 
     def _add(self, kind: str, entity: Any, labels: tuple[str, ...]) -> None:
         """Add one entity that is no block."""
-        at = f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind
+        at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
         if kind == "LINE":
             ends = self._metres([entity.dxf.start, entity.dxf.end])
             self.shapes.add_line(Line(ends, self.shapes.thickness, labels), at=at)
@@ -157,7 +159,7 @@ class DxfDrawing:
         elif kind == "HATCH":
             self.shapes.leave_out("HATCH", "(--hatches takes them as areas)")
         else:
-            self.shapes.leave_out(kind)
+            self.shapes.leave_out(one_line(kind)[:40])
 
     @property
     def _tolerance(self) -> float:

@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
 
-NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)", re.ASCII)
-_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]*|%)\s*", re.ASCII)
+# nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
+_DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
+NUMBER = re.compile(rf"[\s,]*+({_DECIMAL})", re.ASCII)
+_LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
 
 _LARGEST = 1e30

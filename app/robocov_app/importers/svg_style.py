@@ -34,10 +34,8 @@ INHERITED = {
 OWN = ("display", "opacity", "transform", "clip-path", "mask")
 """What belongs to an element itself."""
 
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-_RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
-_IMPORTANT = re.compile(r"\s*!\s*important\s*$", re.IGNORECASE)
+_IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
 _AT_RULE_PARTS = re.compile(r"[{};]")
 
@@ -93,8 +91,12 @@ class StyleSheet:
         self._size += len(text)
         if self._size > MOST_TEXT:
             raise MapError(f"{self.where}: style sheets of over {MOST_TEXT} characters, but less was wanted")
-        text = _COMMENT.sub(" ", text.replace("<!--", " ").replace("-->", " "))
-        for selectors, body in _RULE.findall(self._without_at_rules(text)):
+        text = _without_comments(text.replace("<!--", " ").replace("-->", " "))
+        for rule in self._without_at_rules(text).split("}")[:-1]:
+            before, brace, body = rule.rpartition("{")
+            if not brace:
+                continue
+            selectors = before.rpartition("{")[2]
             properties = _by_importance(declarations(body))
             for selector in selectors.split(","):
                 self._add(selector.strip(), properties)
@@ -151,6 +153,15 @@ class StyleSheet:
         self._keyed.setdefault(key, []).append(rule)
 
 
+def _without_comments(text: str) -> str:
+    """Return a style sheet without comments; one without an end is none."""
+    kept, at = [], 0
+    while (begin := text.find("/*", at)) >= 0 and (end := text.find("*/", begin + 2)) >= 0:
+        kept += [text[at:begin], " "]
+        at = end + 2
+    return "".join([*kept, text[at:]])
+
+
 def declarations(text: str) -> dict[str, str]:
     """Return the properties of a ``style`` attribute or of the body of a rule.
 
@@ -166,7 +177,7 @@ def _by_importance(properties: dict[str, str]) -> tuple[dict[str, str], dict[str
     important = {name for name, value in properties.items() if _IMPORTANT.search(value)}
     return (
         {name: value for name, value in properties.items() if name not in important},
-        {name: _IMPORTANT.sub("", properties[name]) for name in properties if name in important},
+        {name: _IMPORTANT.sub("", properties[name]).rstrip() for name in properties if name in important},
     )
 
 
