@@ -96,6 +96,10 @@ class Shaping:
                 raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(choices)} was wanted")
 
 
+_ZERO = 1e-100
+"""Coordinates nearer to zero, in metres, are zero; as of map files."""
+
+
 @dataclass
 class _Told:
     """What the report will say."""
@@ -190,7 +194,8 @@ def _valid(given: MultiPolygon, outer: Polygon | None, told: _Told, where: str) 
     """Return the free space within `outer` as disjoint valid polygons, the largest first."""
     if not np.isfinite(shapely.get_coordinates(given)).all():
         raise MapError(f"{where}: a coordinate is not finite, but numbers were wanted")
-    free: BaseGeometry = given
+    # what is all but zero makes GEOS divide by zero
+    free: BaseGeometry = shapely.transform(given, lambda points: np.where(abs(points) < _ZERO, 0.0, points))
     if not free.is_valid:
         told.repaired.append(f"outlines met themselves or each other: {_reason(free)}")
         free = shapely.make_valid(free, method="structure", keep_collapsed=False)

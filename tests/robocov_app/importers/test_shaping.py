@@ -46,6 +46,12 @@ def test_the_largest_part_and_its_obstacles() -> None:
     assert report.to_dict()["size_m"] == [10.0, 8.0]
 
 
+@pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
+def test_what_is_all_but_zero_is_zero(tiny: float) -> None:
+    environment, _ = shaped(foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan")
+    assert sorted(environment.boundary) == [(0, 0), (0, 7), (6, 7)]
+
+
 def test_all_parts_lie_in_their_convex_hull() -> None:
     environment, report = shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")
     assert environment.free_area == pytest.approx(ROOM.area + 9)
