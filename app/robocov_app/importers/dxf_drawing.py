@@ -110,7 +110,9 @@ class DxfDrawing:
             except RobocovError:
                 raise
             except Exception as error:  # of ezdxf, which raises what it likes on nonsense
-                self.shapes.leave_out("damaged shape", f"({one_line(entity.dxftype())[:20]}: {type(error).__name__})")
+                self.shapes.leave_out(
+                    "damaged shape", f"({one_line(entity.dxftype())[:20]}: {type(error).__name__})"
+                )
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
         """Add an entity, or what a block holds; see `_draw`."""
