@@ -17,7 +17,7 @@ from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.shapes import Line, Outline, Shapes, polygonised
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from shapely.geometry.base import BaseGeometry
 
@@ -29,6 +29,10 @@ AROUND = 1.0
 
 _MOST = 0.5
 """A boundary holds more than this part of the other shapes; walls that are one leave so much of it open."""
+
+
+_FARTHEST_PARTS = 10.0 * LARGEST
+"""Shapes that are farther from each other, in metres, are of no map: unions of such take seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,9 @@ def foreign_map(
     if not shapes.outlines and not shapes.lines:
         dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
         raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
+    everything = [*(o.area for o in shapes.outlines), *(shapely.linestrings(e.points) for e in shapes.lines)]
+    # one of many parts may be a map, if they are not all too far from each other
+    _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
     shapes.require_untangled()
     asked = shapes.options.outlines
     boundary = _named(shapes) or (_largest(shapes, solid or asked == "solid") if asked != "free" else None)
@@ -100,7 +107,7 @@ def foreign_map(
             area = boundary.area
         if area.is_empty:
             raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
-    _require_size(area, shapes.where)
+    _require_size(area.geoms[0].bounds, shapes.where)
     used = boundary or _Enclosure(area, "")
     blocks = [o.area for o in shapes.outlines if solid and o not in used.outlines]
     solids = [line.solid for line in shapes.lines if line not in used.lines] + shapes.pillars
@@ -126,10 +133,10 @@ def foreign_map(
     )
 
 
-def _require_size(area: MultiPolygon, where: str) -> None:
+def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     """Refuse what no map may be, before it is computed with."""
-    x, y, right, top = area.geoms[0].bounds
-    if max(right - x, top - y) > LARGEST:
+    x, y, right, top = bounds
+    if max(right - x, top - y) > most:
         size = f"{right - x:.6g} x {top - y:.6g} m"
         wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
         raise MapError(f"{where}: {size}, but {wanted}")

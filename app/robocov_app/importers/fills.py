@@ -25,12 +25,14 @@ MAX_CROSSINGS = 30_000
 """Edges may cross each other so often in a file. A ring of some kB can cross itself millions of times,
 and to find all of these places takes minutes and gigabytes."""
 
-_SAMPLES, _WORK, _CERTAIN = 500, 400_000, 50
-"""Edges that are looked at for an estimate, pairs of edges that are compared for it at most, and crossings
-that are enough for one."""
+_SAMPLES, _TOGETHER, _WORK, _CERTAIN = 500, 20, 400_000, 50
+"""Edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
+most, and crossings that are enough for one."""
 
 
-def enclosed(rings: Sequence[Array], rule: Rule = "holes") -> tuple[MultiPolygon, str | None]:
+def enclosed(
+    rings: Sequence[Array], rule: Rule = "holes", where: str = "rings"
+) -> tuple[MultiPolygon, str | None]:
     """Return the valid area that rings enclose, and what was wrong with them.
 
     Parameters
@@ -40,6 +42,8 @@ def enclosed(rings: Sequence[Array], rule: Rule = "holes") -> tuple[MultiPolygon
     rule : str
         ``holes``: the first ring without the others. ``evenodd``, ``nonzero``: what a ray from there
         crosses an odd number of times, or what the rings wind around (SVG 2, 13.3.3).
+    where : str
+        What messages call the file.
 
     Returns
     -------
@@ -47,6 +51,11 @@ def enclosed(rings: Sequence[Array], rule: Rule = "holes") -> tuple[MultiPolygon
         The largest part first; empty where nothing is enclosed.
     reason : str or None
         Where a ring meets itself or another one, of polygons with holes; fills may.
+
+    Raises
+    ------
+    MapError
+        When the rings cross each other more often than `MAX_CROSSINGS`.
 
     Examples
     --------
@@ -58,13 +67,13 @@ def enclosed(rings: Sequence[Array], rule: Rule = "holes") -> tuple[MultiPolygon
     if not any(good) or (rule == "holes" and not good[0]):
         return MultiPolygon(), None
     rings = [ring for ring, whole in zip(rings, good, strict=True) if whole]
-    if rule == "holes" or len(rings) == 1:
-        plain = Polygon(rings[0], rings[1:])
-        if plain.is_valid:
-            return polygons_of(plain), None
-        if rule == "holes":
-            area = _mended(rings)
-            return area, None if area.is_empty else shapely.is_valid_reason(plain)
+    plain = Polygon(rings[0], rings[1:])
+    if (rule == "holes" or len(rings) == 1) and plain.is_valid:
+        return polygons_of(plain), None
+    require_untangled(edges_of(rings, closed=True), where)
+    if rule == "holes":
+        area = _mended(rings)
+        return area, None if area.is_empty else shapely.is_valid_reason(plain)
     return _filled(rings, rule), None
 
 
@@ -104,14 +113,18 @@ def require_untangled(edges: Array, where: str) -> None:
     tree = shapely.STRtree(lines)
     order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
     crossings = work = 0
-    for count, k in enumerate(order, start=1):
-        near = tree.query(lines[k])
-        work += len(near)
-        crossings += int(shapely.crosses(lines[k], lines[near]).sum())
+    for begin in range(0, len(order), _TOGETHER):
+        some = order[begin : begin + _TOGETHER]
+        one, other = tree.query(lines[some])
+        work += len(one)
+        crossings += int(shapely.crosses(lines[some[one]], lines[other]).sum())
         # each is seen from both of its edges
-        if crossings > _CERTAIN and crossings * n / count / 2 > MAX_CROSSINGS:
-            found = f"its lines cross each other some {crossings * n / count / 2:.1g} times"
-            raise MapError(f"{where}: {found}, but at most {MAX_CROSSINGS} times was wanted")
+        found = crossings * n / (begin + len(some)) / 2
+        if crossings > _CERTAIN and found > MAX_CROSSINGS:
+            raise MapError(
+                f"{where}: its lines cross each other some {found:.1g} times, but at most {MAX_CROSSINGS} "
+                "times was wanted"
+            )
         if work > _WORK:
             break
 
@@ -145,7 +158,10 @@ def _filled(rings: Sequence[Array], rule: Rule) -> MultiPolygon:
     inside = shapely.get_coordinates(shapely.point_on_surface(faces))
     winding, crossings = _windings(inside, edges_of(rings, closed=True))
     chosen = crossings % 2 == 1 if rule == "evenodd" else winding != 0
-    return polygons_of(shapely.coverage_union_all(faces[chosen]))
+    try:
+        return polygons_of(shapely.coverage_union_all(faces[chosen]))
+    except shapely.GEOSException:  # faces so thin that rounding has folded them over others
+        return polygons_of(shapely.union_all(faces[chosen], grid_size=GRID))
 
 
 def _windings(points: Array, edges: Array) -> tuple[Array, Array]:

@@ -182,8 +182,7 @@ class Shapes:
             When a coordinate is out of range, or there are too many vertices or crossings.
         """
         rings = self._checked(rings, at)
-        require_untangled(edges_of(rings, closed=True), self.where)
-        area, reason = enclosed(rings, rule)
+        area, reason = enclosed(rings, rule, self.where)
         if reason is not None:
             self._met.append(f"{at}: {reason}" if at else reason)
         if not area.is_empty:
