@@ -174,9 +174,11 @@ def test_a_question_before_unsaved_work_is_closed(display: str, tmp_path: Path) 
     with edited(display, tmp_path, tmp_path / "fresh.json") as hands:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
         hands.key("c")
+        empty = hands.shot()
         hands.drag(at(5, 5), at(5.5, 5), at(6, 5))
+        drawn = differs(hands, empty, 0.002)
         hands.key("ctrl+q")
-        hands.shot()
+        differs(hands, drawn, 0.002)  # there is a question
         assert hands.process.poll() is None
         hands.key("Escape")  # cancel
         hands.shot()
