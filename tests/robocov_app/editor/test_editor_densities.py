@@ -1,0 +1,197 @@
+"""The density in the editor: kept through load, edit and save; hot spots drawn, moved and weighed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from density_cases import KINDS
+from driven_editor import opened_editor, sheet
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedPolygons
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import MapError
+from robocov.mapfile import dump_map, load_map, save_map, to_json
+from robocov_app.editor import densities
+from robocov_app.editor.document import Sketch, parse_sketch, sketch_of, sketch_text
+from robocov_app.editor.files import opened, saved
+from robocov_app.editor.problems import problems
+
+RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
+
+
+def heavy(density=ONE) -> Sketch:
+    return Sketch.from_environment(Environment("heavy", RING, density=density))
+
+
+@pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
+def test_it_passes_through_unchanged(density, tmp_path):
+    path = tmp_path / "heavy.json"
+    save_map(Environment("heavy", RING, density=density), path)
+    sketch, disk = opened(path)
+    assert sketch.density == density and sketch.environment() == load_map(path)
+    assert sketch_text(sketch) == path.read_text() == dump_map(load_map(path))
+    edited, _ = sketch.added([CircleObstacle((5.0, 5.0), 0.5)])
+    saved(edited, path, disk)
+    assert load_map(path).density == density and len(load_map(path).obstacles) == 1
+
+
+def test_a_picture_is_read_when_the_map_is(tmp_path):
+    Image.fromarray(np.array([[0, 255], [51, 102]], dtype=np.uint8)).save(tmp_path / "phi.png")
+    document = to_json(Environment("heavy", RING)) | {
+        "density": {"kind": "raster", "picture": "phi.png", "white": 5}
+    }
+    path = tmp_path / "heavy.json"
+    path.write_text(json.dumps(document))
+    sketch, _ = opened(path)
+    assert sketch.density == load_map(path).density and isinstance(sketch.density, Raster)
+    saved(sketch, tmp_path / "elsewhere.json")
+    (tmp_path / "phi.png").unlink()
+    assert load_map(tmp_path / "elsewhere.json").density == sketch.density
+    with pytest.raises(MapError, match=r"heavy.json:.*density.picture: .phi.png.: no such file"):
+        opened(path)
+
+
+def test_what_is_no_density_is_refused_with_its_place():
+    text = json.dumps(to_json(Environment("heavy", RING)) | {"density": {"kind": "gausians"}})
+    with pytest.raises(MapError, match=r"density\.kind"):
+        parse_sketch(text, "mine.json")
+    # a draft without a boundary may have one all the same
+    document = to_json(Environment("heavy", RING, density=ONE))
+    del document["boundary"]
+    assert sketch_of(document).density == ONE
+
+
+def test_a_density_that_is_nothing_in_the_free_space_is_a_problem():
+    nothing = WeightedPolygons(KINDS["rooms"].areas[1:], 0.0)
+    covering = sheet(CircleObstacle((7.0, 5.5), 3.5), density=nothing)
+    grave = [problem.words for problem in problems(covering) if problem.grave]
+    assert grave and "count 0" in grave[0]
+    assert not [problem for problem in problems(heavy()) if problem.grave]
+
+
+class TestEdits:
+    def test_the_first_hot_spot_stands_on_a_floor_of_one(self):
+        change = densities.peak_added(sheet(), (3.0, 4.0), 1.5, 4.0)
+        assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
+        two = densities.peak_added(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
+        assert len(densities.peaks_of(two)) == 2
+        assert densities.peak_added(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
+
+    def test_with_the_last_one_the_density_goes(self):
+        assert densities.peak_removed(heavy(), 0).sketch.density is None
+        assert densities.density_removed(heavy()).sketch.density is None
+        with pytest.raises(MapError, match="the same already"):
+            densities.density_removed(sheet())
+
+    def test_move_size_weigh(self):
+        moved = densities.peak_moved(heavy(), 0, (4.0, 5.0)).sketch
+        assert densities.peaks_of(moved)[0].center == (4.0, 5.0)
+        sized = densities.peak_sized(moved, 0, 2.5).sketch
+        assert densities.peaks_of(sized)[0].sigma == 2.5
+        weighed = densities.peak_weighed(sized, 0, 7.0).sketch
+        assert weighed.density == Gaussians((Gaussian((4.0, 5.0), 7.0, sigma=2.5),), 0.5)
+        assert densities.floor_set(weighed, 0.0).sketch.density.floor == 0.0
+
+    def test_one_that_is_not_round_keeps_its_shape(self):
+        slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
+        sketch = heavy(Gaussians((slanted,), 0.5))
+        spread = densities.spread_of(slanted)
+        twice = densities.peaks_of(densities.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
+        assert densities.spread_of(twice) == pytest.approx(2.0 * spread)
+        assert np.array(twice.matrix) == pytest.approx(4.0 * np.array(slanted.matrix))
+
+    @pytest.mark.parametrize(
+        ("act", "words"),
+        [
+            (lambda: densities.peak_added(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
+            (lambda: densities.peak_added(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: 0"),
+            (lambda: densities.peak_added(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
+            (lambda: densities.peak_weighed(heavy(), 0, float("nan")), "weight: nan"),
+            (lambda: densities.peak_weighed(heavy(), 0, 1e9), "weight: 1e"),
+            (lambda: densities.peak_moved(heavy(), 5, (1.0, 1.0)), "no such hot spot"),
+            (lambda: densities.floor_set(sheet(), 0.0), "weight: 0"),
+            (lambda: densities.peak_added(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
+        ],
+    )
+    def test_what_cannot_be(self, act, words):
+        with pytest.raises(MapError, match=words):
+            act()
+
+    @given(
+        center=st.tuples(st.floats(0.5, 9.5), st.floats(0.5, 9.5)),
+        sigma=st.floats(0.05, 20.0),
+        weight=st.floats(0.001, 1000.0),
+    )
+    @settings(max_examples=15, deadline=None)
+    def test_whatever_is_drawn_can_be_saved(self, center, sigma, weight):
+        sketch = densities.peak_added(heavy(), center, sigma, weight).sketch
+        assert parse_sketch(sketch_text(sketch), "again").density == sketch.density
+        assert sketch.environment().density == sketch.density
+
+    def test_in_words(self):
+        assert densities.density_words(None) == "none: every place counts the same"
+        assert densities.density_words(ONE) == "1 hot spot, floor 0.5"
+        assert densities.density_words(KINDS["bilinear"]) == "picture, 13 x 11"
+        assert densities.density_words(KINDS["rooms"]) == "polygons, 0.3 to 4"
+
+
+def test_with_the_mouse_and_by_typing(tmp_path):
+    with opened_editor(tmp_path, sheet()) as hands:
+        plain = hands.picture()
+        hands.key("d")
+        hands.drag(*(hands.pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
+        (peak,) = densities.peaks_of(hands.sketch)
+        assert peak.center == pytest.approx((3.0, 3.0), abs=0.06)
+        assert peak.sigma == pytest.approx(2.0, abs=0.1) and peak.weight == 4.0
+        assert not hands.same(plain)
+        hands.type("6.5")
+        hands.key("return")
+        assert densities.peaks_of(hands.sketch)[0].weight == 6.5
+        # the rim
+        rim = hands.pixel((peak.center[0], peak.center[1] + peak.sigma))
+        hands.wait()
+        hands.drag(rim, *(hands.pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
+        assert densities.peaks_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
+        # the middle
+        hands.wait()
+        hands.drag(*(hands.pixel(point) for point in (peak.center, (4, 4), (6, 5))))
+        assert densities.peaks_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
+        hands.wait()
+        hands.drag(*(hands.pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
+        assert [each.weight for each in densities.peaks_of(hands.sketch)] == [6.5, 6.5]
+        hands.key("backspace")
+        assert len(densities.peaks_of(hands.sketch)) == 1
+        hands.key("ctrl+z")
+        assert len(densities.peaks_of(hands.sketch)) == 2
+        hands.wait()
+        hands.click_at((6.0, 5.0))
+        assert hands.desk.tool.chosen == 0
+        hands.key("escape")
+        assert hands.desk.tool.chosen is None and hands.desk.tool.preview(hands.desk).rings
+        hands.command("floor 0.2")
+        hands.command("weight 3")
+        assert hands.sketch.density.floor == 0.2 and hands.desk.tool.weight == 3.0
+        assert densities.density_words(hands.sketch.density) == "2 hot spots, floor 0.2"
+        hands.command("density none")
+        assert hands.sketch.density is None
+        hands.command("density some")
+        assert "none was wanted" in hands.said
+        hands.key("v")
+        hands.frames(2)
+
+
+def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
+    with opened_editor(tmp_path, sheet()) as hands:
+        hands.key("d")
+        hands.press(*hands.pixel((3, 3)))
+        hands.move(*hands.pixel((5, 3)), held=1)
+        assert hands.desk.tool.change is not None
+        hands.key("escape")
+        hands.release()
+        assert hands.sketch.density is None and not hands.desk.paper.history.can_undo
