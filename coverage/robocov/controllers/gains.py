@@ -1,20 +1,34 @@
-"""Gains of a controller: dataclass fields with a unit, a range and one line of meaning."""
+"""Gains of a controller: numbers with a unit and a range, or words to choose from, as dataclass fields."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from robocov.errors import ParameterError, shown, unknown_name
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+Value: TypeAlias = float | str | None
+"""What a gain may be: a number, None for no limit, or one of the words of an `Option`."""
+
+
+def value_text(value: Value, *, digits: int = 6, none: str = "none") -> str:
+    """Return a value as people write it: a number to so many digits, `none` for no limit.
+
+    >>> value_text(0.30000001), value_text(None), value_text("median")
+    ('0.3', 'none', 'median')
+    """
+    if value is None:
+        return none
+    return value if isinstance(value, str) else f"{value:.{digits}g}"
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What is known of one gain.
+    """What is known of one gain that is a number.
 
     Attributes
     ----------
@@ -53,6 +67,40 @@ class Gain:
         return float(value)
 
 
+@dataclass(frozen=True)
+class Option:
+    """What is known of one gain that is a word.
+
+    Attributes
+    ----------
+    name, default, meaning : str
+    words : tuple of str
+        Those to choose from.
+    """
+
+    name: str
+    default: str
+    words: tuple[str, ...]
+    meaning: str
+    unit: ClassVar[str] = ""
+    optional: ClassVar[bool] = False
+
+    def validated(self, value: object, where: str) -> str:
+        """Return `value` when it is one of the words.
+
+        Raises
+        ------
+        ParameterError
+            When it is not; the message names `where`, the value and the words, and the nearest of them.
+        """
+        wanted = f"one of {', '.join(self.words)} was wanted"
+        if not isinstance(value, str):
+            raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {wanted}")
+        if value not in self.words:
+            raise ParameterError(f"{where}.{self.name}: {unknown_name('word', value, self.words)}")
+        return value
+
+
 def gain(
     default: float | None,
     unit: str,
@@ -73,13 +121,35 @@ def gain(
     return field(default=default, metadata={"gain": (unit, low, high, meaning, optional)})
 
 
-def gains_of(controller: Any) -> dict[str, Gain]:
+def choice(default: str, words: Sequence[str], meaning: str) -> Any:
+    """Declare a gain that is one of several words as a dataclass field.
+
+    >>> @dataclass(frozen=True)
+    ... class Mine:
+    ...     side: str = choice("left", ("left", "right"), "where to pass each other")
+    >>> gains_of(Mine)["side"].words
+    ('left', 'right')
+
+    Raises
+    ------
+    ValueError
+        When the default is none of the words.
+    """
+    if default not in words:
+        raise ValueError(f"default {default!r}, but one of {', '.join(words)} was wanted")
+    return field(default=default, metadata={"option": (tuple(words), meaning)})
+
+
+def gains_of(controller: Any) -> dict[str, Gain | Option]:
     """Return the gains of a controller class or instance by name, in their order of declaration.
 
     One that is no dataclass has none.
     """
-    found: dict[str, Gain] = {}
+    found: dict[str, Gain | Option] = {}
     for each in fields(controller) if is_dataclass(controller) else ():
+        if "option" in each.metadata:
+            found[each.name] = Option(each.name, str(each.default), *each.metadata["option"])
+            continue
         default = None if each.default is MISSING else each.default
         if "gain" in each.metadata:
             unit, low, high, meaning, optional = each.metadata["gain"]
@@ -92,7 +162,7 @@ def gains_of(controller: Any) -> dict[str, Gain]:
     return found
 
 
-def gain_values(controller: Any) -> dict[str, float | None]:
+def gain_values(controller: Any) -> dict[str, Value]:
     """Return the values of the gains of a controller instance."""
     return {name: getattr(controller, name) for name in gains_of(controller)}
 

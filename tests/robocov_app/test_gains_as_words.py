@@ -1,0 +1,202 @@
+"""A gain that is a word, through all that knows gains: commands, studies, tables, reports, the window."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from driven_window import opened
+from reported_results import entry, result_of
+from swept import ROOM, small_study
+
+from robocov.errors import InputError, ParameterError
+from robocov.mapfile import save_map
+from robocov.record import Record
+from robocov.results import read_results
+from robocov_app.cli import main
+from robocov_app.demo.scenario import Law, branch_words, gain_words
+from robocov_app.plot_gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.report.dependence_plots import dependence_plots
+from robocov_app.report.gathering import gathered
+from robocov_app.report.groups import dependences, gain_text
+from robocov_app.report.result_plots import styles
+from robocov_app.report.tables import controllers_table
+from robocov_app.sweep.gain_choices import Gains, Range, Sampling
+from robocov_app.sweep.study_file import read_study
+from robocov_app.sweep.sweeping import sweep
+
+STUDY = """
+maps = ["room.json"]
+controllers = ["rapf", "lloyd"]
+seeds = 1
+robots = 2
+duration = 0.5
+[gains.rapf]
+target = ["centroid", "median"]
+k_rep = [0.3, 1.0]
+[gains.lloyd]
+target = "sensing"
+height = 0.5
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    save_map(ROOM, tmp_path / "room.json")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_the_command_line_takes_words_and_the_record_keeps_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["--duration", "0.2", "--lattice", "8", "--set", "target=median", "k_rep=1", "--out", str(out)]
+    assert main(["run", "square", *words]) == 0
+    run = json.loads((out / "run.json").read_text())
+    assert run["controller"]["gains"]["target"] == "median"
+    assert Record.load(out).gains["target"] == "median"
+    capsys.readouterr()
+    assert main(["controllers", "--json"]) == 0
+    rapf = next(row for row in json.loads(capsys.readouterr().out)["controllers"] if row["name"] == "rapf")
+    told = next(gain for gain in rapf["gains"] if gain["name"] == "target")
+    assert told["words"] == ["centroid", "sensing", "median"] and told["default"] == "centroid"
+    assert "low" not in told
+    assert main(["controllers"]) == 0
+    assert "centroid | sensing | median" in capsys.readouterr().out
+
+
+def test_a_study_takes_lists_of_words(study: Path) -> None:
+    read = read_study(study)
+    tried = [(choice["target"], choice["k_rep"]) for choice in read.gains_of("rapf").choices]
+    assert tried == [("centroid", 0.3), ("centroid", 1.0), ("median", 0.3), ("median", 1.0)]
+    (lloyd,) = read.gains_of("lloyd").choices
+    assert (lloyd["target"], lloyd["height"]) == ("sensing", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ('target = ["centroid", "mediam"]', r"gains\.rapf\.target\[1\]: unknown word 'mediam': did you mean"),
+        ("target = 3", r"gains\.rapf\.target: 3\.0, but one of centroid, sensing, median was wanted"),
+        ('target = ["median", "median"]', r"gains\.rapf\.target\[1\]: 'median' is given already at"),
+        (
+            "target = {low = 0, high = 1}",
+            r"gains\.rapf\.target: a range, but one of centroid, sensing, median",
+        ),
+        ('target = "null"', r"gains\.rapf\.target: unknown word 'null'"),
+    ],
+)
+def test_a_study_with_a_wrong_word_is_told_where(study: Path, wrong: str, message: str) -> None:
+    study.write_text(STUDY.replace('target = ["centroid", "median"]', wrong))
+    with pytest.raises(InputError, match=message):
+        read_study(study)
+
+
+def test_words_go_with_samples_of_ranges() -> None:
+    from robocov.controllers import Rapf
+
+    wanted = {"target": ["centroid", "median"], "k_rep": Range(0.1, 1.0)}
+    gains = Gains.of(Rapf, wanted, Sampling(samples=4))
+    assert [choice["target"] for choice in gains.choices] == ["centroid"] * 4 + ["median"] * 4
+
+
+@pytest.fixture(scope="module")
+def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("words") / "out"
+    gains = {"rapf": {"target": ["centroid", "median"]}}
+    sweep(small_study(gains=gains), folder, workers=1, quiet=True)
+    return folder
+
+
+def test_tables_hold_words(swept_folder: Path, tmp_path: Path) -> None:
+    table = pq.read_table(swept_folder / "results.parquet")
+    words = table.column("target").to_pylist()
+    assert set(words) == {"centroid", "median", None}
+    # a table that still grows is read as CSV, which does not say what its columns hold
+    for name in ("results.csv", "study.json"):
+        (tmp_path / name).write_bytes((swept_folder / name).read_bytes())
+    grown = read_results(tmp_path).to_table()
+    assert grown.column("target").to_pylist() == words
+    assert grown.schema.field("k_rep").type == "double"
+
+
+def test_a_report_tells_words(swept_folder: Path) -> None:
+    result = gathered(swept_folder)
+    assert dependences(result) == {"target": ["rapf"]}
+    plots = list(dependence_plots(result, "k"))
+    assert [plot.title for plot in plots] == ["target"]
+    assert "medians at centroid:" in plots[0].svg and "median:" in plots[0].svg
+    assert (
+        gain_text([("target", "median"), ("height", 0.5)], {"height": "m"}) == "target median, height 0.5 m"
+    )
+
+
+def test_values_of_words_are_told_where_they_are_many() -> None:
+    runs = [
+        entry(gains=(("target", word), ("k", 0.1 * k)))
+        for k in range(1, 8)
+        for word in ("centroid", "median")
+    ]
+    result = result_of(runs)
+    (row,) = controllers_table(result, styles(result)).rows
+    assert row[2].text == "target centroid or median, k 0.1 to 0.7"
+
+
+def test_words_have_even_places_and_no_line_between_them() -> None:
+    places, values = np.repeat([0.0, 1.0, 2.0], 4), np.arange(12.0)
+    words = ("centroid", "sensing", "median")
+    axes = plot_gains([Dependence("RAPF", "rapf", places, values)], "target", words=words).axes[0]
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == list(words)
+    _, medians = axes.lines
+    assert medians.get_linestyle() == "None"
+    assert medians.get_ydata().tolist() == [1.5, 5.5, 9.5]
+    grid = plot_gain_grid(["centroid", "median"], [0.3, None], np.arange(4.0).reshape(2, 2), ("target", "k"))
+    assert [tick.get_text() for tick in grid.axes[0].get_xticklabels()] == ["centroid", "median"]
+    assert [tick.get_text() for tick in grid.axes[0].get_yticklabels()] == ["0.3", "none"]
+
+
+def test_laws_of_the_window_say_words() -> None:
+    before, after = Law("rapf"), Law("rapf", {"target": "median", "attraction_limit": None})
+    assert gain_words(before, after) == "attraction_limit = no limit, target = median"
+    assert branch_words(after) == "RAPF, target median, attraction_limit no limit"
+    with pytest.raises(ParameterError, match="unknown word 'mediam'"):
+        before.with_gain("target", "mediam")
+
+
+def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
+    with opened(tmp_path, Law("rapf"), size=(1000, 1000)) as driver:
+        target = lambda: driver.session.lanes[0].law.value("target")  # noqa: E731
+        styles = lambda word: driver.widget("button", f"target:{word}").object_ids[-1]  # noqa: E731
+        assert target() == "centroid" and styles("centroid") == "#chosen_tab"
+        driver.push("target:median")
+        assert target() == "median" and driver.session.events[-1].text.endswith("target = median")
+        assert (styles("median"), styles("centroid")) == ("#chosen_tab", "#small")
+        driver.desk.attempt(lambda: driver.desk.command("target sens"))
+        driver.settle()
+        assert target() == "sensing" and styles("sensing") == "#chosen_tab"
+        driver.desk.attempt(lambda: driver.desk.command("target 3"))
+        assert driver.desk.trouble and "one of centroid, sensing, median" in driver.desk.message
+        driver.push("reset:target")
+        assert target() == "centroid"
+
+
+def test_words_that_do_not_fit_side_by_side_follow_each_other(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from dataclasses import dataclass\n"
+        "import robocov as rc\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    way: str = rc.choice('clockwise', ('clockwise', 'anticlockwise', 'whichever is near'), 'how')\n"
+        "    def force(self, own):\n"
+        "        return own.centroid - own.position\n"
+    )
+    with opened(tmp_path, Law(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
+        for word in ("anticlockwise", "whichever is near", "clockwise"):
+            driver.push("next:way")
+            assert driver.session.lanes[0].law.value("way") == word
+            assert driver.widget("button", "next:way").text == f"{word} ›"
