@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from called import SHORT, answer, complaint
+
+from robocov.record import Record
+from robocov_app.cli import main
+from robocov_app.run import cost_columns
+from robocov_app.saved import load_saved
+
+TEAM = """
+[[group]]
+count = 1
+max_speed = 1.0
+radius = 0.2
+
+[[group]]
+count = 2
+max_speed = 0.3
+"""
+
+
+@pytest.fixture
+def team(tmp_path: Path) -> Path:
+    path = tmp_path / "team.toml"
+    path.write_text(TEAM)
+    return path
+
+
+def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    words = ("run", "rooms", "--team", str(team), "--set", "cells=time", *SHORT, "--out", str(out))
+    said = answer(capsys, *words)
+    assert said["mean_time_s"] > said["mean_distance_m"], "the slow ones take longer than a second a metre"
+    record = Record.load(out)
+    assert record.team.max_speed.tolist() == [1.0, 0.3, 0.3]
+    assert record.team.radius.tolist() == [0.2, 0.1, 0.1]
+    assert record.gains["cells"] == "time"
+    header, *rows = (out / "cost.csv").read_text().splitlines()
+    assert header == "time_s,mean_distance_m,cost_m3,uncovered_area_m2,mean_time_s"
+    saved = load_saved(out)[0]
+    assert saved.history is not None
+    assert saved.history.mean_time is not None
+    assert saved.history.mean_time[-1] == said["mean_time_s"] == float(rows[-1].split(",")[-1])
+    assert cost_columns(saved.history) == header
+    apart = np.hypot(*(record.positions[0, 1] - record.positions[0, 2]))
+    assert apart >= 0.4, "room for the largest"
+    speeds = np.hypot(*np.moveaxis(record.velocities, -1, 0)).max(axis=0)
+    assert (speeds <= record.team.max_speed + 1e-9).all()
+
+
+def test_a_comparison_tells_the_time(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "both"
+    words = ["compare", "rooms", "--controllers", "rapf", "lloyd", "--team", str(team), *SHORT]
+    assert main([*words, "--out", str(out)]) == 0
+    assert "mean time" in capsys.readouterr().out
+    rows = json.loads((out / "comparison.json").read_text())["runs"]
+    assert all(row["mean_time_s"] > 0 for row in rows)
+
+
+def test_the_cost_of_places_in_seconds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    places = tmp_path / "places.json"
+    places.write_text("[[1, 1], [9, 5]]")
+    words = ("cost", "rooms", "--positions", str(places), "--lattice", "16")
+    plain = answer(capsys, *words)
+    assert "mean_time_s" not in plain
+    sites = tmp_path / "sites.npz"
+    timed = answer(capsys, *words, "--speeds", "1.0", "0.25", "--sites", str(sites))
+    assert timed["mean_distance_m"] == plain["mean_distance_m"]
+    assert timed["mean_time_s"] > plain["mean_distance_m"]
+    with np.load(sites) as saved:
+        assert saved["times"].mean() == pytest.approx(timed["mean_time_s"])
+    half = answer(capsys, *words, "--speeds", "0.5")
+    assert half["mean_time_s"] == pytest.approx(2.0 * plain["mean_distance_m"])
+    said = complaint(capsys, *words, "--speeds", "1", "1", "1")
+    assert said == "--speeds: 3 numbers, but one, or one for each of 2 robots, was wanted"
+    assert complaint(capsys, *words, "--speeds", "0") == "--speeds: 0.0 m/s, but a number above 0 was wanted"
+
+
+def test_teams_that_are_none(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
+    assert said == f"--robots: 5, but the team of {team} has 3"
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[[group]]\ncount = 1\nspeed = 3\n")
+    for words in (("run", "rooms"), ("compare", "rooms"), ("demo", "rooms")):
+        said = complaint(capsys, *words, "--team", str(bad))
+        assert said.startswith(f"{bad}: group[0]: unknown key 'speed'")

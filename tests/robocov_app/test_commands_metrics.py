@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from called import SHORT, complaint
+
+from robocov.record import Record
+from robocov.run_metrics import COLUMNS, run_metrics
+from robocov_app.cli import main
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("metrics") / "both"
+    words = ["compare", "rooms", "--controllers", "rapf", "rpf", "--robots", "3", *SHORT, "--out", str(out)]
+    assert main(words) == 0
+    return out
+
+
+def test_each_run_gets_its_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", str(folder), "--rate", "4", "--plot", str(folder / "metrics.png")]) == 0
+    said = capsys.readouterr().out
+    assert "RAPF" in said
+    assert "RPF" in said
+    assert (folder / "metrics.png").stat().st_size > 10_000
+    for name in ("rapf", "rpf"):
+        header, *rows = (folder / name / "metrics.csv").read_text().splitlines()
+        assert header.split(",") == list(COLUMNS.values())
+        expected = run_metrics(Record.load(folder / name), 4.0)
+        assert len(rows) == len(expected.time) == 5
+        assert [float(cell) for cell in rows[-1].split(",")] == [float(x) for x in expected.rows()[-1]]
+
+
+def test_json_has_the_figures_of_the_end(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", str(folder / "rapf"), "--rate", "0", "--json"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    (run,) = json.loads(said.out)["runs"]
+    assert 0 < run["sensed_area_m2"] <= run["range_area_m2"] < run["free_area_m2"]
+    assert run["components"] == 1
+    assert run["near_final_s"] is not None
+
+
+def test_what_is_no_run_is_told(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert str(tmp_path) in complaint(capsys, "metrics", str(tmp_path))
+    assert complaint(capsys, "metrics", str(folder), "--rate", "-1").startswith("--rate: -1.0")
+    assert "picture.gif" in complaint(capsys, "metrics", str(folder), "--plot", "picture.gif")
