@@ -1,0 +1,102 @@
+"""Chance that depends on nothing but a seed, a step, and whom it is for.
+
+A generator that is drawn from again and again has a state, and a run that is copied, rewound or branched
+would have to carry it. Here each number is a function of the seed and of what it is drawn for: the
+counter-based generator Philox-4x32-10 of Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy
+as 1, 2, 3* (SC 2011), over as many counters at once as are asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, IntArray
+
+Words: TypeAlias = NDArray[np.uint64]
+"""Words of 32 bits."""
+
+_ROUNDS = 10
+_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
+_WEYL = (0x9E3779B9, 0xBB67AE85)
+_LOW = np.uint64(0xFFFFFFFF)
+_HALF = np.uint64(32)
+
+
+def philox(counter: Words, key: tuple[int, int]) -> Words:
+    """Return Philox-4x32-10 of counters under a key.
+
+    Parameters
+    ----------
+    counter : (4, ...) words of 32 bits
+    key : two words of 32 bits
+
+    Returns
+    -------
+    (4, ...) words of 32 bits
+    """
+    a, b, c, d = np.asarray(counter, dtype=np.uint64)
+    first, second = key
+    for _ in range(_ROUNDS):
+        left, right = a * _MULTIPLIERS[0], c * _MULTIPLIERS[1]
+        a, c = (right >> _HALF) ^ b ^ np.uint64(first), (left >> _HALF) ^ d ^ np.uint64(second)
+        b, d = right & _LOW, left & _LOW
+        first, second = (first + _WEYL[0]) & 0xFFFFFFFF, (second + _WEYL[1]) & 0xFFFFFFFF
+    return np.stack([a, b, c, d])
+
+
+class Draws:
+    """One stream of chance: numbers for steps and for pairs of whatever is counted.
+
+    Streams of one seed are independent of each other, and so are those of different seeds.
+
+    Parameters
+    ----------
+    seed : int
+        From 0.
+    stream : int
+        From 0.
+
+    Examples
+    --------
+    >>> draws = Draws(7, 0)
+    >>> now, later = draws.uniform(3, np.array([0, 1])), draws.uniform(4, np.array([0, 1]))
+    >>> bool((now == draws.uniform(3, np.array([0, 1]))).all()), bool((now == later).any())
+    (True, False)
+    """
+
+    def __init__(self, seed: int, stream: int) -> None:
+        first, second = np.random.SeedSequence(seed, spawn_key=(stream,)).generate_state(2, np.uint32)
+        self._key = int(first), int(second)
+
+    def uniform(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
+        """Return numbers in the open interval from 0 to 1, of the shape of `one` and `other` together.
+
+        Parameters
+        ----------
+        step : int
+            From 0 to 2⁶⁴ - 1.
+        one, other : whole numbers from 0 to 2³² - 1
+        """
+        return np.asarray(self._pair(step, one, other)[0])
+
+    def normal(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
+        """Return pairs of independent standard normal numbers, (..., 2), by Box and Muller's transformation.
+
+        The parameters are those of `uniform`.
+        """
+        radius, angle = self._pair(step, one, other)
+        radius, angle = np.sqrt(-2.0 * np.log(radius)), 2.0 * np.pi * angle
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+    def _pair(self, step: int, one: IntArray, other: IntArray | int) -> Array:
+        """Return two independent uniform numbers each, (2, ...)."""
+        one, other = np.broadcast_arrays(np.asarray(one, np.uint64), np.asarray(other, np.uint64))
+        low, high = np.uint64(step & 0xFFFFFFFF), np.uint64(step >> 32)
+        counter = np.stack([np.broadcast_to(low, one.shape), one, other, np.broadcast_to(high, one.shape)])
+        words = philox(counter, self._key).astype(np.float64)
+        # 26 bits of one word and 26 of another, and half a step more: never 0, never 1
+        coarse, fine = words[0::2] // 64.0, words[1::2] // 64.0
+        return np.asarray((coarse * 2.0**26 + fine + 0.5) * 2.0**-52)

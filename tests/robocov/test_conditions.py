@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.conditions import Conditions, Failure, Join, parsed_failure, parsed_join
+from robocov.errors import ParameterError
+
+
+def test_without_anything_they_are_ideal() -> None:
+    assert Conditions().ideal
+    assert Conditions(seed=4, forget_after=1.0).ideal
+    for given_ in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
+        assert Conditions(**given_).talks
+        assert not Conditions(**given_).ideal
+    for given_ in (
+        {"sensing_noise": 0.1},
+        {"failure_rate": 0.1},
+        {"failures": ((1, 2),)},
+        {"joins": ((1, 2),)},
+    ):
+        assert not Conditions(**given_).talks
+        assert not Conditions(**given_).ideal
+
+
+@pytest.mark.parametrize(
+    ("given_", "message"),
+    [
+        ({"loss": 1.5}, "conditions.loss: 1.5, but a number from 0 to 1 was wanted"),
+        ({"loss": True}, "conditions.loss: True, but"),
+        ({"delay": -1}, "conditions.delay: -1, but a number from 0 to 1000 s was wanted"),
+        ({"delay": math.nan}, "conditions.delay: nan, but"),
+        ({"message_rate": 0}, r"conditions.message_rate: 0, but .* Hz or null was wanted"),
+        ({"position_noise": "much"}, "conditions.position_noise: 'much', but"),
+        ({"message_rate": 0.1}, "conditions.forget_after: 3 s, but at least the 10 s between two messages"),
+        ({"failures": ((0, 1.0),)}, r"conditions.failures\[0\]: robot 0, but a whole number from 1"),
+        ({"failures": ((1, 1), (1, 2))}, r"conditions.failures\[1\]: robot 1 is given twice"),
+        ({"failures": ((1, math.inf),)}, r"conditions.failures\[0\]: time inf, but a number from 0"),
+        ({"failures": (3,)}, r"conditions.failures\[0\]: 3, but a robot and a time were wanted"),
+        ({"joins": ((1, 2, (1, 2, 3)),)}, r"conditions.joins\[0\]: place \(1, 2, 3\), but \[x, y\]"),
+        ({"joins": ((1, 2, (1, math.nan)),)}, r"conditions.joins\[0\]: place \(1, nan\)"),
+        ({"joins": ((2, 5),), "failures": ((2, 5),)}, "robot 2 joins at 5 s, but it has failed at 5 s"),
+        ({"seed": -1}, "conditions.seed: -1, but a whole number from 0"),
+    ],
+)
+def test_what_cannot_be_is_named(given_: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
+        Conditions(**given_)  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
+
+
+def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
+    Conditions(failures=((3, 1),)).check_team(3)
+    with pytest.raises(
+        ParameterError, match=r"conditions.failures\[0\]: robot 3, but one of 1 to 2 was wanted"
+    ):
+        Conditions(failures=((3, 1),)).check_team(2)
+    with pytest.raises(ParameterError, match="at least one from the start"):
+        Conditions(joins=((1, 1), (2, 2))).check_team(2)
+
+
+def test_who_works_when() -> None:
+    conditions = Conditions(failures=((1, 5.0), (3, 7.0)), joins=((2, 4.0), (3, 6.0)))
+    found = conditions.working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
+    assert found.astype(int).tolist() == [
+        [1, 0, 0, 1],
+        [1, 0, 0, 1],
+        [1, 1, 0, 1],
+        [0, 1, 0, 1],
+        [0, 1, 1, 1],
+        [0, 1, 0, 1],
+    ]
+    assert conditions.failed(7.0, 4).tolist() == [True, False, True, False]
+    assert conditions.present(5.0, 4).tolist() == [True, True, False, True]
+
+
+def test_a_moment_is_the_same_whatever_steps_lead_there() -> None:
+    """Sums of steps miss a time by rounding; that must not shift a failure by a step."""
+    conditions = Conditions(failures=((1, 0.8),))
+    steps = np.add.accumulate(np.full(8, 0.1))
+    assert steps[-1] < 0.8
+    assert conditions.failed(float(steps[-1]), 1).all()
+    assert not conditions.failed(0.79, 1).any()
+
+
+def test_lifetimes_are_exponential() -> None:
+    count, rate = 20_000, 0.02
+    begins, ends = Conditions(failure_rate=rate, seed=5, joins=((1, 30.0),)).lives(count)
+    lives = ends - np.maximum(begins, 0.0)
+    assert abs(lives.mean() * rate - 1.0) < 5 / math.sqrt(count)
+    assert abs((lives > 50.0).mean() - math.exp(-1.0)) < 5 * 0.5 / math.sqrt(count)
+    assert ends[0] > 30.0
+    # each robot's own, whatever the size of the team
+    assert (Conditions(failure_rate=rate, seed=5).lives(3)[1][1:] == ends[1:3]).all()
+    assert (
+        Conditions(failure_rate=rate, seed=6).lives(3)[1] != Conditions(failure_rate=rate).lives(3)[1]
+    ).all()
+
+
+times = st.floats(0, 1e5, allow_nan=False)
+
+
+@given(
+    st.floats(0, 1),
+    st.one_of(st.none(), st.floats(0.5, 60.0)),
+    st.dictionaries(st.integers(1, 9), times, max_size=3),
+    st.dictionaries(st.integers(10, 19), st.tuples(times, st.one_of(st.none(), st.tuples(times, times)))),
+    st.integers(0, 2**62),
+)
+def test_json_keeps_all_of_it(
+    loss: float,
+    rate: float | None,
+    fails: dict[int, float],
+    joins: dict[int, tuple[float, object]],
+    seed: int,
+) -> None:
+    conditions = Conditions(
+        loss=loss,
+        message_rate=rate,
+        failures=tuple(Failure(*each) for each in fails.items()),
+        joins=tuple(Join(robot, *rest) for robot, rest in joins.items()),  # type: ignore[arg-type]
+        seed=seed,
+    )
+    assert Conditions.from_dict(json.loads(json.dumps(conditions.to_dict(), allow_nan=False))) == conditions
+
+
+def test_what_is_not_conditions_is_refused() -> None:
+    with pytest.raises(ParameterError, match="conditions: cannot be read"):
+        Conditions.from_dict({"loss": 0.5})
+    broken = Conditions().to_dict() | {"failures": [{"robot": 1}]}
+    with pytest.raises(ParameterError, match="conditions: cannot be read"):
+        Conditions.from_dict(broken)
+
+
+def test_failures_and_joins_can_be_typed() -> None:
+    assert parsed_failure("3@20") == (3, 20.0)
+    assert parsed_join("5@30") == (5, 30.0, None)
+    assert parsed_join("5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
+    for text in ("3", "3@", "@20", "a@20", "3@x", "3@20s", "-1@2", "3@inf", "3@1@2"):
+        with pytest.raises(ParameterError, match="but ROBOT@SECONDS, as in 3@20, was wanted"):
+            parsed_failure(text)
+    for text in ("3@2:", "3@2:1", "3@2:1,", "3@2:1,2,3", "3@2:a,b", "3@2:nan,1"):
+        with pytest.raises(ParameterError, match="ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted"):
+            parsed_join(text)
+
+
+@given(st.text("0123456789@:,.-+e x", max_size=12))
+def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
+    try:
+        join = parsed_join(text)
+    except ParameterError as error:
+        assert "\n" not in str(error)
+    else:
+        assert parsed_join(text) == join
+
+
+def test_a_repr_says_what_differs() -> None:
+    assert repr(Conditions(loss=0.2)) == "Conditions(loss=0.2)"
+    assert eval(repr(Conditions(loss=0.2, failures=((1, 2),)))) == Conditions(loss=0.2, failures=((1, 2),))

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from called import answer, complaint
+
+from robocov.conditions import Conditions
+from robocov.controllers import Rapf
+from robocov.errors import ParameterError
+from robocov.record import Record
+from robocov.simulation import Simulation
+from robocov_app.condition_options import ConditionOptions
+
+
+def test_nothing_said_is_no_conditions() -> None:
+    assert ConditionOptions().conditions(3, 6) is None
+    assert ConditionOptions(forget_after=1.0).conditions(3, 6) is None
+
+
+def test_what_is_said_becomes_conditions() -> None:
+    options = ConditionOptions(loss=0.2, delay=0.3, fail=("3@20",), join=("5@30:2.5,1", "6@4"))
+    assert options.conditions(7, 6) == Conditions(
+        loss=0.2, delay=0.3, failures=((3, 20.0),), joins=((5, 30.0, (2.5, 1.0)), (6, 4.0)), seed=7
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (ConditionOptions(fail=("3",)), "--fail: '3', but ROBOT@SECONDS"),
+        (ConditionOptions(join=("3@x",)), "--join: '3@x', but ROBOT@SECONDS"),
+        (ConditionOptions(fail=("9@1",)), "robot 9, but one of 1 to 6 was wanted"),
+        (ConditionOptions(loss=2.0), "conditions.loss: 2.0, but a number from 0 to 1"),
+    ],
+)
+def test_what_cannot_be_is_named(options: ConditionOptions, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        options.conditions(0, 6)
+
+
+def test_a_run_under_conditions_can_be_repeated_from_its_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = "run rooms --robots 3 --duration 1 --lattice 16 --loss 0.5 --fail 2@0.5 --join 3@0.3 --seed 4"
+    assert answer(capsys, *words.split(), "--out", str(tmp_path / "a"))["contacts"] == 0
+    saved = json.loads((tmp_path / "a" / "run.json").read_text())["conditions"]
+    assert saved["loss"] == 0.5
+    assert saved["failures"] == [{"robot": 2, "time_s": 0.5}]
+    assert saved["seed"] == 4
+    record = Record.load(tmp_path / "a")
+    assert record.working[-1].tolist() == [True, False, True]
+    simulation = Simulation(
+        record.environment, Rapf(), record.positions[0], record.team, conditions=record.conditions
+    )
+    assert simulation.run(1.0).positions.tobytes() == record.positions.tobytes()
+
+
+def test_one_line_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(capsys, "run", "rooms", "--fail", "3@x")
+    assert said == "--fail: '3@x', but ROBOT@SECONDS, as in 3@20, was wanted"
+
+
+def test_distances_are_not_shown_of_a_map_that_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "x"
+    said = complaint(capsys, "run", "forklifts", "--video", "--show", "distances", "--out", str(out))
+    assert said.startswith("--show: distances, but obstacles of map 'Forklifts' move")
+    assert not out.exists()

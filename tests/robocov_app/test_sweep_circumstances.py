@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from swept import small_study
+
+from robocov.conditions import Conditions
+from robocov.errors import InputError, ParameterError
+from robocov_app.sweep.circumstances import CONDITIONS, condition_axes, conditions_of
+from robocov_app.sweep.ledger import Entry
+from robocov_app.sweep.performing import perform
+from robocov_app.sweep.study_file import study_of
+from robocov_app.sweep.table import columns_of, row_of
+from robocov_app.sweep.task import tasks_of
+
+
+def test_every_combination_is_tried() -> None:
+    study = small_study(conditions={"loss": [0.0, 0.5], "fail": ["", "1@0.2"], "delay": 0.1})
+    assert len(study.teams) == 4
+    assert study.swept == ("loss", "fail")
+    assert len(list(tasks_of(study))) == len(study) == 16
+    columns = [column.name for column in columns_of(study)]
+    assert "loss" in columns
+    assert "fail" in columns
+    assert "delay_s" not in columns
+    row = row_of(list(tasks_of(study))[-1], Entry({}, None))
+    assert (row["loss"], row["fail"], row["delay_s"]) == (0.5, "1@0.2", 0.1)
+
+
+def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
+    """What was done before there were conditions is not done again."""
+    assert [task.digest for task in tasks_of(small_study())] == [
+        task.digest for task in tasks_of(small_study(conditions={}))
+    ]
+    assert "loss" not in next(tasks_of(small_study())).team
+
+
+def test_a_run_is_under_its_conditions() -> None:
+    study = small_study(conditions={"loss": 0.5, "fail": "2@0.2"}, controllers=("rapf",), seeds=[3])
+    (task,) = tasks_of(study)
+    assert conditions_of(task.team, task.seed, task.robots) == Conditions(
+        loss=0.5, failures=((2, 0.2),), seed=3
+    )
+    outcome = perform(task)
+    assert outcome.error is None
+    assert b'"failures": [\n   {\n    "robot": 2' in outcome.files["run.json"]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"lost": 1}, r"conditions: unknown condition 'lost': did you mean 'loss'\?"),
+        ({"loss": [0.1, 2]}, r"conditions.loss\[1\]: 2, but a number from 0 to 1 was wanted"),
+        ({"loss": []}, "conditions.loss: none, but at least one"),
+        ({"loss": [0.1, 0.1]}, r"conditions.loss\[1\]"),
+        ({"fail": 3}, "conditions.fail: 3, but a text"),
+        ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: '3', but ROBOT@SECONDS"),
+        ({"delay": "null"}, "conditions.delay: 'null', but a number"),
+    ],
+)
+def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        condition_axes(given, (6,))
+
+
+def test_robots_that_are_not_there_cannot_fail() -> None:
+    with pytest.raises(ParameterError, match="robot 3, but one of 1 to 2 was wanted"):
+        small_study(conditions={"fail": "3@0.1"})
+
+
+def test_a_file_says_it_in_a_table() -> None:
+    document = {
+        "maps": "rooms",
+        "controllers": "rapf",
+        "conditions": {"loss": [0, 0.2], "message_rate": ["null", 2], "join": "2@1 3@2:1,1"},
+    }
+    study = study_of(document, Path(), "study.toml")
+    assert [team["message_rate"] for team in study.teams] == [None, 2.0, None, 2.0]
+    assert study.teams[0]["join"] == "2@1 3@2:1,1"
+    for broken, message in (
+        ({"loss": {"low": 0}}, "study.toml: conditions.loss: .*, but a number or a text, or a list of them"),
+        ({"lost": 1}, "study.toml: conditions: unknown key 'lost': did you mean 'loss'"),
+        (3, r"study.toml: conditions: 3, but a table \[conditions\] was wanted"),
+    ):
+        with pytest.raises(InputError, match=message):
+            study_of({**document, "conditions": broken}, Path(), "study.toml")
+
+
+def test_all_conditions_can_be_swept() -> None:
+    usual = {"fail": "1@1", "join": "2@1", "message_rate": 2.0}
+    for name in CONDITIONS:
+        assert condition_axes({name: usual.get(name, 1.0)}, (6,))[name] == [usual.get(name, 1.0)]
