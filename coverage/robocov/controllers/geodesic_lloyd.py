@@ -1,0 +1,238 @@
+"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: the informed upper bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from robocov.arrays import Array, IntArray
+from robocov.controllers.driving import drive
+from robocov.controllers.gains import gain, validate_gains
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, PolygonObstacle
+from robocov.errors import ParameterError, shown
+from robocov.geodesic import Geodesics
+from robocov.observation import Decision, Observations
+from robocov.region import Region
+from robocov.robots import Team
+
+_SEGMENTS = 2
+"""Edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it."""
+
+_SIMPLER = 0.005
+"""Metres by which the walls of the room may be simplified: every corner costs time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GeodesicMemory:
+    """What the robots remember.
+
+    Attributes
+    ----------
+    team : Team
+    goals : (n, 2) m or None
+        Where each was going at the last planning, and
+    way : (n, 2) m or None
+        the first way-point to there.
+    beyond : (n,) m or None
+        Length of the way from there to the goal.
+    planned : float, s
+        When that was.
+    """
+
+    team: Team
+    goals: Array | None = None
+    way: Array | None = None
+    beyond: Array | None = None
+    planned: float = -np.inf
+
+
+@dataclass(frozen=True)
+class GeodesicLloyd:
+    """Lloyd's algorithm with geodesic Voronoi cells of the known map.
+
+    Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) descend the cost with the
+    length d of the shortest way in place of the straight distance: the gradient for f(d) points, for
+    each place q of the robot's geodesic cell, along the first piece of the way to it, by f'(d). For
+    f = d^s with 1 <= s <= 2 the function of the robot's place is bounded from above by a paraboloid
+    around the first way-point c of q, with weight d^(s-1) / |c - p|. The goal is the lowest point of the
+    sum of these: the weighted mean of the first way-points, which never raises the cost, and is the
+    centroid where s = 2 and nothing is in the way, a step of Weiszfeld's for s = 1, the cost (22). A
+    density of the map weighs the places.
+
+    Distances are exact, the cell is sampled on a lattice. A goal is moved into the room that walls
+    widened by radius and `clearance` leave, and the robots go there by its shortest ways.
+
+    It knows the whole map from the beginning, which no other law does: a bound, not a rival. Taken from
+    what is generally known of the two papers, not from their text; the papers' cells are those of a grid.
+    """
+
+    name: ClassVar[str] = "geodesic-lloyd"
+    label: ClassVar[str] = "Geodesic Lloyd"
+    summary: ClassVar[str] = (
+        "Lloyd's algorithm with geodesic cells, knowing the whole map (Pimenta 2008, Bhattacharya 2014)"
+    )
+    information: ClassVar[str] = "whole map"
+
+    exponent: float = gain(2.0, "1", "s: f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
+    lattice: float = gain(48.0, "cells", "cells of the lattice along a side", low=4.0, high=512.0)
+    clearance: float = gain(0.03, "m", "distance that ways keep from walls, beyond the radius", high=10.0)
+    period: float = gain(0.2, "s", "time from one planning to the next", high=60.0)
+    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of way to the goal", high=100.0)
+    response_time: float = gain(
+        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
+    )
+    environment: Environment | None = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+        if self.lattice != int(self.lattice):
+            raise ParameterError(
+                f"{self.name}.lattice: {shown(self.lattice)}, but a whole number of cells was wanted"
+            )
+
+    def informed(self, environment: Environment) -> GeodesicLloyd:
+        """Return the same law with the map."""
+        return replace(self, environment=environment)
+
+    def begin(self, region: Region, team: Team) -> GeodesicMemory:
+        """Return what the robots know of themselves.
+
+        Raises
+        ------
+        ParameterError
+            When the law has not been told the map, or no robot fits into it.
+        """
+        self._plan(team)
+        return GeodesicMemory(team)
+
+    def decide(self, seen: Observations, memory: GeodesicMemory) -> Decision:
+        """Return the forces that drive each robot along the way to its goal."""
+        team = memory.team
+        if memory.way is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
+            goals, way, beyond = self._plan(team).ways(seen, self.exponent)
+            memory = GeodesicMemory(team, goals, way, beyond, seen.time)
+        assert memory.way is not None and memory.beyond is not None
+        offset = memory.way - seen.positions
+        distance = np.hypot(*offset.T)
+        speed = np.minimum(self.k_prop * (distance + memory.beyond), team.max_speed)
+        # the last metre before a way-point that is not the goal is not slower than the others
+        speed = np.minimum(speed, distance / self.response_time)
+        wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
+        forces = drive(wanted, seen, team, self.response_time)
+        return Decision(forces=forces, goals=memory.goals, terms={"attraction": forces}, memory=memory)
+
+    def _plan(self, team: Team) -> Plan:
+        if self.environment is None:
+            raise ParameterError(
+                f"controller {self.name!r}: it has not been told the map; informed(environment) was wanted"
+            )
+        return _plan(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
+
+
+class Plan:
+    """The map as robots of some size see it that know it; immutable.
+
+    Parameters
+    ----------
+    environment : Environment
+    clearance : float, m
+        From the centres of the robots to the walls.
+    lattice : int
+
+    Attributes
+    ----------
+    cost : CoverageCost
+        What is descended.
+    room : MultiPolygon
+        Where the centres of robots may be, and
+    paths : Geodesics
+        the shortest ways in there.
+
+    Raises
+    ------
+    ParameterError
+        When no robot fits in.
+    """
+
+    def __init__(self, environment: Environment, clearance: float, lattice: int) -> None:
+        room = environment.free.buffer(-clearance, quad_segs=_SEGMENTS).simplify(_SIMPLER)
+        if room.is_empty:
+            raise ParameterError(
+                f"map {environment.name!r} has no room for robots that keep {clearance:g} m from its walls"
+            )
+        walls = environment.region.polygon.difference(room)
+        solid = tuple(_obstacle(part) for part in shapely.get_parts(walls) if isinstance(part, Polygon))
+        ring = tuple((x, y) for x, y in environment.region.vertices.tolist())
+        inner = Environment(environment.name, ring, solid)
+        self.cost, self.paths = CoverageCost(environment, lattice), Geodesics(inner)
+        self.room: MultiPolygon = inner.free
+        shapely.prepare(self.room)
+
+    def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
+        """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
+        n = len(seen.positions)
+        places = self._inside(seen.positions)
+        if seen.neighbours.complete:
+            goals = self._goals(places, np.arange(n), exponent)
+        else:
+            goals = np.empty_like(places)
+            for i in range(n):
+                team = np.concatenate([places[i : i + 1], self._inside(seen.neighbour_positions(i))])
+                goals[i] = self._goals(team, np.zeros(1, dtype=np.intp), exponent)[0]
+        way, beyond = goals.copy(), np.zeros(n)
+        lines = shapely.linestrings(np.stack([places, goals], axis=1))
+        for i in np.flatnonzero(~shapely.covers(self.room, lines)).tolist():
+            path = self.paths.path(places[i], goals[i])
+            if len(path) < 2:
+                goals[i] = way[i] = places[i]  # in another room
+                continue
+            way[i] = path[1]
+            beyond[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
+        return goals, way, beyond
+
+    def _goals(self, places: Array, some: IntArray, exponent: float) -> Array:
+        """Return the goals of some of the robots at (k, 2) places."""
+        result = self.cost(places)
+        site = np.flatnonzero(result.owner >= 0)
+        owner, first, distance = result.owner[site], result.first[site], result.distances[site]
+        # a site under the robot would hold it fast
+        step = np.maximum(np.hypot(*(first - places[owner]).T), 0.25 * self.cost.spacing)
+        weight = np.maximum(distance, step) ** (exponent - 1.0) / step
+        if result.weights is not None:
+            weight *= result.weights[site]
+        n = len(places)
+        total = np.bincount(owner, weight, minlength=n)
+        goals = np.column_stack([np.bincount(owner, weight * part, minlength=n) for part in first.T])
+        held = total > 0.0
+        goals = np.where(held[:, None], goals / np.where(held, total, 1.0)[:, None], places)
+        return self._inside(np.asarray(goals[some], dtype=np.float64))
+
+    def _inside(self, places: Array) -> Array:
+        """Return the nearest places in the room."""
+        points = shapely.points(places)
+        away = np.flatnonzero(~shapely.intersects(self.room, points))
+        if not len(away):
+            return places
+        places = places.copy()
+        lines = shapely.shortest_line(self.room, points[away])
+        places[away] = shapely.get_coordinates(lines)[::2]
+        return places
+
+
+def _obstacle(part: Polygon) -> PolygonObstacle:
+    """Return a polygon as an obstacle."""
+    rings = (part.exterior, *part.interiors)
+    outer, *holes = (tuple((x, y) for x, y in list(ring.coords)[:-1]) for ring in rings)
+    return PolygonObstacle(outer, tuple(holes))
+
+
+@lru_cache(maxsize=8)
+def _plan(environment: Environment, clearance: float, lattice: int) -> Plan:
+    """Return the plan of a map; it takes long, and memories of robots must not hold it."""
+    return Plan(environment, clearance, lattice)
