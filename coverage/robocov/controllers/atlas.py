@@ -1,0 +1,301 @@
+"""Atlas: every robot plans the placement of its team on the map that it has discovered itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from robocov import steering
+from robocov.arrays import Array, BoolArray
+from robocov.controllers.atlas_memory import AtlasMemory, Mind, Watch
+from robocov.controllers.base import Information
+from robocov.controllers.driving import drive
+from robocov.controllers.gains import gain, validate_gains
+from robocov.discovered import DiscoveredMap, Raster
+from robocov.observation import Decision, Observations
+from robocov.placement import Stock, Table, own_place, team_places
+from robocov.region import Region
+from robocov.robots import Team
+from robocov.scans import Scanning, headings
+from robocov.wayfinding import Ways, Window
+
+FINEST_CELL = 0.1
+"""Side of a cell of the discovered maps in metres, larger where a region is very large."""
+
+MOST_CELLS = 250_000
+
+MOST_NODES, CROWD_NODES = 1000, 400
+"""Nodes of the lattice on which a robot plans: for its whole team, and for itself in a crowd."""
+
+CREW = 8
+"""A robot plans for itself and up to so many less one that it hears. Where it hears more it only considers
+the nearest of them, as they are, and looks for its own place."""
+
+STILL_FOR = 3.0
+"""Who has not got away (see `atlas_memory.Watch`) for so many seconds rests."""
+
+_HARDLY = 0.1
+"""Part of the spacing of the nodes that others may move before a plan is made anew."""
+
+_ARRIVED = 0.35
+"""Metres from a place at which it counts as reached, for looking around."""
+
+_TURN = 0.2
+"""Metres from a way-point at which the next one is headed for."""
+
+_HEEDED = 1.5
+"""Metres up to which other robots matter to the velocity."""
+
+_TOGETHER = 1.5
+"""A robot plans for its whole team as long as it takes to cross the region so many times."""
+
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
+
+    Twice a second every robot scans, and enters what it sees into its own grid (`DiscoveredMap`). It also
+    watches where the robots that it hears are; nothing but positions is ever told. Once in `period` seconds
+    it looks for places P with a low coverage cost (22) on its own map,
+
+        J(P) = sum over q of w_q min_j d(q, p_j),
+
+    where q are the nodes of a lattice, d the geodesic distances among the walls that it knows, and w_q the
+    areas, times φ; an unknown patch counts by its openness: insides of obstacles hardly do (`Stock`).
+
+    1. *A plan for all.* From its former plan on, Lloyd's iteration in turn with interchange (the k-median
+       problem). Who has rested for `STILL_FOR` seconds has said where it wants to be, and is there in the
+       plan. A relocation must save the part `threshold` of J. Who goes where is such that the sum of the
+       squared ways is least, which stays so on the way. Once there has been time to cross the region some
+       times, each decides for itself alone, and relocates only while all others rest.
+    2. *Its own place.* The local minimum of J by its own place, between nodes by a parabola; a goal that
+       saves less than the part `rest` of J is not worth moving.
+    3. *A look.* When it is there, it looks at what is still unknown of its own cell, as long as what is at
+       stake is more than the part `stake` of J; that doubles for each `patience` seconds of looking.
+    4. *The way* is the shortest on its map, with braking before walls and other robots (`steering`).
+
+    What a relocation or a goal must save doubles every `settling` seconds until the team changes. Private
+    maps agree ever more where it matters, and so do the plans; by 1 and by what doubles the team comes to
+    rest also where they do not. Where `CREW` robots or more are heard, 1 is left out: each only considers
+    its nearest ones, as they are, and looks for its own place.
+    """
+
+    name: ClassVar[str] = "atlas"
+    label: ClassVar[str] = "Atlas"
+    summary: ClassVar[str] = "plans the team's placement on the map that each robot discovers itself"
+    information: ClassVar[Information] = "own"
+    scanning: ClassVar[Scanning] = Scanning(rays=120, period=0.5)
+
+    period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
+    threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
+    rest: float = gain(0.001, "1", "part of the cost that a new goal must save", high=1.0)
+    stake: float = gain(0.004, "1", "part of the cost that is worth a look", high=1.0)
+    patience: float = gain(4.0, "s", "looking around in which that doubles", low=0.01, high=1e4)
+    settling: float = gain(
+        40.0, "s", "time in which what a relocation, or a new goal, must save doubles", low=0.01, high=1e6
+    )
+    clearance: float = gain(0.06, "m", "that routes keep between rim and walls", high=10.0)
+    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
+    response_time: float = gain(
+        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
+    )
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+
+    def begin(self, region: Region, team: Team) -> AtlasMemory:
+        """Return the memory of robots that have seen nothing yet."""
+        low_x, low_y, high_x, high_y = region.bounds
+        cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
+        empty = DiscoveredMap.nothing(Raster(region, cell))
+        nobody = Watch(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
+        n = len(team)
+        return AtlasMemory(
+            team,
+            tuple(Mind(empty, -math.inf, nobody) for _ in range(n)),
+            (np.full((1, 2), np.nan),) * n,
+            np.zeros(n, dtype=np.intp),
+            np.full((n, self.scanning.rays, 2), np.nan),
+        )
+
+    def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
+        """Return the forces that lead each robot on its way."""
+        minds, walls = list(memory.minds), memory.walls
+        if seen.scans is not None:
+            walls = seen.positions[:, None] + seen.scans.distances[..., None] * headings(seen.scans.rays)
+            walls[~seen.scans.hit] = np.nan
+            maps = [
+                mind.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
+                for i, mind in enumerate(minds)
+            ]
+            maps = self._told(maps, seen)
+            minds = [
+                mind if known is mind.known else replace(mind, known=known)
+                for mind, known in zip(minds, maps, strict=True)
+            ]
+        routes, legs = list(memory.routes), memory.legs.copy()
+        for i, mind in enumerate(minds):
+            if seen.time >= mind.due - 1e-9:
+                minds[i], goal = self._planned(seen, memory.team, mind, i)
+                ways = minds[i].ways
+                if goal is not None and ways is not None:
+                    routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
+        return self._driven(seen, AtlasMemory(memory.team, tuple(minds), tuple(routes), legs, walls))
+
+    def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
+        """Return the maps after the robots have told each other of theirs, which they do not here."""
+        return maps
+
+    def _planned(self, seen: Observations, team: Team, mind: Mind, i: int) -> tuple[Mind, Array | None]:
+        """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
+        place = seen.positions[i]
+        others, at = seen.neighbours.of(i), seen.neighbour_positions(i)
+        watch = mind.watch.goes_on(others, at, seen.time)
+        crowd = len(others) >= CREW
+        if crowd:
+            near = np.sort(np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: CREW - 1])
+            others, at = others[near], at[near]
+        reach = 1.1 * float(np.sqrt(((at - place) ** 2).sum(axis=1).max())) if crowd else math.inf
+        most = CROWD_NODES if crowd else MOST_NODES
+        window = Window.around(mind.known.raster, place, reach, most)
+        spacing = window.stride * mind.known.raster.cell
+        # nobody gets farther than to the next node meanwhile
+        period = max(self.period, spacing / float(team.max_speed[i]))
+        # the robots do not all plan at the same moment
+        first = math.isinf(mind.due)
+        due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
+        # a team that has changed may have much to do again
+        since = mind.since if np.array_equal(mind.watch.robots, watch.robots) and not first else seen.time
+        mind = replace(mind, due=due, watch=watch, since=since)
+        still = seen.time - watch.since >= STILL_FOR
+        situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
+        if mind.idle and mind.planned is mind.known and mind.ways is not None and mind.ways.window == window:
+            same = mind.crew is not None and np.array_equal(mind.crew, crew)
+            if same and np.abs(situation - mind.situation).max() < _HARDLY * spacing:
+                return mind, None
+        mind = self._mapped(mind, window, float(team.radius[i]) + self.clearance)
+        ways = mind.ways
+        assert ways is not None
+        mind = replace(mind, planned=mind.known, situation=situation, crew=crew)
+        share = seen.region.area / (len(watch.robots) + 1)
+        settling = 2.0 ** min((seen.time - mind.since) / self.settling, 60.0)
+        stock = Stock(mind.known, window, share, seen.density)
+        together = seen.time - mind.since <= _TOGETHER * seen.region.diameter / float(team.max_speed[i])
+        if crowd:
+            begin = ways.standing(place) if mind.node < 0 else mind.node
+            elsewhere = at
+        else:
+            threshold = min(1.0, self.threshold * settling)
+            if not together:
+                # from now on each decides for itself alone, and nobody goes elsewhere while others do
+                threshold = threshold if still.all() else 1.0
+                still[:] = True
+            mind, begin, elsewhere = self._plan_for_all(mind, stock, still, at, threshold)
+        if begin < 0:
+            return replace(mind, own=place, idle=False), place
+        former = np.full(2, np.nan) if mind.own is None else mind.own
+        rest, steps = min(1.0, self.rest * settling), 3 if crowd else 6
+        own = own_place(ways, stock.weights, elsewhere, begin, former, rest, steps)
+        mind = replace(mind, own=own.goal, node=own.node)
+        return self._looking(mind, stock, own.mine, own.cost, place, period)
+
+    def _mapped(self, mind: Mind, window: Window, clearance: float) -> Mind:
+        """Return a mind with the ways of the present map; where no wall is new these are the former ones."""
+        ways = mind.ways
+        blocked = window.cut(mind.known.blocked, True)
+        same = ways is not None and ways.window == window
+        if ways is not None and same and np.array_equal(ways.blocked, blocked):
+            return mind
+        # nodes of another window have other numbers
+        node = mind.node if same else -1
+        return replace(mind, ways=Ways(mind.known.raster, window, blocked, clearance), table=None, node=node)
+
+    def _plan_for_all(
+        self, mind: Mind, stock: Stock, still: BoolArray, at: Array, threshold: float
+    ) -> tuple[Mind, int, Array]:
+        """Return the mind with a plan for the team, the node of the own place, and those of the others."""
+        ways, situation, crew = mind.ways, mind.situation, mind.crew
+        assert ways is not None and situation is not None and crew is not None
+        table = Table.of(ways) if mind.table is None else mind.table
+        given = np.concatenate([[False], still])
+        begin = situation.copy()
+        if mind.places is not None:
+            robots, places = mind.places[:, 0].astype(np.intp), mind.places[:, 1:]
+            _, here, there = np.intersect1d(crew, robots, return_indices=True)
+            free = ~given[here]
+            begin[here[free]] = places[there[free]]
+        places = team_places(ways, table, stock.weights, situation, begin, given, threshold)
+        mind = replace(mind, table=table, places=np.column_stack([crew, places]))
+        near = ((ways.nodes - places[0]) ** 2).sum(axis=1)
+        near[~ways.roomy] = np.inf
+        node = int(near.argmin()) if ways.roomy.any() else -1
+        return mind, node, np.where(still[:, None], at, places[1:])
+
+    def _looking(
+        self, mind: Mind, stock: Stock, mine: Array, cost: float, place: Array, period: float
+    ) -> tuple[Mind, Array]:
+        """Return the mind, and where to go: to the own place, or first to where there is something to see."""
+        ways, own = mind.ways, mind.own
+        assert ways is not None and own is not None
+        former = mind.former
+        if mind.look is not None and math.dist(mind.look, place) < _ARRIVED:
+            former = (*former, mind.look)
+        if mind.look is None and math.dist(own, place) > _ARRIVED:
+            return replace(mind, idle=False), own
+        least = self.stake * cost * 2.0 ** min(mind.looked / self.patience, 60.0)
+        node = ways.standing(place)
+        look = None
+        if node >= 0 and self.stake < 1.0:
+            look = stock.viewpoint(mine, ways.distances(node), ways.tight, least, former)
+        looked = mind.looked + period * (look is not None)
+        mind = replace(mind, look=look, former=former, looked=looked, idle=look is None)
+        return mind, own if look is None else look
+
+    def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
+        """Return the forces towards the way-points, kept off walls and other robots."""
+        team, positions, legs = memory.team, seen.positions, memory.legs
+        aim = np.array([route[leg] for route, leg in zip(memory.routes, legs.tolist(), strict=True)])
+        last = np.array([len(route) - 1 for route in memory.routes])
+        offset = aim - positions
+        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        turning = (legs < last) & (distance < _TURN)
+        if turning.any():
+            legs = legs + turning
+            memory = replace(memory, legs=legs)
+            for i in turning.nonzero()[0].tolist():
+                aim[i] = memory.routes[i][legs[i]]
+            offset = aim - positions
+            distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        braked = np.where(legs == last, self.k_prop * distance, np.inf)
+        speed = np.minimum(team.max_speed, braked)
+        wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
+
+        to_wall = positions - seen.obstacle_points
+        gap = np.sqrt(to_wall[:, 0] ** 2 + to_wall[:, 1] ** 2) - team.radius
+        wanted = steering.slowed(wanted, gap)
+        robot, _, away, apart = seen.neighbours_within(_HEEDED)
+        # of the size of others a robot knows its own
+        wanted = steering.clear_of_robots(wanted, robot, away, apart, 2.0 * team.radius[robot])
+        walls = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
+        wanted = steering.clear_of_walls(wanted, walls, team.radius)
+        forces = drive(wanted, seen, team, self.response_time)
+        goals = np.array([route[-1] for route in memory.routes])
+        return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)
+
+
+@dataclass(frozen=True)
+class AtlasShared(Atlas):
+    """`Atlas`, but robots that hear each other also tell each other their maps."""
+
+    name: ClassVar[str] = "atlas-shared"
+    label: ClassVar[str] = "Atlas, shared maps"
+    summary: ClassVar[str] = "as Atlas, with the maps merged among the robots that hear each other"
+    information: ClassVar[Information] = "shared map"
+
+    def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
+        return [known.merged(maps[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(maps)]

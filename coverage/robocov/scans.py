@@ -1,0 +1,86 @@
+"""Ray scans: what a range sensor measures all around, for the controllers that ask for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import ParameterError, shown
+
+MOST_RAYS = 3600
+"""A ray for each tenth of a degree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scanning:
+    """How a controller wants its robots to scan; it says so in an attribute `scanning`.
+
+    Attributes
+    ----------
+    rays : int
+        Evenly round a full turn, the first along +x.
+    period : float, s
+        Between two scans, rounded to whole control periods; the first is at the beginning.
+
+    Raises
+    ------
+    ParameterError
+        When one of them is out of range.
+    """
+
+    rays: int = 120
+    period: float = 0.5
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.rays, (int, np.integer)) and not isinstance(self.rays, bool)
+        if not whole or not 1 <= self.rays <= MOST_RAYS:
+            raise ParameterError(
+                f"scanning.rays: {shown(self.rays)}, but a whole number from 1 to {MOST_RAYS} was wanted"
+            )
+        number = isinstance(self.period, (int, float, np.floating)) and not isinstance(self.period, bool)
+        if not number or not 0.0 <= self.period <= 1e6:
+            raise ParameterError(
+                f"scanning.period: {shown(self.period)}, but a number from 0 to 1e+06 s was wanted"
+            )
+
+    def every(self, dt: float) -> int:
+        """Return after how many control periods of `dt` seconds each scan follows the one before.
+
+        >>> Scanning(period=0.5).every(0.02)
+        25
+        """
+        return max(1, round(self.period / dt))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scans:
+    """One scan of each robot, by its own range sensor; row i belongs to robot i alone.
+
+    Attributes
+    ----------
+    distances : (n, rays) m
+        To the first solid point along each ray; the robot's sensing range where there is none.
+    hit : (n, rays)
+        Whether there is one.
+    """
+
+    distances: Array
+    hit: BoolArray
+
+    @property
+    def rays(self) -> int:
+        """Number of rays of each robot."""
+        return int(self.distances.shape[1])
+
+    @property
+    def headings(self) -> Array:
+        """Unit vectors along the rays, (rays, 2)."""
+        return headings(self.rays)
+
+
+def headings(rays: int) -> Array:
+    """Return unit vectors evenly round a full turn, (rays, 2), the first along +x."""
+    angle = np.arange(rays) * (2.0 * np.pi / rays)
+    return np.column_stack([np.cos(angle), np.sin(angle)])

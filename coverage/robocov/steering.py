@@ -1,0 +1,108 @@
+"""From a wanted velocity to one that is safe: braking before walls and other robots.
+
+A robot that is `gap` metres off something that does not move may approach it with at most
+``sqrt(2 b gap)``: it then stops before it with the deceleration b. Two robots share the gap between them.
+The velocity is the wanted one, corrected along the directions to what is too close (the correction is
+the projection onto the half-plane of velocities that are allowed, for the most violated one first).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+
+BRAKING = 0.8
+"""Deceleration that is counted on, m/s²: less than half of the usual limit, for the lag of the drive."""
+
+MARGIN = 0.02
+"""Gap that is left to walls, m."""
+
+APART = 0.04
+"""Gap that is left to other robots, m."""
+
+CREEP = 0.15
+"""Speed at which a robot moves along what it is closest to, m/s; the more room, the faster."""
+
+_ROUNDS = 3
+_ASIDE = 0.3
+"""Largest speed, m/s, at which robots that stand in each other's way pass on the left."""
+
+
+def slowed(velocity: Array, gap: Array) -> Array:
+    """Return (n, 2) velocities no faster than the gap to the nearest wall, (n,) m, nan for none, makes wise.
+
+    What is behind a corner comes into sight late: in a narrow place nothing is far.
+    """
+    room = np.where(np.isnan(gap), np.inf, np.maximum(gap, 0.0))
+    most = np.sqrt(2.0 * BRAKING * room) + CREEP
+    speed = np.sqrt(velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
+    return np.asarray(velocity * np.minimum(1.0, most / np.maximum(speed, 1e-9))[:, None])
+
+
+def clear_of_walls(velocity: Array, offset: Array, radius: Array) -> Array:
+    """Return velocities that brake before points of walls.
+
+    Parameters
+    ----------
+    velocity : (n, 2) m/s
+    offset : (n, k, 2) m
+        From points of walls to the robot; nan where there is none.
+    radius : (n,) m
+    """
+    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
+    gap = distance - radius[:, None] - MARGIN
+    allowed = np.where(gap > 0.0, np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    allowed = np.where(np.isnan(gap), np.inf, allowed)
+    normal = offset / np.maximum(distance, 1e-9)[..., None]
+    normal = np.where(np.isnan(normal), 0.0, normal)
+    rows = np.arange(len(velocity))
+    for _ in range(_ROUNDS):
+        approach = -(normal[..., 0] * velocity[:, None, 0] + normal[..., 1] * velocity[:, None, 1])
+        excess = approach - allowed
+        worst = excess.argmax(axis=1)
+        over = np.maximum(excess[rows, worst], 0.0)
+        if not over.any():
+            break
+        velocity = velocity + normal[rows, worst] * over[:, None]
+    return velocity
+
+
+def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: Array, reach: Array) -> Array:
+    """Return velocities that brake before other robots, and pass them on the left.
+
+    Parameters
+    ----------
+    velocity : (n, 2) m/s
+    robot : (m,)
+        Sorted; whose neighbour it is.
+    offset : (m, 2) m
+        From the neighbour to the robot.
+    distance : (m,) m
+    reach : (m,) m
+        At which the two touch.
+    """
+    if not len(robot):
+        return velocity
+    gap = distance - reach - APART
+    allowed = np.where(gap > 0.0, 0.5 * np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    normal = offset / np.maximum(distance, 1e-9)[:, None]
+    n = len(velocity)
+    velocity = velocity.copy()
+    # first past each other, then, in a throng, at least not into anybody
+    for aside in (_ASIDE, _ASIDE, 0.0, 0.0, 0.0):
+        excess = -(normal * velocity[robot]).sum(axis=1) - allowed
+        worst = np.full(n, -np.inf)
+        np.maximum.at(worst, robot, excess)
+        hit = ((excess == worst[robot]) & (excess > 0.0)).nonzero()[0]
+        if not len(hit):
+            break
+        # of equals the last one
+        which = np.full(n, -1)
+        which[robot[hit]] = hit
+        rows = (which >= 0).nonzero()[0]
+        chosen = which[rows]
+        over = excess[chosen]
+        left = np.column_stack([normal[chosen, 1], -normal[chosen, 0]])
+        velocity[rows] += normal[chosen] * over[:, None] + left * np.minimum(over, aside)[:, None]
+    return velocity
