@@ -1,0 +1,91 @@
+"""Learning environments: the simulation for gymnasium and PettingZoo (``pip install "robocov[rl]"``).
+
+`CoverageParallelEnv` has one learner for each robot, `CoverageEnv` one for all of them; both take what a
+`CoverageTask` says, and their observations are those of an `ObservationLayout`. What is learned becomes a
+controller as a `PolicyController`; a controller acts in the environments as a `ControllerPolicy`.
+
+    import numpy as np
+    from robocov_app.learning import CoverageEnv, ObservationLayout
+
+    layout = ObservationLayout(neighbours=2)
+    env = CoverageEnv(
+        duration=20.0, dt=0.05, repeat=5, action="velocity", reward_every=999, observation=layout
+    )
+    offsets = [0, 1, 2, 3, 4, 5, 7, 8, 10, 11]  # x and y of all in an observation, without the masks
+
+
+    def law(gains):  # a velocity along each offset: away from neighbours, to the middle, ...
+        return lambda rows: np.einsum("k,nkd->nd", gains, rows[:, offsets].reshape(len(rows), -1, 2))
+
+
+    def mean_return(policy, seeds):
+        total = 0.0
+        for seed in seeds:
+            rows, _ = env.reset(seed=seed)
+            over = False
+            while not over:
+                rows, reward, _, over, _ = env.step(policy(rows))
+                total += reward
+        return total / len(seeds)
+
+
+    rng = np.random.default_rng(0)
+    tried = [rng.normal(scale=10.0, size=5) for _ in range(16)]
+    returns = [mean_return(law(gains), seeds=range(2)) for gains in tried]
+    best = tried[int(np.argmax(returns))]
+    print("median", np.median(returns), "best on other starts", mean_return(law(best), seeds=range(10, 14)))
+
+Names are loaded on first use; only the two environments need the extra.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from robocov.extras import extra
+
+if TYPE_CHECKING:
+    from robocov_app.learning.expert import ControllerPolicy
+    from robocov_app.learning.gym import CoverageEnv
+    from robocov_app.learning.layout import ObservationLayout
+    from robocov_app.learning.parallel import CoverageParallelEnv
+    from robocov_app.learning.policy import PolicyController
+    from robocov_app.learning.scenarios import GeneratedMaps
+    from robocov_app.learning.task import CoverageTask
+
+__all__ = [
+    "ControllerPolicy",
+    "CoverageEnv",
+    "CoverageParallelEnv",
+    "CoverageTask",
+    "GeneratedMaps",
+    "ObservationLayout",
+    "PolicyController",
+]
+
+_HOME: dict[str, tuple[str, tuple[str, ...]]] = {
+    # name: its module, and the packages of the extra that it needs
+    "ControllerPolicy": ("expert", ()),
+    "CoverageEnv": ("gym", ("gymnasium",)),
+    "CoverageParallelEnv": ("parallel", ("gymnasium", "pettingzoo")),
+    "CoverageTask": ("task", ()),
+    "GeneratedMaps": ("scenarios", ()),
+    "ObservationLayout": ("layout", ()),
+    "PolicyController": ("policy", ()),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, needed = _HOME[name]
+    for package in needed:
+        extra(package, "rl")
+    value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,24 @@
+"""The environment as PettingZoo lays its own out: `parallel_env`, and `env` where robots act in turn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pettingzoo.utils import parallel_to_aec
+
+from robocov_app.learning.parallel import CoverageParallelEnv
+
+__all__ = ["env", "parallel_env", "raw_env"]
+
+
+def parallel_env(**options: Any) -> CoverageParallelEnv:
+    """Return a `CoverageParallelEnv` with these options."""
+    return CoverageParallelEnv(**options)
+
+
+def env(**options: Any) -> Any:
+    """Return PettingZoo's ``AECEnv`` of it: the same, but the robots say one by one what they do."""
+    return parallel_to_aec(parallel_env(**options))
+
+
+raw_env = env

@@ -1,0 +1,335 @@
+"""One episode: a simulation that is driven by actions, and what came of each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from robocov.errors import ParameterError, StartError, shown
+from robocov.metrics import TOUCHING
+from robocov.momentary_cost import MomentaryCost
+from robocov.neighbours import close_pairs
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.record import Record
+from robocov.recorder import Recorder
+from robocov.scans import Scanning
+from robocov.simulation import Simulation
+from robocov_app.learning.driving import driving_forces
+from robocov_app.learning.rewards import reference_distance, shares
+from robocov_app.learning.scenarios import Scenarios, map_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from robocov.arrays import Array, BoolArray
+    from robocov.conditions import Conditions
+    from robocov.cost import CoverageCost
+    from robocov.environment import Environment
+    from robocov.record import Record
+    from robocov.region import Region
+    from robocov.robots import Team
+    from robocov_app.learning.layout import Rows
+    from robocov_app.learning.task import CoverageTask
+
+
+_SEEDS = 2**31
+"""Starts are drawn with seeds below this."""
+
+
+@dataclass(frozen=True)
+class Learner:
+    """Stands where a controller stands in a simulation that is driven from outside."""
+
+    name: ClassVar[str] = "learner"
+    label: ClassVar[str] = "learner"
+    summary: ClassVar[str] = "whoever acts in a learning environment"
+
+    scanning: Scanning | None = None
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered here."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Return no forces; those of the actions are given at each step."""
+        return Decision(np.zeros_like(seen.positions))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of one action of the team.
+
+    Attributes
+    ----------
+    rewards : (n,)
+    contact : (n,) s
+        How long each robot touched a wall or another robot.
+    """
+
+    rewards: Array
+    contact: Array
+
+
+def drawn_episode(
+    task: CoverageTask,
+    scenarios: Scenarios,
+    rng: np.random.Generator,
+    options: Mapping[str, Any] | None = None,
+) -> Episode:
+    """Return a new episode, by chance where the options leave it to chance.
+
+    Parameters
+    ----------
+    task : CoverageTask
+    scenarios : Scenarios
+        Of the task's maps.
+    rng : numpy Generator
+    options : dict or None
+        ``map``: a map, its name or path. ``start``: the name of one of its starts. ``start_seed``: the
+        seed of the positions, as that of `robocov run`. ``positions``: the positions themselves, (n, 2) m.
+        ``conditions_seed``: the seed of the task's conditions. Other keys mean nothing here.
+
+    Raises
+    ------
+    InputError
+        When a map cannot be read or a team has no room at its start.
+    """
+    options = options or {}
+    environment = scenarios.draw(rng)
+    if "map" in options:
+        environment = map_of(options["map"], int(rng.integers(_SEEDS)))
+    name = options.get("start", task.start)
+    starts = list(environment.starts) or ["uniform"]
+    any_start, seed = starts[int(rng.integers(len(starts)))], int(rng.integers(_SEEDS))
+    start = environment.start(any_start if name == "*" else name)
+    seed = options.get("start_seed", seed)
+    conditions, chance = task.conditions, int(rng.integers(_SEEDS))
+    if conditions is not None:
+        conditions = replace(conditions, seed=options.get("conditions_seed", chance))
+    cost = scenarios.cost(environment)
+    if "positions" in options:
+        try:
+            positions = np.asarray(options["positions"], dtype=float)
+        except (TypeError, ValueError):
+            raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
+        return Episode(task, environment, cost, positions, conditions=conditions)
+    radius = float(task.whole_team.radius.max())
+    positions = start.sample(task.robots, seed=seed, radius=radius)
+    return Episode(task, environment, cost, positions, conditions=conditions, start=start.name, seed=seed)
+
+
+class Episode:
+    """A team in one map from one start.
+
+    Parameters
+    ----------
+    task : CoverageTask
+    environment : Environment
+    cost : CoverageCost
+        Of the environment.
+    positions : (n, 2) m
+    conditions : Conditions or None
+    start : str, seed : int
+        Where the positions came from, for the record.
+
+    Attributes
+    ----------
+    simulation : Simulation
+    working : (n,) bool
+        Which robots are there and have not failed.
+    result : CoverageResult
+        The coverage cost when it was last evaluated, of the robots that work.
+    initial : CoverageResult
+        At the beginning.
+    reference : float, m
+        The unit of rewards.
+    trail : list of (n, 2) m
+        The positions at each decision so far, from the start on.
+
+    Raises
+    ------
+    StartError
+        When a robot would start in a wall or in another robot.
+    ParameterError
+        When the lattice of the cost is too coarse for the map.
+    """
+
+    def __init__(
+        self,
+        task: CoverageTask,
+        environment: Environment,
+        cost: CoverageCost,
+        positions: Array,
+        *,
+        conditions: Conditions | None = None,
+        start: str | None = None,
+        seed: int | None = None,
+    ) -> None:
+        self.task, self.team = task, task.whole_team
+        if len(positions) != len(self.team):
+            raise StartError(
+                f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
+            )
+        rays = task.observation.rays
+        self._learner = learner = Learner(Scanning(rays, task.period) if rays else None)
+        self.simulation = Simulation(
+            environment, learner, positions, self.team, task.dt, conditions=conditions
+        )
+        self.working = self.simulation.working
+        self._cost = MomentaryCost(cost)
+        self._counted = self._cost.counted(0.0, self.simulation.positions, self.working)
+        result = self._cost(0.0, self.simulation.positions, self.working)
+        if result is None or not result.mean_distance > 0.0:
+            raise ParameterError(
+                f"lattice: {task.lattice}, but a finer one was wanted for map {environment.name!r}"
+            )
+        self.result = self.initial = result
+        self.reference = reference_distance(environment.free_area - result.uncovered_area, len(self.team))
+        self.trail = [self.simulation.positions]
+        self._rewarded = 0
+        self._scans = self.snapshot.seen.scans
+        self._start, self._seed = start, seed
+        self._moments: list[Snapshot] = []
+
+    @property
+    def environment(self) -> Environment:
+        """The map."""
+        return self.simulation.environment
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The present state, and what is seen in it."""
+        return self.simulation.snapshot
+
+    @property
+    def cycle(self) -> int:
+        """How many actions there were."""
+        return len(self.trail) - 1
+
+    @property
+    def normalised_cost(self) -> float:
+        """The mean distance in units of the reference distance."""
+        return self.result.mean_distance / self.reference
+
+    def observations(self) -> Rows:
+        """Return what each robot is told now, (n, size)."""
+        seen = self.snapshot.seen
+        return self.task.observation.rows(seen, self.team, self._scans)
+
+    def state(self) -> Rows:
+        """Return what nobody knows in the team: where all are, and how fast, (4 n,) from -1 to 1.
+
+        For each robot its position from the middle of the region's bounding box, in the diagonal of that,
+        and its velocity in its largest speed.
+        """
+        low_x, low_y, high_x, high_y = self.environment.region.bounds
+        middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
+        where = (self.simulation.positions - middle) / self.environment.region.diameter
+        speed = self.simulation.velocities / self.team.max_speed[:, None]
+        rows: Rows = np.clip(np.column_stack([where, speed]), -1.0, 1.0).astype(np.float32)
+        return rows.ravel()
+
+    def facts(self) -> dict[str, float]:
+        """Return what is told beside observations: time and cost of the team, units in the names."""
+        return {
+            "time_s": self.simulation.time,
+            "mean_distance_m": self.result.mean_distance,
+            "uncovered_area_m2": self.result.uncovered_area,
+        }
+
+    def advance(self, actions: Array, *, last: bool = False) -> Outcome:
+        """Hold actions for the time of one decision.
+
+        Parameters
+        ----------
+        actions : (n, 2) N or m/s
+        last : bool
+            The cost is rewarded now, whatever `CoverageTask.reward_every` says.
+
+        Raises
+        ------
+        ParameterError
+            When they are not finite numbers of that shape; the message names the robot.
+        """
+        actions = self._checked(actions)
+        task, simulation = self.task, self.simulation
+        contact = np.zeros(len(self.team))
+        for _ in range(task.repeat):
+            forces = driving_forces(task.action, actions, simulation.velocities, self.team)
+            forces = np.where(simulation.working[:, None], forces, 0.0)
+            if task.recording:
+                self._moments.append(replace(simulation.snapshot, decision=Decision(forces)))
+            simulation.step(forces=forces)
+            contact += task.dt * self._touching()
+        self.working = simulation.working
+        self.trail.append(simulation.positions)
+        self._scans = simulation.snapshot.seen.scans
+        gained = self._gained(last) / self.reference
+        return Outcome(np.asarray(gained - task.contact_penalty * contact), contact)
+
+    def _gained(self, last: bool) -> Array:
+        """Return what each robot gets for what became of the cost, (n,) m, and take the new cost.
+
+        Who fails changes the cost at once. That is nobody's doing: those who have counted all the time
+        get what became of their own cost, as if they had been alone.
+        """
+        task, now, gained = self.task, self.simulation.time, np.zeros(len(self.team))
+        positions, earlier = self.simulation.positions, self.trail[self._rewarded]
+        counted = self._cost.counted(now, positions, self.working)
+        changed = not np.array_equal(counted, self._counted)
+        since = self.cycle - self._rewarded
+        if not (last or changed or since >= task.reward_every):
+            return gained
+        stayed, before, after = counted & self._counted, self.result, self.result
+        self._counted, self._rewarded = counted, self.cycle
+        if counted.any():
+            after = self.result = self._cost.at(now)(positions[counted])
+        if not stayed.any():
+            return gained
+        if changed:
+            before = self._cost.at(now - since * task.period)(earlier[stayed])
+            after = self._cost.at(now)(positions[stayed])
+        gained[stayed] = shares(task.reward, before, after, since / task.cycles)
+        return gained
+
+    def record(self) -> Record:
+        """Return the episode so far as a record, with the forces that the actions gave; none at its end.
+
+        Raises
+        ------
+        ParameterError
+            When the task does not say `recording`.
+        """
+        if not self.task.recording:
+            raise ParameterError("record: a task with recording=True was wanted")
+        recorder = Recorder(
+            *(self.environment, self.team, self._learner, self.task.dt),
+            start=self._start,
+            seed=self._seed,
+            conditions=self.simulation.conditions,
+        )
+        for moment in (*self._moments, self.snapshot):
+            recorder.add(moment)
+        return recorder.record()
+
+    def _touching(self) -> BoolArray:
+        """Return which robots that work touch a wall or another robot now, (n,)."""
+        simulation, radius = self.simulation, self.team.radius
+        positions, works = simulation.positions, simulation.working
+        touching = works & ~np.isnan(simulation.sensor.nearest(positions, radius + TOUCHING)[:, 0])
+        first, second, distance = close_pairs(positions, 2.0 * float(radius.max()) + TOUCHING)
+        if len(first):
+            met = (distance <= radius[first] + radius[second] + TOUCHING) & works[first] & works[second]
+            touching[first[met]] = True
+        return touching
+
+    def _checked(self, actions: Any) -> Array:
+        array = np.asarray(actions, dtype=np.float64)
+        if array.shape != (len(self.team), 2):
+            raise ParameterError(f"actions of shape {array.shape}, but {(len(self.team), 2)} was wanted")
+        for robot in np.flatnonzero(~np.isfinite(array).all(axis=1)).tolist():
+            raise ParameterError(
+                f"action of robot_{robot + 1}: {shown(array[robot].tolist())}, but finite numbers were wanted"
+            )
+        return array

@@ -1,0 +1,184 @@
+"""What a learner is told of what a robot knows: one row of numbers from -1 to 1 for each robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.controllers.cells import cells_seen
+from robocov.errors import ParameterError, shown
+from robocov.scans import MOST_RAYS
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.observation import Observations
+    from robocov.region import Region
+    from robocov.robots import Team
+    from robocov.scans import Scans
+
+Rows: TypeAlias = NDArray[np.float32]
+"""(n, size): one row for each robot."""
+
+MOST_NEIGHBOURS = 1000
+"""Most neighbours that a row has room for."""
+
+
+@dataclass(frozen=True)
+class ObservationLayout:
+    """Which numbers an observation has, and in what order.
+
+    Row i holds only what robot i knows (see `robocov.observation`); all are from -1 to 1. The unit of
+    ``D`` is the diagonal of the known region's bounding box, that of ``S`` the robot's sensing range, or
+    ``D`` where that is shorter.
+
+    =============  ==================  =====================================================================
+    block          numbers             content
+    =============  ==================  =====================================================================
+    ``position``   2                   from the middle of the region's bounding box, D
+    ``velocity``   2                   in the robot's largest speed
+    ``obstacle``   3                   offset of the nearest sensed obstacle point, S; then 1; all 0 for none
+    ``neighbour``  3 x `neighbours`    the nearest robots that are heard, nearest first: offset, D; then 1;
+                                       all 0 where there is none
+    ``rays``       `rays`              distance along each ray, evenly round from +x, S; 1 where it is free
+    ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
+    =============  ==================  =====================================================================
+
+    Attributes
+    ----------
+    neighbours : int
+    rays : int
+        0 for no scan; each one costs a query of the physics.
+    centroid : bool
+        The one number that a robot has to compute of the others: what Lloyd's algorithm steers to.
+
+    Raises
+    ------
+    ParameterError
+        When a number is out of range.
+
+    Examples
+    --------
+    >>> layout = ObservationLayout(neighbours=2)
+    >>> layout.size, layout.blocks["neighbour"]
+    (13, slice(7, 13, None))
+    """
+
+    neighbours: int = 4
+    rays: int = 0
+    centroid: bool = False
+
+    def __post_init__(self) -> None:
+        for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
+            value = getattr(self, name)
+            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+            if not whole or not 0 <= value <= most:
+                raise ParameterError(
+                    f"observation.{name}: {shown(value)}, but a whole number from 0 to {most} was wanted"
+                )
+        if not isinstance(self.centroid, bool):
+            raise ParameterError(
+                f"observation.centroid: {shown(self.centroid)}, but true or false was wanted"
+            )
+
+    @property
+    def blocks(self) -> dict[str, slice]:
+        """Where in a row each block is, in their order; only those that it has."""
+        counts = {
+            "position": 2,
+            "velocity": 2,
+            "obstacle": 3,
+            "neighbour": 3 * self.neighbours,
+            "rays": self.rays,
+            "centroid": 2 * self.centroid,
+        }
+        places: dict[str, slice] = {}
+        begin = 0
+        for name, count in counts.items():
+            if count:
+                places[name] = slice(begin, begin + count)
+            begin += count
+        return places
+
+    @property
+    def size(self) -> int:
+        """How many numbers a row has."""
+        return 7 + 3 * self.neighbours + self.rays + 2 * self.centroid
+
+    @property
+    def bounds(self) -> tuple[Rows, Rows]:
+        """Least and largest values of a row, (size,) each."""
+        low = np.full(self.size, -1.0, dtype=np.float32)
+        places = self.blocks
+        low[places["obstacle"]][2] = 0.0
+        if "neighbour" in places:
+            low[places["neighbour"]][2::3] = 0.0
+        if "rays" in places:
+            low[places["rays"]] = 0.0
+        return low, np.ones(self.size, dtype=np.float32)
+
+    def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
+        """Return what each robot is told, (n, size).
+
+        Parameters
+        ----------
+        seen : Observations
+        team : Team
+            For its largest speeds and its sensing ranges.
+        scans : Scans or None
+            The latest; by default those of `seen`.
+
+        Raises
+        ------
+        ParameterError
+            When rays are wanted and there is no scan of so many.
+        """
+        n, unit = len(seen.positions), seen.region.diameter
+        reach = sensing_unit(team, seen.region)[:, None]
+        places, rows = self.blocks, np.zeros((n, self.size))
+        low_x, low_y, high_x, high_y = seen.region.bounds
+        middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
+        rows[:, places["position"]] = (seen.positions - middle) / unit
+        rows[:, places["velocity"]] = seen.velocities / team.max_speed[:, None]
+        sensed = ~np.isnan(seen.obstacle_points[:, 0])
+        obstacle = rows[:, places["obstacle"]]
+        obstacle[sensed, :2] = ((seen.obstacle_points - seen.positions) / reach)[sensed]
+        obstacle[:, 2] = sensed
+        if self.neighbours:
+            rows[:, places["neighbour"]] = _nearest(seen, self.neighbours, unit)
+        if self.rays:
+            scans = seen.scans if scans is None else scans
+            if scans is None or scans.rays != self.rays:
+                found = "none" if scans is None else str(scans.rays)
+                raise ParameterError(
+                    f"observation.rays: {self.rays} in a scan were wanted, but {found} are there"
+                )
+            rows[:, places["rays"]] = np.where(scans.hit, scans.distances / reach, 1.0)
+        if self.centroid:
+            cells = cells_seen(seen, "distance", None)
+            rows[:, places["centroid"]] = (cells.centroid - seen.positions) / unit
+        # what is believed of places may be off by more than there is
+        return np.clip(rows, -1.0, 1.0).astype(np.float32)
+
+
+def sensing_unit(team: Team, region: Region) -> Array:
+    """Return the length in metres that sensed distances are told in, (n,)."""
+    return np.asarray(np.clip(team.sensing_range, 1e-9, region.diameter))
+
+
+def _nearest(seen: Observations, count: int, unit: float) -> Array:
+    """Return the blocks of the nearest neighbours, (n, 3 count)."""
+    n = len(seen.positions)
+    robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
+    # stable: what is equally far stays in the order of the numbers
+    order = np.lexsort((distance, robot))
+    begin = np.searchsorted(robot, np.arange(n))
+    rank = np.arange(len(robot)) - begin[robot]
+    told = rank < count
+    blocks = np.zeros((n, count, 3))
+    # from the robot to its neighbour
+    blocks[robot[told], rank[told], :2] = -offset[order[told]] / unit
+    blocks[robot[told], rank[told], 2] = 1.0
+    return blocks.reshape(n, 3 * count)

@@ -1,0 +1,217 @@
+"""One learner for each robot: a parallel environment of PettingZoo."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from pettingzoo import ParallelEnv
+
+from robocov.errors import ParameterError, RobocovError, shown
+from robocov_app.learning.driving import action_limit
+from robocov_app.learning.episode import Episode, drawn_episode
+from robocov_app.learning.pictures import FRAMES_PER_SECOND, RENDER_MODES, Pictures
+from robocov_app.learning.scenarios import Scenarios
+from robocov_app.learning.task import CoverageTask, changed_task
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from robocov.arrays import Array
+    from robocov_app.learning.layout import Rows
+    from robocov_app.recording import Frame
+
+
+class CoverageParallelEnv(ParallelEnv):
+    """A team that learns to cover, each robot by what it knows: PettingZoo's ``ParallelEnv``.
+
+    The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's
+    `ObservationLayout`: float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
+    `CoverageTask.repeat` control periods. Every robot's spaces are its own; equal robots have equal ones.
+
+    An episode is truncated after `CoverageTask.duration`. The same seed and actions give the same episode,
+    bit for bit; ``reset()`` without a seed goes on with the random numbers.
+
+    Parameters
+    ----------
+    task : CoverageTask or None
+    render_mode : {"rgb_array", "human"} or None
+        ``human`` opens a window; it needs a display.
+    size : (width, height), px
+        Of pictures.
+    theme : {"light", "dark"}
+    max_cycles : int or None
+        Actions until an episode is truncated, in place of the task's duration.
+    **changes
+        Of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``.
+
+    Attributes
+    ----------
+    task : CoverageTask
+    episode : Episode
+        The present one; None before the first ``reset``.
+    agents, possible_agents : list of str
+    max_cycles : int
+    state_space : Box
+        Of `state`.
+
+    Raises
+    ------
+    InputError
+        When the task makes no sense or a map cannot be read.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "robocov_coverage_v0",
+        "render_modes": list(RENDER_MODES),
+        "render_fps": FRAMES_PER_SECOND,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        task: CoverageTask | None = None,
+        *,
+        render_mode: str | None = None,
+        size: tuple[int, int] = (640, 480),
+        theme: str = "light",
+        max_cycles: int | None = None,
+        **changes: Any,
+    ) -> None:
+        self.task = changed_task(task, changes)
+        self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
+        if self.max_cycles < 1:
+            raise ParameterError(f"max_cycles: {max_cycles}, but a whole number of at least 1 was wanted")
+        self.render_mode = render_mode
+        self._pictures = Pictures(render_mode, size, theme)
+        self._scenarios = Scenarios(self.task.maps, self.task.lattice)
+        self.possible_agents = self.task.agents
+        self.agents: list[str] = []
+        self.episode: Episode | None = None
+        self._rng = np.random.default_rng()
+        low, high = self.task.observation.bounds
+        limits = action_limit(self.task.action, self.task.whole_team).tolist()
+        self.observation_spaces = {agent: Box(low, high, dtype=np.float32) for agent in self.possible_agents}
+        self.action_spaces = {
+            agent: Box(-limit, limit, (2,), np.float32)
+            for agent, limit in zip(self.possible_agents, limits, strict=True)
+        }
+        self.state_space = Box(-1.0, 1.0, (4 * self.task.robots,), np.float32)
+
+    def observation_space(self, agent: str) -> Box:
+        """Return the space of a robot's observations, the same object every time."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Box:
+        """Return the space of a robot's actions, the same object every time."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[dict[str, Rows], dict[str, dict[str, Any]]]:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        seed : int or None
+        options : dict or None
+            See `robocov_app.learning.episode.drawn_episode`.
+        """
+        if seed is not None:
+            self._rng, _ = seeding.np_random(seed)
+        self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
+        self.agents = self._working()
+        self._pictures.shown(self.episode)
+        infos = self._infos(np.zeros(self.task.robots))
+        for info in infos.values():
+            info["map"] = self.episode.environment.name
+        return self._observations(self.agents), infos
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[
+        dict[str, Rows],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Let every robot act, and return observations, rewards, terminations, truncations and infos.
+
+        Raises
+        ------
+        ParameterError
+            When a robot has no action, or one that is not two finite numbers.
+        """
+        episode = self._present()
+        values = np.zeros((self.task.robots, 2))
+        for robot, agent in enumerate(self.possible_agents):
+            if agent in self.agents:
+                values[robot] = _action(actions, agent)
+        acting = list(self.agents)
+        over = episode.cycle + 1 >= self.max_cycles
+        outcome = episode.advance(values, last=over)
+        self.agents = self._working()
+        told = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
+        rewards = dict(zip(self.possible_agents, outcome.rewards.tolist(), strict=True))
+        # who has failed will not come back: for it the episode has ended
+        ended = {agent: agent not in self.agents for agent in told}
+        truncated = {agent: over and not ended[agent] for agent in told}
+        observations, infos = self._observations(told), self._infos(outcome.contact)
+        if over:
+            self.agents = []
+        self._pictures.shown(episode)
+        return (
+            observations,
+            {agent: rewards[agent] for agent in told},
+            ended,
+            truncated,
+            {agent: infos[agent] for agent in told},
+        )
+
+    def state(self) -> Rows:
+        """Return where all robots are and how fast, for critics: see `Episode.state`."""
+        return self._present().state()
+
+    def render(self) -> Frame | None:
+        """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
+        return self._pictures.frame(self._present())
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._pictures.close()
+
+    def _present(self) -> Episode:
+        if self.episode is None:
+            raise RobocovError("environment: reset() was wanted before anything else")
+        return self.episode
+
+    def _working(self) -> list[str]:
+        working = self._present().working.tolist()
+        return [agent for agent, works in zip(self.possible_agents, working, strict=True) if works]
+
+    def _observations(self, agents: list[str]) -> dict[str, Rows]:
+        rows = dict(zip(self.possible_agents, self._present().observations(), strict=True))
+        return {agent: rows[agent] for agent in agents}
+
+    def _infos(self, contact: Array) -> dict[str, dict[str, Any]]:
+        common = self._present().facts()
+        told = zip(self.possible_agents, contact.tolist(), strict=True)
+        return {agent: {**common, "contact_s": touched} for agent, touched in told}
+
+
+def _action(actions: Mapping[str, Any], agent: str) -> Array:
+    """Return the action of one agent, (2,)."""
+    if agent not in actions:
+        raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
+    try:
+        values = np.asarray(actions[agent], dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (2,) or not np.isfinite(values).all():
+        raise ParameterError(
+            f"action of {agent}: {shown(actions[agent])}, but two finite numbers were wanted"
+        )
+    return values

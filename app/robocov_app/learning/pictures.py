@@ -1,0 +1,107 @@
+"""Pictures of an episode: arrays without a display, or a window."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.errors import ParameterError, RobocovError, unknown_name
+
+if TYPE_CHECKING:
+    from robocov_app.learning.episode import Episode
+    from robocov_app.recording import Frame
+    from robocov_app.view.picture import Painter
+
+RENDER_MODES = ("rgb_array", "human")
+
+_THEMES = ("light", "dark")
+
+FRAMES_PER_SECOND = 10
+"""Of films of the usual task, one picture for each action."""
+
+
+class Pictures:
+    """Draws an episode as runs are drawn everywhere.
+
+    Parameters
+    ----------
+    mode : {"rgb_array", "human"} or None
+    size : (width, height), px
+    theme : {"light", "dark"}
+
+    Raises
+    ------
+    ParameterError
+        On another mode or theme, or a size that is none.
+    """
+
+    def __init__(self, mode: str | None, size: tuple[int, int], theme: str = "light") -> None:
+        if mode is not None and mode not in RENDER_MODES:
+            raise ParameterError(f"render_mode: {unknown_name('mode', str(mode), RENDER_MODES)}")
+        if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
+            raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
+        if theme not in _THEMES:
+            raise ParameterError(f"theme: {unknown_name('theme', str(theme), _THEMES)}")
+        self._theme = theme
+        self.mode, self._size = mode, (int(size[0]), int(size[1]))
+        self._painter: Painter | None = None
+        self._window: Any = None
+        self._clock: Any = None
+
+    def shown(self, episode: Episode) -> None:
+        """Show the present moment where there is a window; else nothing."""
+        if self.mode == "human":
+            self._show(episode)
+
+    def frame(self, episode: Episode) -> Frame | None:
+        """Return the present moment as an RGB picture in the mode ``rgb_array``; else None."""
+        if self.mode != "rgb_array":
+            return None
+        painter, scene = self._drawn(episode)
+        return painter.frame(scene).copy()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            import pygame
+
+            pygame.display.quit()
+            self._window = self._clock = None
+
+    def _drawn(self, episode: Episode) -> tuple[Painter, Any]:
+        from robocov_app.view.picture import Painter
+        from robocov_app.view.scene import Scene
+        from robocov_app.view.theme import theme_named
+
+        if self._painter is None or self._painter.environment is not episode.environment:
+            self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
+        trail = np.array(episode.trail)
+        scene = Scene.of(
+            episode.environment,
+            episode.team,
+            episode.snapshot,
+            starts=trail[0],
+            trail=trail,
+            trail_time=np.arange(float(len(trail))) * episode.task.period,
+            label=f"action {episode.cycle} of {episode.task.cycles}",
+            cost=f"mean distance {episode.result.mean_distance:.3f} m",
+        )
+        return self._painter, scene
+
+    def _show(self, episode: Episode) -> None:
+        import pygame
+
+        if self._window is None:
+            try:
+                pygame.display.init()
+                self._window = pygame.display.set_mode(self._size)
+            except pygame.error as error:
+                raise RobocovError(f"render_mode: 'human', but there is no display ({error})") from error
+            pygame.display.set_caption("robocov")
+            self._clock = pygame.time.Clock()
+        pygame.event.pump()
+        painter, scene = self._drawn(episode)
+        painter.draw(self._window, scene)
+        pygame.display.flip()
+        self._clock.tick(1.0 / episode.task.period)

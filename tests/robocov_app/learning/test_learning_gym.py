@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from robocov.conditions import Conditions
+from robocov.environment import Environment
+from robocov.errors import ParameterError, RobocovError
+from robocov_app import learning
+from robocov_app.learning import CoverageEnv, CoverageParallelEnv, ObservationLayout
+
+SMALL = {"maps": "square", "robots": 3, "lattice": 8, "duration": 2.0, "dt": 0.05, "repeat": 2}
+ID = "robocov_app.learning.gym:robocov/Coverage-v0"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"action": "velocity", "reward": "level", "observation": ObservationLayout(1, 6, True)},
+        {"conditions": Conditions(position_noise=0.1, failure_rate=0.3)},
+    ],
+)
+def test_gymnasiums_check_passes(changes: dict[str, Any]) -> None:
+    check_env(gymnasium.make(ID, render_mode="rgb_array", size=(160, 120), **SMALL, **changes).unwrapped)
+
+
+def test_the_id_is_known_once_the_module_is() -> None:
+    assert gymnasium.spec("robocov/Coverage-v0").entry_point == "robocov_app.learning.gym:CoverageEnv"
+    assert gymnasium.make("robocov/Coverage-v0", **SMALL).unwrapped.task.robots == 3
+    script = f"import gymnasium; print(gymnasium.make({ID!r}, robots=2).reset(seed=0)[0].shape)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "(2, 19)\n"
+
+
+def test_it_is_the_parallel_environment_with_one_learner(cluttered: Environment) -> None:
+    options = {**SMALL, "maps": cluttered, "reward": "own", "contact_penalty": 0.3, "reward_every": 3}
+    single, parallel = CoverageEnv(**options), CoverageParallelEnv(**options)
+    rows, info = single.reset(seed=5)
+    apart, infos = parallel.reset(seed=5)
+    rng = np.random.default_rng(0)
+    over = False
+    while not over:
+        assert rows.tobytes() == b"".join(apart[agent].tobytes() for agent in parallel.agents)
+        action = rng.normal(scale=2.0, size=(3, 2))
+        rows, reward, ended, over, info = single.step(action)
+        apart, rewards, _, truncated, infos = parallel.step(dict(zip(parallel.agents, action, strict=True)))
+        assert reward == pytest.approx(np.mean([*rewards.values()]), abs=1e-15)
+        assert not ended and set(truncated.values()) == {over}
+        assert info["mean_distance_m"] == infos["robot_1"]["mean_distance_m"]
+    assert parallel.agents == []
+
+
+def test_many_at_once_are_as_one_at_a_time() -> None:
+    """In processes of their own, each with its own seed, to the last bit."""
+    several = gymnasium.vector.AsyncVectorEnv([partial(CoverageEnv, **SMALL)] * 2)
+    actions = np.random.default_rng(0).normal(size=(4, 2, 3, 2)).astype(np.float32)
+    try:
+        rows, _ = several.reset(seed=[3, 4])
+        together = [rows.copy()]
+        rewards = []
+        for action in actions:
+            rows, reward, *_ = several.step(action)
+            together.append(rows.copy())
+            rewards.append(reward)
+    finally:
+        several.close()
+    for k, seed in enumerate((3, 4)):
+        alone = CoverageEnv(**SMALL)
+        assert np.array_equal(alone.reset(seed=seed)[0], together[0][k])
+        for cycle, action in enumerate(actions):
+            rows, reward, *_ = alone.step(action[k])
+            assert np.array_equal(rows, together[cycle + 1][k]) and reward == rewards[cycle][k]
+
+
+def test_it_ends_when_nobody_is_left() -> None:
+    env = CoverageEnv(**SMALL, conditions=Conditions(failures=((1, 0.15), (2, 0.15), (3, 0.35))))
+    env.reset(seed=0)
+    ended = []
+    for _ in range(4):
+        rows, _, over, _, info = env.step(np.zeros((3, 2)))
+        ended.append(over)
+        assert [bool(row.any()) for row in rows] == info["working"].tolist()
+    assert ended == [False, False, False, True]
+
+
+def test_actions_may_be_rescaled_and_observations_flattened() -> None:
+    wrapped = gymnasium.wrappers.RescaleAction(CoverageEnv(**SMALL), np.float32(-1.0), np.float32(1.0))
+    wrapped = gymnasium.wrappers.FlattenObservation(wrapped)
+    plain = CoverageEnv(**SMALL)
+    assert wrapped.reset(seed=0)[0].shape == (3 * 19,)
+    plain.reset(seed=0)
+    rows = plain.step(np.full((3, 2), 2.0))[0]
+    np.testing.assert_allclose(
+        wrapped.step(np.full((3, 2), 0.5, dtype=np.float32))[0], rows.ravel(), atol=1e-6
+    )
+
+
+def test_what_is_wrong_is_said() -> None:
+    env = CoverageEnv(**SMALL)
+    with pytest.raises(RobocovError, match=r"reset\(\) was wanted"):
+        env.step(env.action_space.sample())
+    env.reset(seed=0)
+    with pytest.raises(ParameterError, match=r"actions of shape \(6,\), but \(3, 2\) was wanted"):
+        env.step(np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    ("name", "package"), [("CoverageEnv", "gymnasium"), ("CoverageParallelEnv", "pettingzoo")]
+)
+def test_without_the_extra_it_says_how_it_is_had(
+    name: str, package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(vars(learning), name)
+    with pytest.raises(RobocovError) as caught:
+        getattr(learning, name)
+    assert str(caught.value) == f'{package} is not installed: pip install "robocov[rl]"'
+
+
+def test_public_names() -> None:
+    assert all(getattr(learning, name) is not None for name in learning.__all__)
+    assert sorted(learning._HOME) == sorted(learning.__all__) and set(learning.__all__) <= {*dir(learning)}
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        learning.nothing
+
+
+def test_a_policy_loads_neither() -> None:
+    script = "import sys, robocov_app.learning as learning\n"
+    script += "learning.PolicyController, learning.ControllerPolicy, learning.CoverageTask\n"
+    script += "print({'gymnasium', 'pettingzoo', 'pygame', 'matplotlib'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

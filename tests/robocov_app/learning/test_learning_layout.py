@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import ParameterError
+from robocov.neighbours import Neighbours
+from robocov.observation import Observations
+from robocov.region import Region
+from robocov.robots import Team
+from robocov.scans import Scans
+from robocov.voronoi import partition
+from robocov_app.learning import ObservationLayout
+
+REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))  # a diameter of 10 m
+
+
+def seen_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: int = 0) -> Observations:
+    rng = np.random.default_rng(seed)
+    n = len(positions)
+    points = positions + rng.normal(scale=0.8, size=(n, 2))
+    points[rng.random(n) < 0.4] = np.nan
+    scans = Scans(rng.uniform(0.1, 3.0, (n, rays)), rng.random((n, rays)) < 0.5) if rays else None
+    return Observations(
+        positions,
+        rng.uniform(-0.7, 0.7, size=(n, 2)),
+        Neighbours.within(positions, np.full(n, reach)),
+        points,
+        REGION,
+        scans=scans,
+    )
+
+
+def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float) -> list[float]:
+    """Return one row by another way, in plain Python."""
+    x, y = seen.positions[robot]
+    row = [(x - 4.0) / 10.0, (y - 3.0) / 10.0, *seen.velocities[robot] / 0.8]
+    point = seen.obstacle_points[robot]
+    row += [0.0] * 3 if np.isnan(point[0]) else [(point[0] - x) / 2.0, (point[1] - y) / 2.0, 1.0]
+    others = [k for k in range(len(seen.positions)) if k != robot]
+    heard = [k for k in others if np.hypot(*(seen.positions[k] - [x, y])) <= reach]
+    heard.sort(key=lambda k: (np.hypot(*(seen.positions[k] - [x, y])), k))
+    for rank in range(layout.neighbours):
+        if rank < len(heard):
+            row += [*(seen.positions[heard[rank]] - [x, y]) / 10.0, 1.0]
+        else:
+            row += [0.0] * 3
+    if layout.rays:
+        distances, hit = seen.scans.distances[robot], seen.scans.hit[robot]
+        row += [d / 2.0 if h else 1.0 for d, h in zip(distances, hit, strict=True)]
+    if layout.centroid:
+        row += [*(partition(seen.positions, REGION, seen.neighbours).centroid[robot] - [x, y]) / 10.0]
+    return [min(max(value, -1.0), 1.0) for value in row]
+
+
+@pytest.mark.parametrize("layout", [ObservationLayout(), ObservationLayout(0), ObservationLayout(2, 5, True)])
+@pytest.mark.parametrize("reach", [np.inf, 2.5])
+@pytest.mark.parametrize("n", [1, 3, 60])
+def test_rows_are_what_they_are_documented_to_be(layout: ObservationLayout, reach: float, n: int) -> None:
+    positions = np.random.default_rng(n).uniform((0, 0), (8, 6), size=(n, 2))
+    seen = seen_at(positions, reach, n, layout.rays)
+    team = Team.homogeneous(n, max_speed=0.8, sensing_range=2.0, communication_range=reach)
+    rows = layout.rows(seen, team)
+    assert rows.dtype == np.float32 and rows.shape == (n, layout.size)
+    for robot in range(n):
+        np.testing.assert_allclose(rows[robot], told(layout, seen, robot, reach), atol=2e-6)
+
+
+def test_blocks_are_all_of_a_row() -> None:
+    layout = ObservationLayout(3, 8, True)
+    assert [*layout.blocks] == ["position", "velocity", "obstacle", "neighbour", "rays", "centroid"]
+    covered = np.concatenate([np.arange(layout.size)[place] for place in layout.blocks.values()])
+    assert covered.tolist() == list(range(layout.size))
+    assert "rays" not in ObservationLayout().blocks and "neighbour" not in ObservationLayout(0).blocks
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32), n=st.integers(2, 40), reach=st.floats(0.5, 5.0))
+def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) -> None:
+    """Changing anything outside robot i's ranges changes nothing in row i, not one bit."""
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform((0, 0), (8, 6), size=(n, 2))
+    seen = seen_at(positions, reach, seed, rays=6)
+    layout, team = ObservationLayout(3, 6, True), Team.homogeneous(n, communication_range=reach)
+    i = int(rng.integers(n))
+    before = layout.rows(seen, team)[i]
+    heard = np.zeros(n, dtype=bool)
+    heard[[*seen.neighbours.of(i), i]] = True
+    moved = positions.copy()
+    for k in np.flatnonzero(~heard):
+        place = rng.uniform((0, 0), (8, 6))
+        if np.hypot(*(place - positions[i])) > reach:
+            moved[k] = place
+    other = seen_at(moved, reach, seed + 1, rays=6)
+    for name in ("velocities", "obstacle_points"):
+        getattr(other, name)[i] = getattr(seen, name)[i]
+    other.scans.distances[i], other.scans.hit[i] = seen.scans.distances[i], seen.scans.hit[i]
+    assert layout.rows(other, team)[i].tobytes() == before.tobytes()
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32), n=st.integers(1, 20), sensing=st.sampled_from([0.0, 0.3, 3.0, np.inf]))
+def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> None:
+    """Even where a robot believes itself to be outside, or what it senses is farther than it can sense."""
+    rng = np.random.default_rng(seed)
+    seen = seen_at(rng.uniform((-5, -5), (13, 11), size=(n, 2)), np.inf, seed, rays=4)
+    layout = ObservationLayout(2, 4, True)
+    low, high = layout.bounds
+    rows = layout.rows(seen, Team.homogeneous(n, max_speed=0.2, sensing_range=sensing))
+    assert ((rows >= low) & (rows <= high)).all()
+
+
+def test_a_message_that_is_old_is_told_as_it_came() -> None:
+    positions = np.array([[1.0, 1.0], [2.0, 1.0]])
+    linked = Neighbours.within(positions, np.full(2, 5.0))
+    seen = Observations(
+        positions,
+        np.zeros((2, 2)),
+        linked,
+        np.full((2, 2), np.nan),
+        REGION,
+        heard=np.array([[1.5, 1.0], [1.0, 3.0]]),
+    )
+    rows = ObservationLayout(1).rows(seen, Team.homogeneous(2))
+    np.testing.assert_allclose(rows[:, 7:], [[0.05, 0.0, 1.0], [-0.1, 0.2, 1.0]], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"neighbours": -1}, r"observation.neighbours: -1, but a whole number from 0 to 1000 was wanted"),
+        ({"rays": 2.5}, r"observation.rays: 2.5, but a whole number"),
+        ({"centroid": 1}, r"observation.centroid: 1, but true or false was wanted"),
+    ],
+)
+def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        ObservationLayout(**values)
+
+
+def test_rays_want_a_scan() -> None:
+    seen = seen_at(np.array([[1.0, 1.0]]), rays=4)
+    with pytest.raises(ParameterError, match=r"observation.rays: 6 in a scan were wanted, but 4 are there"):
+        ObservationLayout(rays=6).rows(seen, Team.homogeneous(1))

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment
+from robocov.errors import ParameterError
+from robocov_app.learning.rewards import checked_reward, reference_distance, shares
+
+STEPS = st.integers(0, 2**32)
+
+
+@pytest.fixture(scope="module")
+def cost(cluttered: Environment) -> CoverageCost:
+    return CoverageCost(cluttered, 20)
+
+
+def places(environment: Environment, seed: int, n: int = 4) -> np.ndarray:
+    return environment.start("uniform").sample(n, seed=seed, radius=0.3)
+
+
+@settings(max_examples=15)
+@given(seed=STEPS)
+def test_parts_sum_up_to_the_decrease(cost: CoverageCost, seed: int) -> None:
+    begin = places(cost.environment, seed)
+    moved = begin + np.random.default_rng(seed).uniform(-0.1, 0.1, size=begin.shape)
+    before, after = cost(begin), cost(moved)
+    decrease = before.mean_distance - after.mean_distance
+    assert shares("shared", before, after, 0.1).tolist() == [decrease] * 4
+    assert shares("own", before, after, 0.1).sum() == pytest.approx(decrease, abs=1e-12)
+    assert shares("level", before, after, 0.1).tolist() == [-0.1 * after.mean_distance] * 4
+
+
+def test_ones_own_part_is_what_one_has_done(cost: CoverageCost) -> None:
+    """Where a single robot moves, nearly all is its own; that is the difference of two costs."""
+    begin = places(cost.environment, 5)
+    for robot in range(4):
+        moved = begin.copy()
+        moved[robot] += 0.02, 0.01
+        before, after = cost(begin), cost(moved)
+        own = shares("own", before, after, 1.0)
+        decrease = before.mean_distance - after.mean_distance
+        assert abs(decrease) > 1e-5
+        assert own[robot] == pytest.approx(decrease, rel=0.03)
+
+
+def test_those_who_stay_get_next_to_nothing(cost: CoverageCost) -> None:
+    """What two slopes leave over of a step of 22 cm: a part in a thousand of a metre, divided by four."""
+    left = []
+    for seed in range(12):
+        begin = places(cost.environment, seed)
+        moved = begin.copy()
+        moved[0] += 0.2, 0.1
+        own = shares("own", cost(begin), cost(moved), 1.0)
+        assert np.ptp(own[1:]) < 1e-15
+        left.append(abs(own[1]))
+    assert np.mean(left) < 2e-4
+
+
+def test_no_placement_goes_below_the_reference(empty: Environment) -> None:
+    """Of many placements of 1 to 12 robots in a square none does, and the best come near."""
+    cost = CoverageCost(empty, 40)
+    for n in (1, 4, 9):
+        side = round(n**0.5)
+        grid = (np.stack(np.meshgrid(*[np.arange(side) + 0.5] * 2), -1).reshape(-1, 2)) * 10.0 / side
+        best = cost(grid).mean_distance / reference_distance(100.0, n)
+        assert 1.0 < best < 1.03
+        for seed in range(5):
+            assert cost(places(empty, seed, n)).mean_distance > reference_distance(100.0, n)
+
+
+def test_names() -> None:
+    assert checked_reward("own") == "own"
+    with pytest.raises(ParameterError, match="unknown kind of reward 'share': did you mean 'shared'"):
+        checked_reward("share")

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from robocov.conditions import Conditions
+from robocov.errors import ParameterError
+from robocov.robots import Team
+from robocov_app.learning import CoverageTask
+from robocov_app.learning.task import changed_task
+
+
+def test_times() -> None:
+    task = CoverageTask(duration=10.0, dt=0.05, repeat=4)
+    assert task.period == pytest.approx(0.2) and task.cycles == 50
+    assert CoverageTask().cycles == 600
+
+
+def test_the_team_goes_before_the_number() -> None:
+    task = CoverageTask(robots=9, team=Team.homogeneous(3, max_speed=0.5))
+    assert task.robots == 3 and task.agents == ["robot_1", "robot_2", "robot_3"]
+    assert len(changed_task(task, {"robots": 5}).whole_team) == 5
+    assert changed_task(task, {"duration": 5.0}).team is task.team
+    assert changed_task(None, {"robots": 2}).robots == 2
+    assert repr(task) == "<CoverageTask 3 robots, 60 s, 600 actions, force, reward shared>"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"robots": 0}, "robots: 0, but a whole number from 1 to 10000 was wanted"),
+        ({"repeat": 1.5}, r"repeat: 1\.5, but a whole number"),
+        ({"reward_every": 0}, "reward_every: 0, but a whole number"),
+        ({"duration": 0.05}, r"duration: 0\.05 s, but at least the time of one action, 0\.1 s"),
+        ({"duration": float("nan")}, "duration: nan s"),
+        ({"dt": 2.0}, r"dt: 2\.0 s"),
+        ({"action": "push"}, "action: unknown kind of action 'push'"),
+        ({"reward": "none"}, "reward: unknown kind of reward 'none'"),
+        ({"action": "velocity", "dt": 0.2}, r"dt: 0\.2 s, but at most 0\.1 s was wanted"),
+        ({"contact_penalty": -1.0}, r"contact_penalty: -1\.0"),
+        ({"team": 6}, "team: 6, but a Team was wanted"),
+        ({"observation": None}, "observation: None, but a ObservationLayout was wanted"),
+        (
+            {"conditions": Conditions(failures=((7, 3.0),))},
+            r"conditions\.failures\[0\]: robot 7, but one of 1 to 6",
+        ),
+    ],
+)
+def test_what_makes_no_sense(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        CoverageTask(**values)
+
+
+def test_an_unknown_part() -> None:
+    with pytest.raises(ParameterError, match="unknown part of a task 'robot': did you mean 'robots'"):
+        changed_task(None, {"robot": 6})
