@@ -31,6 +31,8 @@ class TestTiny:
         assert "is no study of the paper" in complaint(capsys, "paper", "--out", str(tmp_path))
         assert "--workers: 0" in complaint(capsys, "paper", "--out", "x", "--workers", "0")
         assert "--out" in complaint(capsys, "paper")
+        said = complaint(capsys, "paper", "--out", "x", "--beyond-only", "--figures-only")
+        assert "--figures-only and --beyond-only: one of them was wanted" in said
         assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
@@ -38,10 +40,11 @@ class TestTiny:
 def test_the_quick_study_finds_what_is_plain(tmp_path):
     """The one test that takes a minute or two: the quick study as people call it.
 
-    Its maps are few: what is close is for the full study.
+    Its maps are few: what is close is for the full study. The part beyond the paper has a test of its own.
     """
     out = tmp_path / "out"
-    assert main(["paper", "--quick", "--out", str(out)]) == 0
+    assert main(["paper", "--quick", "--without-beyond", "--out", str(out)]) == 0
+    assert not (out / "beyond.html").exists()
     claims = {claim["key"]: claim for claim in json.loads((out / "claims.json").read_text())}
     assert len(claims) == 15
     assert claims["nonconvex-final-shared"]["verdict"] == "holds"

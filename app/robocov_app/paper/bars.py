@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 _WIDTH, _HEIGHT = 320.0, 44.0
 """Units of the view box; the page gives it its size."""
 
+_APART = 40.0
+"""Nearer than this, the ends of the range have their numbers aside."""
+
 _EDGE, _LINE = 14.0, 17.0
 """Free at both sides, and the height of the line of the interval."""
 
@@ -44,9 +47,11 @@ def interval_bar(criterion: Criterion) -> Markup:
         f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>',
         f'<path class="axis" d="M{_EDGE} 30H{_WIDTH - _EDGE}"/>',
     ]
-    for value in ends:
+    near = len(ends) == 2 and end - begin < _APART
+    for value, anchor in zip(ends, ("end", "start"), strict=False):
         parts.append(f'<path class="bound" d="M{at(value)} 4V34"/>')
-        parts.append(f'<text x="{at(value)}" y="43">{amount(value, criterion.unit)}</text>')
+        aside = f' style="text-anchor: {anchor}"' if near else ""
+        parts.append(f'<text x="{at(value)}" y="43"{aside}>{amount(value, criterion.unit)}</text>')
     state = {True: "yes", False: "no", None: "open"}[criterion.met]
     if math.isfinite(interval.low):
         parts.append(f'<path class="interval {state}" d="M{at(interval.low)} {_LINE}H{at(interval.high)}"/>')

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from robocov.controllers.gains import value_text
+
+if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
 
 SHARED = {"k_rep": 1.0, "rho_0": 2.0}
 """Potential parameters that RAPF and RPF share, as in the paper, which does not print its own.
@@ -32,7 +38,7 @@ class Contender:
     key: str
     label: str
     controller: str
-    gains: Mapping[str, float | None]
+    gains: Mapping[str, Value]
 
 
 RAPF_SHARED = Contender(
@@ -53,6 +59,29 @@ LABELS = {each.key: each.label for each in (RAPF_SHARED, RPF_SHARED, LLOYD, RAPF
 """What every contender is called."""
 
 
-def best(controller: str, gains: Mapping[str, float | None]) -> Contender:
+def best(controller: str, gains: Mapping[str, Value]) -> Contender:
     """Return RAPF or RPF with the gains that were best on the maps of the tuning."""
     return Contender(f"{controller}-best", LABELS[f"{controller}-best"], controller, dict(gains))
+
+
+def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
+    """Return gains of the potential as they are read: "(k_rep 1, rho_0 2, no limit)".
+
+    Words are left out, and what goes with them: in the whole study a law heads for the centroids of the
+    nearest robots' cells.
+
+    Parameters
+    ----------
+    gains : dict of name to value
+    no_limit : str
+        What stands for an attraction without limit; by default nothing does.
+    """
+    parts = []
+    for name, value in gains.items():
+        if isinstance(value, str) or name == "height":
+            continue
+        if value is not None:
+            parts.append(f"{name} {value_text(value)}")
+        elif no_limit:
+            parts.append(no_limit if name == "attraction_limit" else f"{name} none")
+    return "(" + ", ".join(parts) + ")"

@@ -185,7 +185,7 @@ def partition_figure(environment: Environment, robots: Array, radius: Array, the
             Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="Voronoi cell"),
             *map_handles(environment, theme)[1:],
         ]
-        page, (axes,) = _panels(environment, 1, NARROW, handles, theme, above=10.0)
+        page, (axes,) = panels(environment, 1, NARROW, handles, theme, above=10.0)
         draw_map(axes, environment, theme)
         cells = partition(robots, environment.region)
         axes.add_collection(
@@ -214,10 +214,10 @@ def trajectories_figure(runs: Sequence[Shown], theme: Theme = LIGHT) -> Figure:
         for record in records:
             for handle in run_handles(record, theme, "paper"):
                 handles.setdefault(str(handle.get_label()), handle)
-        page, panels = _panels(
+        page, places = panels(
             records[0].environment, len(runs), WIDE, _worth_naming(handles, runs), theme, above=30.0
         )
-        for letter, shown, axes in zip("abcdef", runs, panels, strict=False):
+        for letter, shown, axes in zip("abcdef", runs, places, strict=False):
             draw_run(axes, shown.record, theme, "paper")
             box = axes.get_position()
             left, top = box.x0 * page.size[0], (1.0 - box.y1) * page.size[1] - 14 * page.scale
@@ -243,7 +243,7 @@ def cost_figure(runs: Sequence[Shown], theme: Theme = LIGHT) -> Figure:
         return page.figure
 
 
-def _panels(
+def panels(
     environment: Environment, count: int, wide: int, handles: Sequence[Artist], theme: Theme, above: float
 ) -> tuple[Page, list[Axes]]:
     """Return a page of `wide` pixels with equal axes for one map in a row, its legend and scale bar."""

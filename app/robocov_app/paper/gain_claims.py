@@ -6,6 +6,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.paper.claims import BARELY, REGRET
+from robocov_app.paper.contenders import potential_text
 from robocov_app.paper.outcomes import GainOutcomes
 from robocov_app.paper.verdicts import Claim, Criterion, amount
 from robocov_app.statistics import bootstrap, paired, spread
@@ -102,8 +103,7 @@ def regrets(outcomes: GainOutcomes) -> tuple[Array, tuple[str, ...]]:
 
 def written_gains(outcomes: GainOutcomes) -> str:
     """Return the best gains as they are read: "(k_rep 0.3, rho_0 3)"."""
-    gains = outcomes.gains[outcomes.best()]
-    return "(" + ", ".join(f"{name} {value:g}" for name, value in gains.items() if value is not None) + ")"
+    return potential_text(outcomes.gains[outcomes.best()])
 
 
 def _same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
+
+if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
 
 
 class Scenario(NamedTuple):
@@ -66,6 +69,17 @@ class Outcomes:
             finite &= np.isfinite(self.of(contender, measure))
         return finite
 
+    def median_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:
+        """Return the median of what a contender reached on each map on which it has a finite value."""
+        values = self.of(contender, measure)
+        found: dict[str, float] = {}
+        for map_ in dict.fromkeys(self.maps):
+            here = values[[each == map_ for each in self.maps]]
+            here = here[np.isfinite(here)]
+            if len(here):
+                found[map_] = float(np.median(here))
+        return found
+
     def among(self, chosen: BoolArray) -> Outcomes:
         """Return some of the scenarios."""
         return Outcomes(
@@ -81,6 +95,28 @@ class Outcomes:
         return self.among(np.array([start in wanted for start in self.starts], dtype=bool))
 
 
+def joined(parts: Sequence[Outcomes]) -> Outcomes:
+    """Return the outcomes of several studies together; a contender has nan where it did not take part.
+
+    Scenarios keep the order in which they are first met. Where several parts have a contender in the same
+    scenario, the last one counts.
+    """
+    scenarios = tuple(dict.fromkeys(scenario for part in parts for scenario in part.scenarios))
+    place = {scenario: k for k, scenario in enumerate(scenarios)}
+    values: dict[tuple[str, str], Array] = {}
+    placements: dict[str, Array] = {}
+    shares: dict[str, float] = {}
+    for part in parts:
+        rows = [place[scenario] for scenario in part.scenarios]
+        for key, own in part.values.items():
+            values.setdefault(key, np.full(len(scenarios), np.nan))[rows] = own
+        for contender, places in part.placements.items():
+            missing = np.full((len(scenarios), *places.shape[1:]), np.nan)
+            placements.setdefault(contender, missing)[rows] = places
+        shares |= part.shares
+    return Outcomes(scenarios, values, placements, shares)
+
+
 @dataclass(frozen=True, eq=False)
 class GainOutcomes:
     """What one law reached with every set of gains of a grid.
@@ -94,7 +130,7 @@ class GainOutcomes:
     """
 
     scenarios: tuple[Scenario, ...]
-    gains: tuple[Mapping[str, float | None], ...]
+    gains: tuple[Mapping[str, Value], ...]
     excess: Array
 
     @property

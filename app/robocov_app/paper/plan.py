@@ -4,6 +4,8 @@
 2. ``gains``: grids of gains on maps of their own, for the claims on gains and for each law's best gains;
 3. ``convex``: RAPF and LA in convex regions;
 4. ``claims``: all contenders on non-convex maps, none of which was used in 2.
+
+What goes beyond the paper is in `beyond_studies`.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.mapfile import load_map
+from robocov_app.paper import beyond_plan
 from robocov_app.paper.contenders import (
     LLOYD,
     RAPF_DEFAULT,
@@ -34,7 +37,9 @@ from robocov_app.paper.maps import (
 from robocov_app.sweep.study import Study, StudyMap
 
 if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
     from robocov.environment import Environment
+    from robocov_app.paper.beyond_plan import BeyondPlan
 
 ROBOTS = 6
 """As in the paper."""
@@ -76,6 +81,8 @@ class Plan:
     convex_seeds : seeds of the starts in them
     restarts : int
         Of the search for the centralised reference.
+    beyond : BeyondPlan or None
+        How much of what goes beyond the paper; None: nothing.
     """
 
     name: str
@@ -94,6 +101,7 @@ class Plan:
     tuning_seed: int = 1000
     dt: float = 0.02
     lattice: int = 64
+    beyond: BeyondPlan | None = None
 
     @property
     def team(self) -> dict[str, Any]:
@@ -126,6 +134,7 @@ FULL = Plan(
     convex_generated=tuple(range(6)),
     convex_seeds=(0, 1, 2, 3),
     restarts=24,
+    beyond=beyond_plan.FULL,
 )
 """33 non-convex maps, 8 convex regions, 6 maps for gains."""
 
@@ -143,8 +152,9 @@ QUICK = Plan(
     convex_generated=(0, 1, 2),
     convex_seeds=(0,),
     restarts=8,
+    beyond=beyond_plan.QUICK,
 )
-"""Enough to see that everything works, too little to decide much; ends within three minutes."""
+"""Enough to see that everything works, too little to decide much; ends within four minutes."""
 
 
 def generated_test_map(seed: int) -> Environment:
@@ -200,7 +210,7 @@ def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
 def figure_studies(plan: Plan) -> dict[str, Study]:
     """Return the studies whose runs the figures show; their paths and costs are kept finely."""
     return {
-        name: _study(
+        name: study_of(
             plan,
             (StudyMap(map_, load_map(map_)),),
             contenders,
@@ -217,13 +227,13 @@ def figure_studies(plan: Plan) -> dict[str, Study]:
 def probe_study(plan: Plan) -> Study:
     """Return one run of each law, by which the time of the others is estimated."""
     maps = (StudyMap("blocks-a", load_map("blocks-a")),)
-    return _study(plan, maps, (RAPF_SHARED, RPF_SHARED, LLOYD), ("paper",), (0,))
+    return study_of(plan, maps, (RAPF_SHARED, RPF_SHARED, LLOYD), ("paper",), (0,))
 
 
-def gain_sets(plan: Plan) -> dict[str, list[dict[str, float | None]]]:
+def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
     """Return the grids of gains: the same potential for both laws, RAPF with every attraction beside it."""
     potential = [{"k_rep": k, "rho_0": r} for k, r in product(plan.k_rep, plan.rho_0)]
-    attracted: list[dict[str, float | None]] = [
+    attracted: list[dict[str, Value]] = [
         {**both, "k_att": k_att, "attraction_limit": None} for k_att in plan.k_att for both in potential
     ]
     return {"rapf": attracted, "rpf": [dict(both) for both in potential]}
@@ -248,7 +258,7 @@ def convex_contenders(best: Mapping[str, Contender]) -> tuple[Contender, ...]:
 
 def convex_study(plan: Plan, best: Mapping[str, Contender]) -> Study:
     """Return the study of convex regions."""
-    return _study(plan, convex_maps(plan), convex_contenders(best), CONVEX_KINDS, plan.convex_seeds)
+    return study_of(plan, convex_maps(plan), convex_contenders(best), CONVEX_KINDS, plan.convex_seeds)
 
 
 def claim_contenders(best: Mapping[str, Contender]) -> tuple[Contender, ...]:
@@ -258,16 +268,16 @@ def claim_contenders(best: Mapping[str, Contender]) -> tuple[Contender, ...]:
 
 def claims_study(plan: Plan, best: Mapping[str, Contender]) -> Study:
     """Return the study of non-convex maps."""
-    return _study(plan, claim_maps(plan), claim_contenders(best), KINDS, plan.seeds)
+    return study_of(plan, claim_maps(plan), claim_contenders(best), KINDS, plan.seeds)
 
 
-def distinct(contenders: Sequence[Contender]) -> list[tuple[str, dict[str, float | None]]]:
+def distinct(contenders: Sequence[Contender]) -> list[tuple[str, dict[str, Value]]]:
     """Return the controllers with their gains, each once, in the order in which a study runs them.
 
     A law's best gains may be the shared ones: then there is one run for both contenders.
     """
     order = list(dict.fromkeys(contender.controller for contender in contenders))
-    found: list[tuple[str, dict[str, float | None]]] = []
+    found: list[tuple[str, dict[str, Value]]] = []
     for controller in order:
         for contender in contenders:
             entry = (controller, complete_gains(contender))
@@ -276,14 +286,14 @@ def distinct(contenders: Sequence[Contender]) -> list[tuple[str, dict[str, float
     return found
 
 
-def complete_gains(contender: Contender) -> dict[str, float | None]:
+def complete_gains(contender: Contender) -> dict[str, Value]:
     """Return all gains of a contender, the controller's defaults among them."""
     from robocov.controllers import gain_values, make_controller
 
     return dict(gain_values(make_controller(contender.controller, contender.gains)))
 
 
-def _study(
+def study_of(
     plan: Plan,
     maps: tuple[StudyMap, ...],
     contenders: Sequence[Contender],
@@ -291,7 +301,8 @@ def _study(
     seeds: Sequence[int],
     **other: Any,
 ) -> Study:
-    gains: dict[str, list[dict[str, float | None]]] = {}
+    """Return the study of some contenders, in which all else is as the plan has it but for `other`."""
+    gains: dict[str, list[dict[str, Value]]] = {}
     for controller, choice in distinct(contenders):
         gains.setdefault(controller, []).append(choice)
     return Study(

@@ -148,7 +148,7 @@ def studied_figures(folder: Path, plan: Plan, means: Means) -> dict[str, Shown]:
     """
     shown: dict[str, Shown] = {}
     for name, study in planned.figure_studies(plan).items():
-        _swept(study, folder, name, means)
+        swept(study, folder, name, means)
         results = read_results(folder / "studies" / name)
         for row in results.to_table().to_pylist():
             if row["error"] is not None:
@@ -175,19 +175,19 @@ def studied(folder: Path, plan: Plan, means: Means) -> Material:
     figures = studied_figures(folder, plan, means)
 
     tuning = planned.gains_study(plan)
-    known = _referenced(tuning.maps, folder, plan, means)
-    _swept(tuning, folder, "gains", means)
+    known = referenced(tuning.maps, folder, plan, means)
+    swept(tuning, folder, "gains", means)
     gains = read_gain_outcomes(folder / "studies" / "gains", tuning, known)
     chosen = {law: best(law, grid.gains[grid.best()]) for law, grid in gains.items()}
 
     convex = planned.convex_study(plan, chosen)
     claims = planned.claims_study(plan, chosen)
-    known |= _referenced((*convex.maps, *claims.maps), folder, plan, means)
-    _swept(convex, folder, "convex", means)
-    _swept(claims, folder, "claims", means)
+    known |= referenced((*convex.maps, *claims.maps), folder, plan, means)
+    swept(convex, folder, "convex", means)
+    swept(claims, folder, "claims", means)
     found = read_outcomes(folder / "studies" / "claims", claims, planned.claim_contenders(chosen), known)
     studies = [*planned.figure_studies(plan), "gains", "convex", "claims"]
-    counts = [_counted(folder / "studies" / name) for name in studies]
+    counts = [counted_runs(folder / "studies" / name) for name in studies]
     return Material(
         plan=plan,
         figures=figures,
@@ -207,7 +207,7 @@ WORST = 4
 
 
 def worst_runs(
-    study: Study, outcomes: Outcomes, law: Contender = RAPF_SHARED
+    study: Study, outcomes: Outcomes, law: Contender = RAPF_SHARED, count: int = WORST
 ) -> list[tuple[Scenario, Record]]:
     """Return a law's runs farthest above the reference, the worst of each map, done again to be shown."""
     import numpy as np
@@ -220,7 +220,7 @@ def worst_runs(
     wanted: dict[str, Scenario] = {}
     for k in order:
         scenario = outcomes.scenarios[k]
-        if len(wanted) < WORST:
+        if len(wanted) < count:
             wanted.setdefault(scenario.map, scenario)
     environments = {each.name: each.environment for each in study.maps}
     gains = planned.complete_gains(law)
@@ -278,7 +278,8 @@ def forecast(folder: Path, plan: Plan, workers: int, *, figures_only: bool = Fal
         for name in names:
             counts[name] += scenarios
     runs = sum(counts.values())
-    there = len(list((folder / "studies").glob("*/runs/[!.]*")))
+    names = list(studies) if figures_only else [*studies, "gains", "convex", "claims"]
+    there = sum(runs_there(folder, name) for name in names)
     if runs <= there:
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
@@ -291,11 +292,36 @@ def forecast(folder: Path, plan: Plan, workers: int, *, figures_only: bool = Fal
     return Forecast(runs, runs - there, work * (runs - there) / runs / workers, each)
 
 
+def together(parts: Sequence[Forecast]) -> Forecast:
+    """Return what several parts of a study are going to take, one after the other."""
+    each = {law: seconds for part in reversed(parts) for law, seconds in part.each.items()}
+    return Forecast(
+        sum(part.runs for part in parts),
+        sum(part.left for part in parts),
+        sum(part.seconds for part in parts),
+        each,
+    )
+
+
+def runs_there(folder: Path, name: str) -> int:
+    """Return how many runs of a study are there, whether its table is written or not."""
+    return len(list((folder / "studies" / name / "runs").glob("[!.]*")))
+
+
 def _scenarios(study: Study) -> int:
     return sum(len(study.starts_on(each)) for each in study.maps) * len(study.seeds)
 
 
-def _swept(study: Study, folder: Path, name: str, means: Means) -> None:
+def swept(study: Study, folder: Path, name: str, means: Means) -> None:
+    """Do the runs of a study that are not done yet, in ``studies/`` under this name.
+
+    Raises
+    ------
+    Stopped
+        After Ctrl-C.
+    InputError, OutputError
+        As `robocov_app.sweep.sweeping.sweep`.
+    """
     target = folder / "studies" / name
     try:
         target.parent.mkdir(exist_ok=True)
@@ -314,7 +340,16 @@ def _swept(study: Study, folder: Path, name: str, means: Means) -> None:
         raise Stopped
 
 
-def _referenced(maps: Sequence[StudyMap], folder: Path, plan: Plan, means: Means) -> dict[str, Reference]:
+def referenced(maps: Sequence[StudyMap], folder: Path, plan: Plan, means: Means) -> dict[str, Reference]:
+    """Return the centralised reference of every map by its name, searched for where it is not there yet.
+
+    Raises
+    ------
+    Stopped
+        After Ctrl-C.
+    OutputError
+        As `robocov_app.paper.references.references`.
+    """
     found = references(
         maps,
         folder / "references",
@@ -331,7 +366,8 @@ def _referenced(maps: Sequence[StudyMap], folder: Path, plan: Plan, means: Means
     return found
 
 
-def _counted(folder: Path) -> tuple[int, int]:
+def counted_runs(folder: Path) -> tuple[int, int]:
+    """Return how many runs the folder of a sweep has, and how many of them failed."""
     results = read_results(folder)
     failures: Any = results.failures()
     return len(results), len(failures)

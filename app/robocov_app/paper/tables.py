@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -74,10 +74,12 @@ class MapRow:
     gaps: Mapping[str, float]
 
 
-def law_rows(outcomes: Outcomes) -> list[LawRow]:
-    """Return a row for each contender that has runs."""
+def law_rows(
+    outcomes: Outcomes, laws: Iterable[str] = ORDER, labels: Mapping[str, str] = LABELS
+) -> list[LawRow]:
+    """Return a row for each contender that has runs, with its label."""
     rows = []
-    for law in ORDER:
+    for law in laws:
         fine = outcomes.among(outcomes.together((law,), "gap"))
         if not fine.scenarios:
             continue
@@ -86,7 +88,7 @@ def law_rows(outcomes: Outcomes) -> list[LawRow]:
         rows.append(
             LawRow(
                 law,
-                LABELS[law],
+                labels[law],
                 len(gap),
                 bootstrap(gap, clusters=fine.maps),
                 (low, high),

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import versions
 from robocov_app.paper import claims
-from robocov_app.paper.contenders import RAPF_DEFAULT, RAPF_SHARED, RPF_SHARED, Contender
+from robocov_app.paper.contenders import (
+    RAPF_DEFAULT,
+    RAPF_SHARED,
+    RPF_SHARED,
+    Contender,
+    potential_text,
+)
 from robocov_app.paper.maps import NON_CONVEX, RADII, TIGHT
 from robocov_app.paper.plan import ROBOTS, Plan, complete_gains
 from robocov_app.paper.verdicts import LEAST_MAPS, amount
@@ -146,13 +152,7 @@ def thresholds() -> str:
 
 def gains_text(contender: Contender) -> str:
     """Return a contender's gains as they are read: "(k_rep 1, rho_0 2, no limit)"."""
-    parts = []
-    for name, value in complete_gains(contender).items():
-        if value is None:
-            parts.append("no limit" if name == "attraction_limit" else f"{name} none")
-        else:
-            parts.append(f"{name} {value:g}")
-    return "(" + ", ".join(parts) + ")"
+    return potential_text(complete_gains(contender), "no limit")
 
 
 def span(numbers: Sequence[int]) -> str:

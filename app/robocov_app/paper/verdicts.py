@@ -107,6 +107,8 @@ class Claim:
         What else there is to say, with numbers.
     source : str
         Where the paper says it; empty where the question is ours.
+    least_maps : int
+        On fewer maps it is undecided.
     """
 
     key: str
@@ -117,11 +119,12 @@ class Claim:
     maps: int
     explanation: str = ""
     source: str = ""
+    least_maps: int = LEAST_MAPS
 
     @property
     def verdict(self) -> Verdict:
         """What the criteria say together; see the head of this module."""
-        if self.maps < LEAST_MAPS or not self.criteria:
+        if self.maps < self.least_maps or not self.criteria:
             return "undecided"
         met = [criterion.met for criterion in self.criteria]
         if all(met):

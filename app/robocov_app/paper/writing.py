@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
 from robocov.atomic import written
-from robocov.errors import OutputError
-from robocov_app.figure_files import save_figure
 from robocov_app.output import finite
 from robocov_app.paper import told
 from robocov_app.paper.asking import QUESTIONS
-from robocov_app.paper.bars import interval_bar
 from robocov_app.paper.claim_plots import claim_figures
 from robocov_app.paper.contenders import RAPF_SHARED, RPF_SHARED
 from robocov_app.paper.figures import NUMBERS, TEXTS, Shown, draw_figure
 from robocov_app.paper.outcomes import Scenario
-from robocov_app.paper.tables import law_rows, map_rows, settled_text
-from robocov_app.paper.verdicts import amount, described
+from robocov_app.paper.pages import BEYOND_PAGE, PAGE, Image, rendered, save_drawn, style_sheet
+from robocov_app.paper.tables import law_rows, map_rows
+from robocov_app.paper.verdicts import amount
 from robocov_app.paper.words import seen
-from robocov_app.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,11 +31,7 @@ if TYPE_CHECKING:
     from robocov_app.paper.studying import Material
     from robocov_app.paper.verdicts import Claim
 
-PAGE = "index.html"
-
 CLAIMS = "claims.json"
-
-_SUFFIXES = (".png", ".svg", ".pdf")
 
 _REPLAY_BUDGET = 400_000
 """Bytes of the runs in the page's replay."""
@@ -55,25 +46,6 @@ _WORDS = {
     "claim-6-gap": "The final cost of every law on the non-convex maps, by the reference.",
 }
 """What is said of the claims' plots."""
-
-
-@dataclass(frozen=True)
-class Image:
-    """A picture on the page.
-
-    Attributes
-    ----------
-    name : str
-        Of its files in ``figures/``, without suffix.
-    width, height : int, px
-    words : str
-        What it shows.
-    """
-
-    name: str
-    width: int
-    height: int
-    words: str
 
 
 def save_claims(folder: Path, claims: Sequence[Claim]) -> None:
@@ -110,22 +82,8 @@ def save_pictures(
     OutputError
         When something cannot be written.
     """
-    target = folder / "figures"
-    try:
-        target.mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be used for results: {error.strerror or error}") from error
     light, dark = (_drawn(runs, first, material, theme) for theme in ("light", "dark"))
-    found: dict[str, Image] = {}
-    with progress("figures", len(light), quiet=quiet) as update:
-        for number, (name, (draw, words)) in enumerate(light.items(), start=1):
-            figure = draw()
-            for suffix in _SUFFIXES:
-                save_figure(figure, target / f"{name}{suffix}")
-            save_figure(dark[name][0](), target / f"{name}-dark.png")
-            found[name] = Image(name, round(figure.bbox.width), round(figure.bbox.height), words)
-            update(number)
-    return found
+    return save_drawn(folder, light, dark, quiet=quiet)
 
 
 def save_page(
@@ -136,15 +94,18 @@ def save_page(
     first: Record,
     material: Material | None,
     claims: Sequence[Claim],
+    beyond: Sequence[Claim] = (),
 ) -> None:
     """Write ``index.html``, which needs nothing but ``figures/`` beside it.
+
+    The parameters are those of `page`.
 
     Raises
     ------
     OutputError
         When it cannot be written.
     """
-    content = page(plan, images, runs, first, material, claims)
+    content = page(plan, images, runs, first, material, claims, beyond)
     with written(folder / PAGE) as part:
         part.write_text(content, encoding="utf-8")
 
@@ -156,22 +117,27 @@ def page(
     first: Record,
     material: Material | None,
     claims: Sequence[Claim],
+    beyond: Sequence[Claim] = (),
 ) -> str:
-    """Return the page; the parameters are those of `save_page`."""
-    import jinja2
+    """Return the page.
+
+    Parameters
+    ----------
+    plan : Plan
+    images : dict of name to Image
+    runs : dict of name to Shown
+    first : Record
+        Whose first moment is figure 1.
+    material : Material or None
+        None where only the paper's figures are wanted.
+    claims, beyond : sequence of Claim
+        The paper's, and those that are told in full on the page beyond the paper.
+    """
     from markupsafe import Markup
 
     from robocov_app.plot_curves import curve_styles
-    from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
-    from robocov_app.report.theme_css import theme_rules
+    from robocov_app.report.replay import ReplayRun, replay_css, replay_js, replay_part, script
 
-    assets = Path(__file__).parent / "assets"
-    surroundings = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=_held_together,
-    )
     replays = [
         ReplayRun(shown.record, shown.history, f"{_CASES[name.partition('/')[0]]}: {shown.record.label}")
         for name, shown in runs.items()
@@ -179,17 +145,18 @@ def page(
     order = list(runs)
     panes = [order.index("b/rapf"), order.index("b/rpf")]
     styles = curve_styles(run.record.controller for run in replays)
-    own = (assets / "paper.css").read_text(encoding="utf-8")
-    style = theme_rules(":root") + replay_css() + asset("report.css") + own
     context: dict[str, Any] = {
         "version": __version__,
-        "style": Markup(style),
+        "style": style_sheet(replay_css()),
         "quick": plan.name == "quick",
         "lead": _lead(plan, material),
-        "notice": _notice(plan, material),
+        "notice": _notice(plan, material, alone=bool(beyond)),
         "sections": _sections(material),
+        "beyond": beyond,
+        "beyond_counts": told_counts(beyond),
+        "beyond_page": BEYOND_PAGE,
         "claims": claims,
-        "counts": _counts(claims),
+        "counts": told_counts(claims),
         "figure_gains": f"{plan.duration:g} s, RAPF {told.gains_text(RAPF_SHARED)}, "
         f"RPF {told.gains_text(RPF_SHARED)}",
         "figures": [
@@ -216,10 +183,6 @@ def page(
         "errata": told.ERRATA,
         "citation": told.CITATION,
         "made": f"Made by robocov {__version__}: robocov paper{' --quick' if plan.name == 'quick' else ''}",
-        "bar": interval_bar,
-        "amount": amount,
-        "described": described,
-        "settled_text": settled_text,
     }
     if material is not None:
         context |= {
@@ -230,7 +193,7 @@ def page(
             "failures": _failures(material),
             "failure_words": _failure_words(material),
         }
-    return surroundings.get_template("paper.html.jinja").render(context)
+    return rendered("paper.html.jinja", context)
 
 
 _QUESTION_NAMES = {
@@ -242,16 +205,6 @@ _QUESTION_NAMES = {
     6: "Optimum",
 }
 """What the questions are called in the page's contents."""
-
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
-
-
-def _held_together(value: object) -> object:
-    """Return a text in which no line breaks between a number and its unit."""
-    if isinstance(value, str) and not hasattr(value, "__html__"):
-        return _UNIT.sub("\N{NO-BREAK SPACE}", value)
-    return value
-
 
 _CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}
 """Which figure shows which runs."""
@@ -285,7 +238,12 @@ def _lead(plan: Plan, material: Material | None) -> str:
     )
 
 
-def _notice(plan: Plan, material: Material | None) -> str:
+def _notice(plan: Plan, material: Material | None, *, alone: bool) -> str:
+    if material is None and alone:
+        return (
+            "Only the figures and what goes beyond the paper were asked for: without --beyond-only the "
+            "claims are tested too."
+        )
     if material is None:
         return "Only the figures were asked for: without --figures-only the claims are tested too."
     if plan.name == "quick":
@@ -306,7 +264,8 @@ def _sections(material: Material | None) -> list[tuple[str, str]]:
     return [*head, *parts, ("protocol", "Protocol"), ("errata", "Errata")]
 
 
-def _counts(claims: Sequence[Claim]) -> str:
+def told_counts(claims: Sequence[Claim]) -> str:
+    """Return in words how many claims hold, hold partly, do not hold, or are undecided."""
     words = [claim.verdict for claim in claims]
     parts = [
         f"{words.count(word)} {text}"
