@@ -32,6 +32,7 @@ COMMANDS = {
     "sweep": ("sweep", "many runs in parallel, from a study file; resumable; one table of all"),
     "replay": ("replay", "a saved run or comparison again: in the window, or as frames and a film"),
     "report": ("report", "one HTML page of runs, comparisons and sweeps, with a replay; no network"),
+    "metrics": ("metrics", "covered and visible area, energy, ways, connectivity, clearance of saved runs"),
     "paper": ("paper", "the paper's figures again, and its claims tested over many maps"),
     "edit": ("edit", "the map editor: draw, check, try; nothing is lost"),
     "check": ("check", "validate maps; area, free area, components, narrowest gap"),

@@ -32,6 +32,9 @@ _HEAD = {"format": "robocov-comparison", "version": 1}
 
 _FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
 
+_TIMED = ("mean_time_s",)
+"""Where robots are not equally fast."""
+
 
 def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the gains of each controller out of those given for the comparison.
@@ -84,6 +87,7 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
             "label": run.record.label,
             "gains": dict(run.record.gains),
             **{figure: run.summary[figure] for figure in _FIGURES},
+            **{figure: run.summary[figure] for figure in _TIMED if figure in run.summary},
             "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
             "above_best": run.summary["mean_distance_m"] / best - 1.0,
         }

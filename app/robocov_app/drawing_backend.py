@@ -125,6 +125,7 @@ def plot_result(
     from robocov_app.building import PICTURE_LATTICE, built_cost
     from robocov_app.plot_coverage import Moment, plot_coverage, plot_distances
     from robocov_app.view.field import Field, FieldLattice
+    from robocov_app.view.phi import mean_words
 
     _checked(axes)
     environment, sites, n = result.environment, result.sites, len(result.positions)
@@ -133,7 +134,7 @@ def plot_result(
     team = Team.homogeneous(n)
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
-    facts = f"{counted(n, 'robot')}, mean distance {result.mean_distance:.3f} m"
+    facts = f"{counted(n, 'robot')}, {mean_words(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < PICTURE_LATTICE:
         finer = built_cost(environment, PICTURE_LATTICE, quiet=True)
         sites, result = finer.sites, finer(result.positions)

@@ -47,10 +47,17 @@ def _rows(report: MapReport) -> dict[str, str]:
         "obstacles": f"{report.obstacles}, with {report.vertices} vertices (boundary included)",
         "components": _components(report),
         "narrowest gap": _gap(report),
+        **({} if report.density is None else {"density": _density(report)}),
         **{
             f"start {start.name}": f"{start.kind}, room for about {start.capacity}" for start in report.starts
         },
     }
+
+
+def _density(report: MapReport) -> str:
+    assert report.density_range is not None
+    low, high = report.density_range
+    return f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
 
 
 def _components(report: MapReport) -> str:

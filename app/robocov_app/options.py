@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from robocov.errors import ParameterError, shown
+from robocov_app.condition_options import ConditionOptions
+
+if TYPE_CHECKING:
+    from robocov.robots import Team
 
 MOST_ROWS = 2e7
 """Largest record, in moments times robots: about 2 GB."""
+
+_WORD = r"[A-Za-z][A-Za-z0-9_-]*"
+_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
+"""What a gain's value may look like where it is a word, and what looks so and is none."""
 
 
 @dataclass
@@ -23,7 +32,7 @@ class RunOptions:
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
     """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
-    """Gains, as in --set k_rep=0.3 attraction_limit=null (see `robocov controllers`)."""
+    """Gains, as in --set k_rep=0.3 target=median attraction_limit=null (see `robocov controllers`)."""
     robots: int = 6
     """Number of robots."""
     start: str | None = None
@@ -46,6 +55,9 @@ class RunOptions:
     """How far the range sensor reaches, in metres from the robot's centre."""
     communication_range: float | None = None
     """How far robots hear each other, in metres; without limit by default."""
+    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
+    """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
+    says how many there are, and what a group leaves open is as the options above say."""
     lattice: int = 64
     """The coverage cost is evaluated on a lattice of N x N sites over the map."""
     out: Path | None = None
@@ -72,8 +84,11 @@ class RunOptions:
     """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
     json: bool = False
     """Print one JSON object and nothing else."""
+    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
     def __post_init__(self) -> None:
+        if self.team is not None:
+            self.robots = robots_of(self.made_team(), self.robots, RunOptions.robots, self.team)
         in_range("--robots", self.robots, 1, 10_000)
         in_range("--seed", self.seed, 0, 2**63 - 1)
         in_range("--duration", self.duration, 0.0, 1e6, "s")
@@ -91,6 +106,30 @@ class RunOptions:
             )
         self.picture_size()
 
+    def made_team(self) -> Team:
+        """Return the team that the options describe.
+
+        Raises
+        ------
+        InputError
+            When a value is out of range, or the team file cannot be read.
+        """
+        from robocov.robots import Team
+
+        said = {
+            "radius": self.radius,
+            "max_speed": self.max_speed,
+            "max_acceleration": self.max_acceleration,
+            "viscosity": self.viscosity,
+            "sensing_range": self.sensing_range,
+            "communication_range": math.inf if self.communication_range is None else self.communication_range,
+        }
+        if self.team is None:
+            return Team.homogeneous(self.robots, **said)
+        from robocov.teamfile import read_team
+
+        return read_team(self.team, said)
+
     def picture_size(self) -> tuple[int, int] | None:
         """Return the size that was asked for (width, height), None when none was."""
         return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
@@ -98,6 +137,19 @@ class RunOptions:
     def film_size(self) -> tuple[int, int]:
         """Return the size of film frames (width, height)."""
         return self.picture_size() or (1280, 720)
+
+
+def robots_of(team: Team, robots: int, default: int, path: Path) -> int:
+    """Return how many robots a team file has; the option --robots may say the same.
+
+    Raises
+    ------
+    ParameterError
+        When it says something else.
+    """
+    if robots not in (default, len(team)):
+        raise ParameterError(f"--robots: {robots}, but the team of {path} has {len(team)}")
+    return len(team)
 
 
 def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
@@ -133,15 +185,15 @@ def in_range(option: str, value: float, low: float, high: float, unit: str = "")
 
 
 def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit.
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
 
-    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null"))
-    {'k_rep': 0.3, 'attraction_limit': None}
+    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
+    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
 
     Raises
     ------
     ParameterError
-        When a text is not NAME=VALUE, a value is not a number, or a gain is given twice.
+        When a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is given twice.
     """
     gains: dict[str, Any] = {}
     for text in texts:
@@ -150,10 +202,13 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
             raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
         if name in gains:
             raise ParameterError(f"--set: {name} is given twice")
+        if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
+            gains[name] = value
+            continue
         try:
             gains[name] = json.loads(value)
         except json.JSONDecodeError as error:
             raise ParameterError(
-                f"--set {name}: {shown(value)}, but a number (or null) was wanted"
+                f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
             ) from error
     return gains

@@ -14,7 +14,7 @@ from robocov.atomic import written
 from robocov.errors import InputError, OutputError
 
 _OF_A_RUN = (
-    *("run.json", "record.npz", "cost.csv", "run.mp4"),
+    *("run.json", "record.npz", "cost.csv", "metrics.csv", "run.mp4"),
     *("trajectories.png", "trajectories.svg", "cost.png", "cost.svg"),
 )
 _OF_A_COMPARISON = (

@@ -12,7 +12,7 @@ from robocov.errors import ParameterError
 from robocov_app.recording import Frame, iter_frames
 from robocov_app.view.furniture import LEGEND_ROW, MARGIN, STRIP, legend_picture
 from robocov_app.view.picture import Painter, pane_layers, scale_for
-from robocov_app.view.scene import Scene
+from robocov_app.view.record_scene import record_scene
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import Colour, theme_named
 
@@ -239,17 +239,11 @@ def _legend(
     for record in records:
         painter = Painter(record.environment, (64, 64), look, pane_layers(colours), scale)
         painter.change(shown.also, shown.without)
-        start = record.positions[:1]
-        scene = Scene.of(
-            record.environment,
-            record.team,
-            record.snapshot(0),
-            starts=start[0],
-            trail=start,
-            label=record.label,
-            field=shown.fields.at(start[0]) if shown.fields and painter.needs_field else None,
-        )
-        found.append(painter.legend_entries(scene))
+        fields = shown.fields if painter.needs_field else None
+        # robots that fail are explained too
+        for row in (0, -1) if record.conditions is not None else (0,):
+            scene = record_scene(record, row % len(record), fields=fields)
+            found.append(painter.legend_entries(scene))
     # the longest first: its order is kept, and mostly nothing is missing
     entries = {(entry.text, entry.style): entry for part in sorted(found, key=len)[::-1] for entry in part}
     return legend_picture(list(entries.values()), width, look, scale, shown.also)

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
+from robocov.weighted_cells import outlines_of
 from robocov_app.page import tone
+from robocov_app.view.phi import density_words, shading
 from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
@@ -27,6 +29,10 @@ _START, _CENTROID = 6.2, 8.0
 """Sizes of marks where they have room, in points."""
 
 
+_DOTS = 400
+"""Dots of the shading of a density along the longer side of a map."""
+
+
 def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
     """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
     from matplotlib.ticker import MaxNLocator
@@ -42,11 +48,16 @@ def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
     axes.set_facecolor(tone(theme.background))
 
 
-def draw_map(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Draw the obstacles, what of the region lies outside the boundary, and the region's outline."""
+def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: bool = True) -> None:
+    """Draw the obstacles, what of the region lies outside the boundary, and the region's outline.
+
+    Where places do not count all the same, how much they count is a shading below; without `density` not.
+    """
     from matplotlib.patches import PathPatch, Polygon
     from matplotlib.path import Path as Outline
 
+    if density:
+        _draw_density(axes, environment, theme)
     for part in environment.blocked.geoms:
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
@@ -73,19 +84,40 @@ def draw_map(axes: Axes, environment: Environment, theme: Theme) -> None:
     )
 
 
+def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
+    from matplotlib.image import AxesImage
+    from matplotlib.patches import Polygon
+
+    if environment.density is None or environment.density.uniform:
+        return
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    step = max(high_x - low_x, high_y - low_y) / _DOTS
+    columns, rows = (max(round(side / step), 1) for side in (high_x - low_x, high_y - low_y))
+    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
+    y = low_y + (np.arange(rows) + 0.5) * (high_y - low_y) / rows
+    # limits stay as they are, which imshow would change
+    image = AxesImage(
+        axes, extent=(low_x, high_x, low_y, high_y), origin="lower", interpolation="bilinear", zorder=1.5
+    )
+    image.set_data(shading(environment.density, environment.region.bounds, x, y, theme))
+    axes.add_image(image)
+    image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
+
+
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     """Draw map, final cells, trajectories, starts, final positions and centroids."""
     from matplotlib.collections import LineCollection, PolyCollection
 
-    from robocov.voronoi import partition
-
-    draw_map(axes, record.environment, theme)
+    draw_map(axes, record.environment.at(float(record.time[-1])), theme)
     last, n = record.positions[-1], record.positions.shape[1]
-    cells = partition(last, record.environment.region)
-    hues = robot_hues(n, cells.adjacency)
+    working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
+    cells = record.cells()
+    outlines, owners = outlines_of(cells)
+    hues = robot_hues(n, working[cells.adjacency])
     paper = colours == "paper"
     tint = theme.paper_tint if paper else theme.tint
-    polygons = [(cell, hue) for cell, hue in zip(cells.polygons, hues.tolist(), strict=True) if len(cell) > 2]
+    each = zip(outlines, hues[working[owners]].tolist(), strict=True)
+    polygons = [(cell, hue) for cell, hue in each if len(cell) > 2]
     axes.add_collection(
         PolyCollection(
             [cell for cell, _ in polygons],
@@ -98,7 +130,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     )
     crowd = line_crowding(n)
     lines = LineCollection(
-        list(np.moveaxis(record.positions, 1, 0)),
+        [record.positions[record.present[:, robot], robot] for robot in range(n)],
         colors=[tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)],
         linewidths=1.6 * crowd,
         capstyle="round",
@@ -106,22 +138,34 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
         zorder=4,
     )
     axes.add_collection(lines, autolim=False)
-    begin = record.positions[0]
+    # of one that joins, where it does
+    begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
     axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
     fills = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
-    radius = draw_robots(axes, last, record.team.radius, fills, theme)
+    failed = _failed(record)
+    fills = [wreck_colour(theme) if failed[robot] else fills[robot] for robot in there.tolist()]
+    drawn = draw_robots(axes, last[there], record.team.radius[there], fills, theme, (there + 1).tolist())
     if has_goals(record):
+        radius = np.array(drawn)[np.searchsorted(there, working)]
         apart = mark_size(_in_points(axes, cells.centroid), 3.2, _CENTROID)
-        away = np.hypot(*(_in_points(axes, cells.centroid) - _in_points(axes, last)).T)
+        away = np.hypot(*(_in_points(axes, cells.centroid) - _in_points(axes, last[working])).T)
         # where a robot has arrived, only the ends of the cross would stick out from under its disc
         axes.plot(*cells.centroid[away > radius].T, zorder=6, **_centroid_style(theme, apart))
 
 
 def draw_robots(
-    axes: Axes, places: Array, radius: Array, fills: Sequence[Colour], theme: Theme
+    axes: Axes,
+    places: Array,
+    radius: Array,
+    fills: Sequence[Colour],
+    theme: Theme,
+    numbers: Sequence[int] | None = None,
 ) -> list[float]:
-    """Draw robots at (n, 2) m with radii (n,) m as discs with numbers; return the drawn radii in points."""
+    """Draw robots at (n, 2) m with radii (n,) m as discs with numbers; return the drawn radii in points.
+
+    The numbers are 1, 2, 3, ... where others are not given.
+    """
     drawn = _disc_points(axes, places, radius)
     axes.scatter(
         places[:, 0],
@@ -133,7 +177,8 @@ def draw_robots(
         zorder=7,
         clip_on=False,
     )
-    for robot, (point, r, fill) in enumerate(zip(places, drawn, fills, strict=True), start=1):
+    numbers = range(1, len(places) + 1) if numbers is None else numbers
+    for robot, point, r, fill in zip(numbers, places, drawn, fills, strict=True):
         digits = len(str(robot))
         size = r * (1.25, 1.1, 0.85, 0.65)[min(digits, 4) - 1]
         if size >= _SMALLEST_NUMBER:
@@ -199,7 +244,7 @@ def _centroid_style(theme: Theme, size: float) -> dict[str, Any]:
     }
 
 
-def map_handles(environment: Environment, theme: Theme) -> list[Artist]:
+def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
     """Return the legend's entries for what `draw_map` draws."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -214,6 +259,10 @@ def map_handles(environment: Environment, theme: Theme) -> list[Artist]:
                 label="obstacle (unknown to robots)",
             )
         )
+    words = density_words(environment) if density else ""
+    if words:
+        colour = mix(theme.background, theme.density, 0.7 * theme.density_strength)
+        handles.append(Patch(facecolor=tone(colour), linewidth=0.0, label=words))
     return handles
 
 
@@ -231,6 +280,16 @@ def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
     return Line2D([], [], label=label, **style)
 
 
+def wreck_colour(theme: Theme) -> Colour:
+    """Return the colour of robots that have failed."""
+    return mix(theme.background, theme.ink, 0.3)
+
+
+def _failed(record: Record) -> BoolArray:
+    """Return which robots had failed at the end, (n,) bool."""
+    return np.asarray(record.present[-1] & ~record.working[-1])
+
+
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
     """Return the legend's entries for what `draw_run` draws."""
     from matplotlib.lines import Line2D
@@ -242,6 +301,7 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
+        *([robot_handle("failed robot", wreck_colour(theme), theme)] if _failed(record).any() else []),
         *([centroid] if has_goals(record) else []),
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from robocov.changing_world import only
 from robocov.errors import ParameterError
 from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
-from robocov_app.plot_curves import draw_curves, end_label
+from robocov_app.plot_curves import DISTANCE, WEIGHED, draw_curves, end_label
 from robocov_app.plots import plot_cost
+from robocov_app.view.phi import density_words, mean_words
 from robocov_app.view.shading import levels, palette, round_limit, strength, ticks
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from robocov.arrays import IntArray
     from robocov.environment import Environment
     from robocov.record import Record
     from robocov.robots import Team
@@ -48,6 +51,8 @@ class Moment:
     field : Field
     title, facts : str
         What stands above the map.
+    numbers : tuple of int or None
+        What people call the robots; by default 1, 2, 3, ...
     """
 
     environment: Environment
@@ -55,14 +60,24 @@ class Moment:
     field: Field
     title: str = ""
     facts: str = ""
+    numbers: tuple[int, ...] | None = None
 
     @classmethod
-    def last_of(cls, record: Record, field: Field, mean_distance: float) -> Moment:
-        """Return the last moment of a run, with the mean distance that its curve ends with."""
+    def last_of(
+        cls, record: Record, field: Field, mean_distance: float, counted: IntArray | None = None
+    ) -> Moment:
+        """Return the last moment of a run, with the mean distance that its curve ends with.
+
+        `counted` are the rows of the robots that count, all by default.
+        """
         facts = f"after {record.time[-1]:.1f} s"
         if np.isfinite(mean_distance):
-            facts = f"mean distance {mean_distance:.3f} m {facts}"
-        return cls(record.environment, record.team, field, record.label, facts)
+            facts = f"{mean_words(record.environment)} {mean_distance:.3f} m {facts}"
+        environment = record.environment.at(float(record.time[-1]))
+        if counted is None:
+            return cls(environment, record.team, field, record.label, facts)
+        team, numbers = only(record.team, counted), tuple((counted + 1).tolist())
+        return cls(environment, team, field, record.label, facts, numbers)
 
 
 class _Rooms(NamedTuple):
@@ -125,7 +140,8 @@ def plot_coverage(
         page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=free - 2 * page.margin)
         if rooms.curves is not None:
             axes = page.axes(_curves_box(page, curves, rooms.curves))
-            draw_curves(axes, curves, theme)
+            weighed = any(density_words(moment.environment) for moment in moments)
+            draw_curves(axes, curves, theme, label=WEIGHED if weighed else DISTANCE)
         panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
         for moment, (box, slot) in zip(moments, panels, strict=True):
             axes = page.axes(box)
@@ -183,7 +199,7 @@ def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
 
     line = Line2D([], [], color=tone(_border_colour(theme)), linewidth=1.6, label="geodesic cell border")
     handles: list[Artist] = [robot_handle("robot", theme.final, theme), line]
-    obstacles = [map_handles(moment.environment, theme)[1:] for moment in moments]
+    obstacles = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
     for handle in max(obstacles, key=len):
         handle.set_label("obstacle")
         handles.append(handle)
@@ -292,9 +308,9 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     )
     region = Polygon(moment.environment.region.vertices, transform=axes.transData)
     image.set_clip_path(region)
-    draw_map(axes, moment.environment, theme)
+    draw_map(axes, moment.environment, theme, density=False)
     places = moment.field.result.positions
-    draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme)
+    draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
 
 
 def _border_colour(theme: Theme) -> tuple[int, int, int]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
+from robocov.controllers.gains import value_text
 from robocov.errors import ParameterError, shown
 from robocov_app.page import SMALL, TEXT, TITLE, Page, plain_style, tone
 from robocov_app.plot_curves import DISTANCE, CurveStyle, curve_styles
@@ -17,6 +18,8 @@ from robocov_app.view.theme import LIGHT, Colour, Theme, theme_named
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from robocov.controllers.gains import Value
 
 HEAT_LEVELS = 12
 """Steps of the scale of colours of a grid."""
@@ -41,7 +44,7 @@ class Dependence(NamedTuple):
     ----------
     label, controller : str
     gains : (m,)
-        nan where the gain is null: no limit.
+        nan where the gain is null: no limit. Of a gain that is a word, the word's number.
     values : (m,)
     """
 
@@ -62,10 +65,12 @@ def plot_gains(
     scale: float | None = None,
     styles: Sequence[CurveStyle] | None = None,
     label: str = DISTANCE,
+    words: Sequence[str] = (),
 ) -> Figure:
     """Plot values against a gain, one colour and mark a controller, with a line through medians.
 
     The axis of the gain is logarithmic where it spans much; null has a place of its own at the right.
+    A gain that is a word has even places, and no line, for between words there is nothing.
 
     Parameters
     ----------
@@ -84,6 +89,8 @@ def plot_gains(
     styles : sequence of CurveStyle or None
     label : str
         What the values are.
+    words : sequence of str
+        Of a gain that is a word: the words, of which `dependences` hold the numbers.
 
     Returns
     -------
@@ -108,9 +115,10 @@ def plot_gains(
     with plain_style():
         if axes is None:
             axes = _page_axes(theme, size or (700, 480), title, scale)
-        null = _gain_axis(axes, np.concatenate([each.gains for each in kept]))
+        gains = np.concatenate([each.gains for each in kept])
+        null = _gain_axis(axes, gains, words)
         for each, look in zip(kept, looks, strict=True):
-            _draw_dependence(axes, each, look, null, theme)
+            _draw_dependence(axes, each, look, null, theme, joined=not words)
         _frame(axes, np.concatenate([each.values for each in kept]), gain, label, theme)
         if len(kept) > 1:
             axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(theme.ink), borderaxespad=0.2)
@@ -118,8 +126,8 @@ def plot_gains(
 
 
 def plot_gain_grid(
-    first: Sequence[float | None],
-    second: Sequence[float | None],
+    first: Sequence[Value],
+    second: Sequence[Value],
     values: Array,
     gains: tuple[str, str],
     axes: Axes | None = None,
@@ -133,7 +141,7 @@ def plot_gain_grid(
 
     Parameters
     ----------
-    first, second : sequence of float or None
+    first, second : sequence of float, str or None
         Values of the gains: columns and rows, ascending; None for no limit.
     values : (rows, columns)
         nan where there is none.
@@ -218,10 +226,14 @@ def _page_axes(theme: Theme, size: tuple[int, int], title: str, scale: float | N
     return page.axes((52 * s, above, size[0] - 70 * s, size[1] - above - 50 * s))
 
 
-def _gain_axis(axes: Axes, gains: Array) -> float | None:
+def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
     """Set the scale of the axis; return where null stands on it, None where there is no null."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
+    if words:
+        axes.set_xlim(-0.5, len(words) - 0.5)
+        axes.set_xticks(range(len(words)), list(words))
+        return None
     finite = gains[np.isfinite(gains)]
     levels = np.unique(finite)
     logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
@@ -254,12 +266,12 @@ def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
     return [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
 
 
-def _gain_text(value: float | None) -> str:
-    return "none" if value is None else f"{value:.4g}"
+def _gain_text(value: Value) -> str:
+    return value_text(value, digits=4)
 
 
 def _draw_dependence(
-    axes: Axes, each: Dependence, style: CurveStyle, null: float | None, theme: Theme
+    axes: Axes, each: Dependence, style: CurveStyle, null: float | None, theme: Theme, *, joined: bool
 ) -> None:
     colour = tone(style.colour(theme))
     where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
@@ -271,7 +283,8 @@ def _draw_dependence(
         axes.plot([], [], style.mark, markersize=5.0, label=each.label, **dots)
         return
     medians = np.array([np.median(each.values[where == level]) for level in levels])
-    line: Any = {"color": colour, "linestyle": style.dashes, "linewidth": 2.0, "label": each.label}
+    dashes = style.dashes if joined else "none"
+    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": each.label}
     axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)
 
 

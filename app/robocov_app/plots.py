@@ -17,6 +17,7 @@ from robocov_app.figure_files import save_figure as save_figure
 from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style
 from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
 from robocov_app.plot_curves import Curve, draw_curves, end_label
+from robocov_app.view.phi import mean_words
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
 
@@ -101,7 +102,7 @@ def plot_trajectories(
             ticks_in_metres(axes, record.environment, theme)
             draw_run(axes, record, theme, colours)
             return _figure_of(axes)
-        facts = [_distance(mean_distance), _time(record), _robots(record)]
+        facts = [_distance(record.environment, mean_distance), _time(record), _robots(record)]
         page, axes = _map_page(
             record.environment,
             theme,
@@ -322,7 +323,7 @@ def _titles(page: Page, box: Box, title: str, facts: str) -> None:
 def _captions(records: Sequence[Record], costs: Sequence[float | None]) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
     same: list[str] = []
-    own = [[_distance(cost)] for cost in costs]
+    own = [[_distance(record.environment, cost)] for record, cost in zip(records, costs, strict=True)]
     for fact in (_map, _robots, _time):
         found = [fact(record) for record in records]
         if len(set(found)) == 1:
@@ -350,6 +351,6 @@ def _time(record: Record) -> str:
     return f"t = {record.time[-1]:.1f} s"
 
 
-def _distance(mean_distance: float | None) -> str:
+def _distance(environment: Environment, mean_distance: float | None) -> str:
     known = mean_distance is not None and np.isfinite(mean_distance)
-    return f"mean distance {mean_distance:.3f} m" if known else ""
+    return f"{mean_words(environment)} {mean_distance:.3f} m" if known else ""

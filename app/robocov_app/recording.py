@@ -120,8 +120,9 @@ def iter_frames(
     (height, width, 3) RGB
         The array is the caller's own.
     """
+    from robocov_app.view.phi import mean_words
     from robocov_app.view.picture import Painter, standard_layers
-    from robocov_app.view.scene import Scene
+    from robocov_app.view.record_scene import record_scene
     from robocov_app.view.theme import theme_named
 
     layers = standard_layers(colours) if layers is None else layers
@@ -134,29 +135,23 @@ def iter_frames(
     last, frame = -1, None
     for row in rows.tolist():
         if frame is None or row != last:
-            scene = Scene.of(
-                record.environment,
-                record.team,
-                record.snapshot(row),
-                starts=record.positions[0],
-                trail=record.positions[: row + 1],
-                trail_time=record.time[: row + 1],
-                label=record.label,
-                cost=_cost_text(float(record.time[row]), cost),
-                field=fields.at(record.positions[row]) if fields and painter.needs_field else None,
-                field_limit=fields.limit if fields else 1.0,
+            scene = record_scene(
+                record,
+                row,
+                cost=_cost_text(mean_words(record.environment), float(record.time[row]), cost),
+                fields=fields if painter.needs_field else None,
             )
             last, frame = row, painter.frame(scene)
         yield frame
 
 
-def _cost_text(time: float, cost: tuple[Array, Array] | None) -> str:
+def _cost_text(what: str, time: float, cost: tuple[Array, Array] | None) -> str:
     if cost is None:
         return ""
     known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
     if known < 0 or not np.isfinite(cost[1][known]):
         return ""
-    return f"mean distance {cost[1][known]:.3f} m"
+    return f"{what} {cost[1][known]:.3f} m"
 
 
 def png_bytes(frame: Frame) -> bytes:

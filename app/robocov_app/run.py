@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
+from robocov.errors import ParameterError
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
-from robocov.record import Record, Recorder
+from robocov.momentary_cost import MomentaryCost
+from robocov.record import Record
+from robocov.recorder import Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.building import FILM_LATTICE, built_cost, cost_for_pictures
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from robocov.arrays import Array
+    from robocov.conditions import Conditions
     from robocov.cost import CoverageCost
     from robocov.environment import Environment
     from robocov_app.options import RunOptions
@@ -41,6 +45,9 @@ FILM_HOLD = 1.0
 
 STOPPED_SAMPLES = 200
 """Samples of the coverage cost of a run that was stopped."""
+
+_OF_STANDING_MAPS = frozenset(("distances", "geodesic_cells"))
+"""Layers that take long to know of a map."""
 
 COST_RATE = 10.0
 """Samples of the coverage cost per simulated second."""
@@ -59,22 +66,20 @@ class Run:
 
 
 def team_of(options: RunOptions) -> Team:
-    """Return the homogeneous team that the options describe."""
-    return Team.homogeneous(
-        options.robots,
-        radius=options.radius,
-        max_speed=options.max_speed,
-        max_acceleration=options.max_acceleration,
-        viscosity=options.viscosity,
-        sensing_range=options.sensing_range,
-        communication_range=np.inf if options.communication_range is None else options.communication_range,
-    )
+    """Return the team that the options describe."""
+    return options.made_team()
+
+
+def conditions_of(options: RunOptions) -> Conditions | None:
+    """Return the conditions that the options describe; None where they are ideal."""
+    return options.conditions.conditions(options.seed, options.robots)
 
 
 def starts_of(environment: Environment, options: RunOptions) -> tuple[str, Array]:
     """Return the name of the start and the positions drawn from it."""
     start = environment.start(options.start)
-    return start.name, start.sample(options.robots, seed=options.seed, radius=options.radius)
+    radius = float(team_of(options).radius.max())  # room for the largest
+    return start.name, start.sample(options.robots, seed=options.seed, radius=radius)
 
 
 def simulated(
@@ -87,7 +92,10 @@ def simulated(
     """Simulate, and return the record up to the end or to Ctrl-C."""
     controller = make_controller(controller_name, gains)
     start, positions = starts_of(environment, options)
-    simulation = Simulation(environment, controller, positions, team_of(options), options.dt)
+    conditions = conditions_of(options)
+    simulation = Simulation(
+        environment, controller, positions, team_of(options), options.dt, conditions=conditions
+    )
     recorder = Recorder(
         environment,
         simulation.team,
@@ -96,6 +104,7 @@ def simulated(
         name=controller_name,
         start=start,
         seed=options.seed,
+        conditions=conditions,
     )
     total = round(options.duration / options.dt)
     # what a user's controller prints must not get among the answer
@@ -135,18 +144,20 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
 def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     """Write ``record.npz``, ``run.json`` and ``cost.csv``; the summary depends on the lattice."""
     run.record.save(folder, finite(run.summary), lattice=lattice)
-    write_csv(folder / "cost.csv", COST_COLUMNS, cost_rows(run.history))
+    write_csv(folder / "cost.csv", cost_columns(run.history), cost_rows(run.history))
+
+
+def cost_columns(history: CostHistory) -> str:
+    """Return the header of ``cost.csv``; where robots are not equally fast, with one column more."""
+    return COST_COLUMNS if history.mean_time is None else f"{COST_COLUMNS},mean_time_s"
 
 
 def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
-    """Return the rows of ``cost.csv``, under `COST_COLUMNS`."""
-    return zip(
-        history.time.tolist(),
-        history.mean_distance.tolist(),
-        history.cost.tolist(),
-        history.uncovered_area.tolist(),
-        strict=True,
-    )
+    """Return the rows of ``cost.csv``, under `cost_columns`."""
+    columns = [history.time, history.mean_distance, history.cost, history.uncovered_area]
+    if history.mean_time is not None:
+        columns.append(history.mean_time)
+    return zip(*(column.tolist() for column in columns), strict=True)
 
 
 def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:
@@ -176,22 +187,27 @@ def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOption
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
 
-    The others are on the same map, but for robots that failed at other places.
+    The others are on the same map, but for robots that failed at other places. Where all robots have
+    failed there is nothing to draw.
     """
     from robocov_app.plot_coverage import Moment
     from robocov_app.view.field import Field, FieldLattice
 
     drawn, moments = runs[0].record.environment, []
     cost = cost_for_pictures(drawn, cost)
-    lattice = FieldLattice(cost.sites)
     for run in runs:
         record = run.record
         if record.environment != drawn:
             drawn = record.environment
             cost = built_cost(drawn, cost.lattice, quiet=True)
-            lattice = FieldLattice(cost.sites)
-        field = Field(lattice, cost(record.positions[-1]))
-        moments.append(Moment.last_of(record, field, float(run.history.mean_distance[-1])))
+        momentary, time = MomentaryCost(cost), float(record.time[-1])
+        counted = momentary.counted(time, record.positions[-1], record.working[-1])
+        if not counted.any():
+            continue
+        now, rows = momentary.at(time), np.flatnonzero(counted)
+        field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
+        some = None if counted.all() else rows
+        moments.append(Moment.last_of(record, field, float(run.history.mean_distance[-1]), some))
     return moments
 
 
@@ -261,19 +277,24 @@ def save_run_moving(
     save_moving(folder, "run.mp4", frames, total, options, stop)
 
 
-def check_layers(options: RunOptions) -> None:
+def check_layers(options: RunOptions, environment: Environment | None = None) -> None:
     """Make sure, before anything is simulated, that films can show what is wanted.
 
     Raises
     ------
     ParameterError
-        When there is no such layer.
+        When there is no such layer, or it cannot be drawn of the map.
     """
     if options.show or options.hide:
         from robocov_app.view.picture import checked_layers
 
-        checked_layers("--show", options.show)
+        also = checked_layers("--show", options.show)
         checked_layers("--hide", options.hide)
+        if environment is not None and environment.moves and also & _OF_STANDING_MAPS:
+            raise ParameterError(
+                f"--show: {' '.join(options.show)}, but obstacles of map {environment.name!r} move: "
+                f"distances are known of maps where all stand"
+            )
 
 
 def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> Shown:
@@ -301,7 +322,7 @@ def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunO
 def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
     """Yield the distances at the end of each run that are finite."""
     for run in runs:
-        distances = cost(run.record.positions[-1]).distances
+        distances = cost(run.record.positions[-1][run.record.working[-1]]).distances
         yield distances[np.isfinite(distances)]
 
 

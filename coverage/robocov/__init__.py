@@ -18,8 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robocov.array_cache import ArrayCache
+    from robocov.conditions import Conditions, Failure, Join
     from robocov.controllers import (
         CONTROLLERS,
+        Atlas,
+        AtlasShared,
         Controller,
         IndividualController,
         Individually,
@@ -29,47 +32,71 @@ if TYPE_CHECKING:
         Rpf,
         make_controller,
     )
-    from robocov.controllers.gains import gain
+    from robocov.controllers.gains import choice, gain
     from robocov.cost import CoverageCost, CoverageResult
+    from robocov.density import (
+        Density,
+        Gaussian,
+        Gaussians,
+        Raster,
+        Uniform,
+        WeightedArea,
+        WeightedPolygons,
+    )
     from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
     from robocov.generator import GENERATORS, generated_map
     from robocov.mapcheck import check_map
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
     from robocov.metrics import cost_history, settled_at, summarise
+    from robocov.momentary_cost import MomentaryCost
     from robocov.neighbours import Neighbours
     from robocov.observation import Decision, Observations, Snapshot
+    from robocov.obstacle_path import ObstaclePath
     from robocov.optimum import Optimum
     from robocov.record import Record
     from robocov.region import Region
     from robocov.results import Results, read_results
     from robocov.robots import Team
+    from robocov.run_metrics import RunMetrics, run_metrics
     from robocov.sensor import RangeSensor
     from robocov.simulation import Simulation
     from robocov.starts import DiscStart, PointsStart, UniformStart
+    from robocov.teamfile import read_team
     from robocov.voronoi import VoronoiPartition, partition
+    from robocov.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
 
 __version__ = "0.1.0"
 
 _HOME = {
     "ArrayCache": "array_cache",
+    "Atlas": "controllers",
+    "AtlasShared": "controllers",
     "CONTROLLERS": "controllers",
     "CircleObstacle": "environment",
+    "Conditions": "conditions",
     "Controller": "controllers",
     "CoverageCost": "cost",
     "CoverageResult": "cost",
     "Decision": "observation",
+    "Density": "density",
     "DiscStart": "starts",
     "Environment": "environment",
+    "Failure": "conditions",
     "GENERATORS": "generator",
+    "Gaussian": "density",
+    "Gaussians": "density",
     "IndividualController": "controllers",
     "Individually": "controllers",
     "InputError": "errors",
+    "Join": "conditions",
     "Lloyd": "controllers",
     "MapError": "errors",
+    "MomentaryCost": "momentary_cost",
     "Neighbours": "neighbours",
     "Observations": "observation",
+    "ObstaclePath": "obstacle_path",
     "Optimum": "optimum",
     "OutputError": "errors",
     "OwnView": "controllers",
@@ -78,21 +105,28 @@ _HOME = {
     "PolygonObstacle": "environment",
     "RangeSensor": "sensor",
     "Rapf": "controllers",
+    "Raster": "density",
     "Record": "record",
     "Region": "region",
     "Results": "results",
     "RobocovError": "errors",
     "Rpf": "controllers",
+    "RunMetrics": "run_metrics",
     "Simulation": "simulation",
     "Snapshot": "observation",
     "StartError": "errors",
     "Team": "robots",
+    "Uniform": "density",
     "UniformStart": "starts",
     "VoronoiPartition": "voronoi",
     "WallObstacle": "environment",
+    "WeightedArea": "density",
+    "WeightedCells": "weighted_cells",
+    "WeightedPolygons": "density",
     "World": "world",
     "bundled_maps": "mapfile",
     "check_map": "mapcheck",
+    "choice": "controllers.gains",
     "cost_history": "metrics",
     "gain": "controllers.gains",
     "generated_map": "generator",
@@ -101,29 +135,42 @@ _HOME = {
     "map_schema": "mapfile",
     "partition": "voronoi",
     "read_results": "results",
+    "read_team": "teamfile",
+    "run_metrics": "run_metrics",
     "save_map": "mapfile",
     "settled_at": "metrics",
     "summarise": "metrics",
+    "weighted_partition": "weighted_cells",
 }
 
 __all__ = [
     "CONTROLLERS",
     "GENERATORS",
     "ArrayCache",
+    "Atlas",
+    "AtlasShared",
     "CircleObstacle",
+    "Conditions",
     "Controller",
     "CoverageCost",
     "CoverageResult",
     "Decision",
+    "Density",
     "DiscStart",
     "Environment",
+    "Failure",
+    "Gaussian",
+    "Gaussians",
     "IndividualController",
     "Individually",
     "InputError",
+    "Join",
     "Lloyd",
     "MapError",
+    "MomentaryCost",
     "Neighbours",
     "Observations",
+    "ObstaclePath",
     "Optimum",
     "OutputError",
     "OwnView",
@@ -132,21 +179,28 @@ __all__ = [
     "PolygonObstacle",
     "RangeSensor",
     "Rapf",
+    "Raster",
     "Record",
     "Region",
     "Results",
     "RobocovError",
     "Rpf",
+    "RunMetrics",
     "Simulation",
     "Snapshot",
     "StartError",
     "Team",
+    "Uniform",
     "UniformStart",
     "VoronoiPartition",
     "WallObstacle",
+    "WeightedArea",
+    "WeightedCells",
+    "WeightedPolygons",
     "World",
     "bundled_maps",
     "check_map",
+    "choice",
     "cost_history",
     "gain",
     "generated_map",
@@ -155,9 +209,12 @@ __all__ = [
     "map_schema",
     "partition",
     "read_results",
+    "read_team",
+    "run_metrics",
     "save_map",
     "settled_at",
     "summarise",
+    "weighted_partition",
 ]
 
 

@@ -32,7 +32,9 @@ Cell: TypeAlias = list[Vertex]
 """The vertices of a cell, counter-clockwise; none when the cell is empty."""
 
 
-def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> list[Cell]:
+def clip_cells(
+    generators: Array, region: Region, neighbours: Neighbours, heard: Array | None = None
+) -> list[Cell]:
     """Return the cells V_i of equation (1) within `region`.
 
     Parameters
@@ -41,7 +43,11 @@ def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> lis
     neighbours : Neighbours
         Cell i is cut by the bisectors to the robots that i hears. Generators at the very same place
         do not cut each other: they get the same cell.
+    heard : (m, 2) m or None
+        Where each robot knows those that it hears to be, in the order of ``neighbours.indices``.
     """
+    if heard is not None:
+        return _clip_heard(generators, region, neighbours, heard)
     corners = region.vertices.tolist()
     places = generators.tolist()
     cells = []
@@ -62,6 +68,42 @@ def clip_cells(generators: Array, region: Region, neighbours: Neighbours) -> lis
                     break
         cells.append(cell)
     return cells
+
+
+def _clip_heard(generators: Array, region: Region, neighbours: Neighbours, heard: Array) -> list[Cell]:
+    """Return the cells where each robot has an idea of its own of where the others are."""
+    corners = region.vertices.tolist()
+    robot, others = neighbours.pairs()
+    offset = heard - generators[robot]
+    square = np.square(offset[:, 0]) + np.square(offset[:, 1])
+    stops = np.cumsum(np.bincount(robot, minlength=len(generators))).tolist()
+    cells = []
+    for (px, py), start, stop in zip(generators.tolist(), [0, *stops], stops, strict=False):
+        cell = [(x - px, y - py, REGION) for x, y in corners]
+        security = _security(cell)
+        for rank in _nearest_first(square[start:stop]):
+            if square[start + rank] > security:
+                break
+            dx, dy = offset[start + rank].tolist()
+            level = 0.5 * (dx * dx + dy * dy)
+            for x, y, _ in cell:
+                if x * dx + y * dy > level:
+                    cell = _cut(cell, dx, dy, level, int(others[start + rank]))
+                    security = _security(cell)
+                    break
+        cells.append(cell)
+    return cells
+
+
+def _nearest_first(square: Array) -> Iterator[int]:
+    """Yield the ranks of squared distances, the smallest first; the far ones are sorted when needed."""
+    if len(square) <= 2 * _ENOUGH:
+        yield from square.argsort(kind="stable").tolist()
+        return
+    parted = square.argpartition(_ENOUGH)
+    near, far = np.sort(parted[:_ENOUGH]), np.sort(parted[_ENOUGH:])
+    for ranks in (near, far):
+        yield from ranks[square[ranks].argsort(kind="stable")].tolist()
 
 
 def mass_and_centroid(cells: list[Cell], generators: Array) -> tuple[Array, Array]:

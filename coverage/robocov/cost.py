@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from time import perf_counter
@@ -11,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.arrivals import Ways, checked_speeds, first_there
 from robocov.corner_views import CornerViews
+from robocov.density_masses import means_over_squares
 from robocov.drawing import drawing_backend
 from robocov.errors import InputError, ParameterError, counted, shown
 from robocov.geodesic import Geodesics
-from robocov.grouping import least
+from robocov.grouping import least, weighted_mean
 from robocov.lattice import Lattice, Number, Sites
 from robocov.robot_views import RobotViews
 
@@ -43,15 +46,18 @@ class CoverageResult:
     ----------
     mean_distance : float, m
         Mean geodesic distance of the sites to their nearest robot, over the components of the free
-        space that hold robots; nan if these are too small to hold a site.
+        space that hold robots, each site weighed by φ; nan if these are too small to hold a site.
     value : float, m³
-        Equation (22): `mean_distance` times the exact area of these components.
+        Equation (22), with φ as in (4): `mean_distance` times the exact integral of φ over these
+        components, which is their area where there is no density. With `speeds` it is m² s, `mean_time` times
+        that integral.
     uncovered_area : float, m²
         Area of the components without a robot.
     distances : (m,) m
-        Geodesic distance to the nearest robot, inf where none can come.
+        Geodesic distance to the nearest robot, or with `speeds` to the one that is there first; inf where
+        none can come.
     owner : (m,)
-        The nearest robot (the geodesic Voronoi partition), -1 where none can come.
+        That robot (the geodesic Voronoi partition), -1 where none can come.
     corner : (m,)
         The row in `corners` where the way from the owner to the site bends first, -1 where it is straight.
     last_corner : (m,)
@@ -65,6 +71,12 @@ class CoverageResult:
         The map, and
     sites : Sites or None
         its lattice, for plots.
+    weights : (m,) or None
+        The mean of φ over the cell of each site; None where every place counts the same.
+    speeds : (n,) m/s or None
+        How fast each robot goes, if not the nearest robot counts but the one that is there first.
+    mean_time : float, s, or None
+        Mean time, with `speeds`, until the first robot is at a site.
     """
 
     mean_distance: float
@@ -79,11 +91,26 @@ class CoverageResult:
     corners: Array
     environment: Environment | None = None
     sites: Sites | None = None
+    weights: Array | None = None
+    speeds: Array | None = None
+    mean_time: float | None = None
 
     def __repr__(self) -> str:
         robots = counted(len(self.positions), "robot")
         uncovered = f", {self.uncovered_area:.3f} m² uncovered" if self.uncovered_area else ""
-        return f"<CoverageResult {robots}, mean distance {self.mean_distance:.3f} m{uncovered}>"
+        time = "" if self.mean_time is None else f", mean time {self.mean_time:.3f} s"
+        return f"<CoverageResult {robots}, mean distance {self.mean_distance:.3f} m{time}{uncovered}>"
+
+    @cached_property
+    def times(self) -> Array:
+        """The time until the first robot is at each site, (m,) s, inf where none can come.
+
+        Without `speeds` every robot goes at 1 m/s.
+        """
+        if self.speeds is None:
+            return self.distances
+        # where none can come, the distance is infinite whatever the speed
+        return np.asarray(self.distances / self.speeds[self.owner])
 
     @cached_property
     def first(self) -> Array:
@@ -95,10 +122,11 @@ class CoverageResult:
 
     @cached_property
     def gradient(self) -> Array:
-        """Derivative of `value` by the positions, (n, 2) m².
+        """Derivative of `value` by the positions, (n, 2) m², with `speeds` m s.
 
         Each site pulls its owner towards the first way-point, by a unit vector times the site's part of
-        the area. Exact wherever `value` is differentiable with the owners and ways as they are.
+        the integral of φ, over the owner's speed. Exact wherever `value` is differentiable with the owners
+        and ways as they are.
         """
         count = len(self.positions)
         site = np.nonzero(self.owner >= 0)[0]
@@ -106,9 +134,15 @@ class CoverageResult:
         toward = self.first[site] - self.positions[owner]
         length = np.hypot(toward[:, 0], toward[:, 1])
         toward /= np.where(length > 0.0, length, 1.0)[:, None]
+        total = float(len(site))
+        if self.weights is not None:
+            toward *= self.weights[site, None]
+            total = float(self.weights[site].sum())
         pull = [np.bincount(owner, toward[:, k], minlength=count) for k in (0, 1)]
-        weight = self.value / (self.mean_distance * len(site)) if len(site) and self.mean_distance else 0.0
-        return np.asarray(np.column_stack(pull) * -weight)
+        mean = self.mean_distance if self.mean_time is None else self.mean_time
+        weight = self.value / (mean * total) if total and mean else 0.0
+        slope = np.column_stack(pull) * -weight
+        return np.asarray(slope if self.speeds is None else slope / self.speeds[:, None])
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
         """Plot the distance of every place to its nearest robot, and the borders of the geodesic cells.
@@ -143,7 +177,8 @@ class CoverageCost:
 
     The region's bounding box is widened to a square, anchored at its lower left corner, and cut into
     ``lattice``² square cells; the cell centres in the open free space are the sites. Distances are
-    exact; only the mean over the sites is an approximation of the integral.
+    exact; only the mean over the sites is an approximation of the integral. Where the environment has a
+    density φ, each site is weighed by the exact mean of φ over its cell.
 
     Parameters
     ----------
@@ -170,6 +205,8 @@ class CoverageCost:
     corners : (k, 2) m
         Where ways can bend.
     geodesics : Geodesics
+    weights : (m,) or None
+        The mean of φ over the cell of each site; None where every place counts the same.
 
     Raises
     ------
@@ -201,12 +238,34 @@ class CoverageCost:
         self.environment = environment
         self.geodesics = Geodesics(environment, None if progress is None else partial(progress, 0.0))
         self._areas = np.array([part.area for part in environment.free.geoms])
+        self._masses = environment.free_masses
         self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
         self._corner_views = self._looked_up(progress, cache)
         self.sites = self._lattice.sites
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         corners = np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y])
         self.corners = frozen(self.geodesics.walls.grid.metres(corners))
+        self.weights = self._weights()
+
+    def weighed(self, environment: Environment) -> CoverageCost:
+        """Return the coverage cost of the same map with another density; nothing else is computed again.
+
+        Parameters
+        ----------
+        environment : Environment
+            With the free space and the region of this one's.
+        """
+        twin = copy(self)
+        twin.environment = environment
+        twin._masses = environment.free_masses
+        twin.weights = twin._weights()
+        return twin
+
+    def _weights(self) -> Array | None:
+        density = self.environment.density
+        if density is None or density.uniform:
+            return None
+        return frozen(means_over_squares(density, self.points, self.spacing))
 
     def _looked_up(self, progress: Callable[[float], None] | None, cache: ArrayCache | None) -> CornerViews:
         """Return what the sites see of the corners, from the cache if it is there; this takes the longest."""
@@ -226,21 +285,35 @@ class CoverageCost:
             cache.save(key, tables)
         return views
 
-    def __call__(self, positions: Array) -> CoverageResult:
+    def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
+
+        Parameters
+        ----------
+        positions : (n, 2) m
+        speeds : (n,) m/s or None
+            How fast each robot goes: then not the nearest robot counts but the one that is there first, and
+            the cost is in seconds.
 
         Raises
         ------
         InputError
-            When there is no robot, or one is outside the free space; the message names it.
+            When there is no robot, or one is outside the free space, or speeds are not positive numbers, one
+            for each robot; the message names it.
         """
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        paths, sites = self.geodesics, self._lattice
-        x, y, holds = paths.place(positions)
+        x, y, holds = self.geodesics.place(positions)
         covered = np.asarray(holds.any(axis=0))
+        if speeds is None:
+            return self._result(positions, covered, self._nearest(x, y, covered))
+        speeds = checked_speeds(speeds, len(positions))
+        return self._result(positions, covered, first_there(self._nearest, x, y, holds, speeds), speeds)
 
+    def _nearest(self, x: Array, y: Array, covered: BoolArray) -> Ways:
+        """Return the ways of the nearest of the robots at (x, y), which stand in some of the components."""
+        paths, sites = self.geodesics, self._lattice
         runs = sites.scanlines.nearest(x, y)
         owner = runs.robot.repeat(runs.length)
         dx = sites.x - x[runs.robot].repeat(runs.length)
@@ -280,23 +353,21 @@ class CoverageCost:
             distance[site] = shortest
             site = site[straight]
             corner[site], last_corner[site], owner[site] = -1, -1, robot[straight]
-        return self._result(positions, covered, distance, owner, corner, last_corner)
+        return distance, owner, corner, last_corner
 
     def _result(
-        self,
-        positions: Array,
-        covered: BoolArray,
-        distances: Array,
-        owner: IntArray,
-        corner: IntArray,
-        last_corner: IntArray,
+        self, positions: Array, covered: BoolArray, ways: Ways, speeds: Array | None = None
     ) -> CoverageResult:
+        distances, owner, corner, last_corner = ways
         distances = distances * self.geodesics.walls.grid.unit
         reached = distances if covered.all() else distances[owner >= 0]
-        mean = float(reached.mean()) if len(reached) else np.nan
+        weights = self.weights
+        some = None if weights is None else weights if covered.all() else weights[owner >= 0]
+        mean = weighted_mean(reached, some)
+        time = None if speeds is None else weighted_mean(reached / speeds[owner[owner >= 0]], some)
         return CoverageResult(
             mean_distance=mean,
-            value=mean * float(self._areas[covered].sum()),
+            value=(mean if time is None else time) * float(self._masses[covered].sum()),
             uncovered_area=float(self._areas[~covered].sum()),
             distances=distances,
             owner=owner,
@@ -307,6 +378,9 @@ class CoverageCost:
             corners=self.corners,
             environment=self.environment,
             sites=self.sites,
+            weights=weights,
+            speeds=speeds,
+            mean_time=time,
         )
 
     def grid(self, values: NDArray[Number]) -> NDArray[Number]:

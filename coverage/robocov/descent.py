@@ -179,13 +179,20 @@ def _slope(result: CoverageResult) -> Array:
 
 
 def _curvature(result: CoverageResult, least: float) -> Array:
-    """Return the sum of the inverse distances to the first way-points over the number of sites, (n,) 1/m."""
+    """Return the sum of the inverse distances to the first way-points over the number of sites, (n,) 1/m.
+
+    Where sites have weights, these are summed in place of ones.
+    """
     site = np.nonzero(result.owner >= 0)[0]
     owner = result.owner[site]
     toward = result.first[site] - result.positions[owner]
     # a site under the robot would hold it fast
     length = np.maximum(np.hypot(toward[:, 0], toward[:, 1]), least)
-    curvature = np.bincount(owner, 1.0 / length, minlength=len(result.positions)) / max(len(site), 1)
+    pull, total = 1.0 / length, float(max(len(site), 1))
+    if result.weights is not None:
+        pull *= result.weights[site]
+        total = float(result.weights[site].sum()) or 1.0
+    curvature = np.bincount(owner, pull, minlength=len(result.positions)) / total
     return np.where(curvature > 0.0, curvature, 1.0)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -11,8 +11,11 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
+from robocov.arrays import Array, frozen
+from robocov.density_masses import masses_of_polygons
 from robocov.drawing import displaying_backend, drawing_backend
 from robocov.errors import StartError, counted, unknown_name
+from robocov.obstacle_path import ObstaclePath
 from robocov.region import Region
 from robocov.starts import Start, StartSpec, UniformStart
 
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from shapely.geometry.base import BaseGeometry
+
+    from robocov.density import Density
 
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]
@@ -39,11 +44,17 @@ class PolygonObstacle:
     vertices: Ring
     holes: tuple[Ring, ...] = ()
     name: str | None = None
+    path: ObstaclePath | None = None
 
     @cached_property
     def polygon(self) -> Polygon:
         """The obstacle as a shapely polygon."""
         return Polygon(self.vertices, self.holes)
+
+    def shifted(self, by: Array) -> PolygonObstacle:
+        """Return the obstacle elsewhere, without a path."""
+        holes = tuple(_moved(hole, by) for hole in self.holes)
+        return replace(self, vertices=_moved(self.vertices, by), holes=holes, path=None)
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,7 @@ class CircleObstacle:
     center: Point
     radius: float
     name: str | None = None
+    path: ObstaclePath | None = None
 
     @cached_property
     def polygon(self) -> Polygon:
@@ -64,6 +76,10 @@ class CircleObstacle:
         ring = np.column_stack([np.cos(angle), np.sin(angle)]) * self.radius + self.center
         return Polygon(ring)
 
+    def shifted(self, by: Array) -> CircleObstacle:
+        """Return the obstacle elsewhere, without a path."""
+        return replace(self, center=_moved((self.center,), by)[0], path=None)
+
 
 @dataclass(frozen=True)
 class WallObstacle:
@@ -72,12 +88,17 @@ class WallObstacle:
     points: Ring
     width: float
     name: str | None = None
+    path: ObstaclePath | None = None
 
     @cached_property
     def polygon(self) -> BaseGeometry:
         """The obstacle as a shapely polygon (or polygons, where the line doubles back)."""
         line = LineString(self.points)
         return line.buffer(self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=4.0)
+
+    def shifted(self, by: Array) -> WallObstacle:
+        """Return the obstacle elsewhere, without a path."""
+        return replace(self, points=_moved(self.points, by), path=None)
 
 
 Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
@@ -96,13 +117,16 @@ class Environment:
     boundary : ring of [x, y], m
         The outer boundary as it was given: either way round, convex or not.
     obstacles : tuple of obstacles
-        They may overlap, touch and stick out of the boundary.
+        They may overlap, touch and stick out of the boundary. One with a `path` moves; here it is where it
+        is at time zero.
     starts : dict of name to start
         The first is the default.
     extra : dict
         Free keys of the file, kept untouched.
     schema : str or None
         The file's ``$schema``, kept untouched.
+    density : Density or None
+        φ, how much each place counts: part of the task, which robots know. None: every place the same.
     """
 
     name: str
@@ -112,6 +136,7 @@ class Environment:
     description: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict)
     schema: str | None = None
+    density: Density | None = None
 
     def __hash__(self) -> int:
         return hash((self.name, self.boundary, self.obstacles))
@@ -149,6 +174,29 @@ class Environment:
         region = shapely.set_precision(self.region.polygon, GRID)
         return _polygons(shapely.difference(region, self.free, grid_size=GRID))
 
+    @cached_property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+        return any(shape.path is not None for shape in self.obstacles)
+
+    @cached_property
+    def standing(self) -> Environment:
+        """The map without the obstacles that move; this one where none does."""
+        if not self.moves:
+            return self
+        return replace(self, obstacles=tuple(shape for shape in self.obstacles if shape.path is None))
+
+    def at(self, time: float) -> Environment:
+        """Return the map as it is at a time, s, with all obstacles standing; this one where none moves."""
+        if not self.moves:
+            return self
+        obstacles = tuple(
+            # to the nanometre, so that an obstacle that comes by again stands in the very same place
+            shape if shape.path is None else shape.shifted(np.round(shape.path.shift(time), 9))
+            for shape in self.obstacles
+        )
+        return replace(self, obstacles=obstacles)
+
     @property
     def area(self) -> float:
         """Area inside the boundary, m²."""
@@ -158,6 +206,26 @@ class Environment:
     def free_area(self) -> float:
         """Area of the free space, m²."""
         return float(self.free.area)
+
+    @cached_property
+    def free_masses(self) -> Array:
+        """Integral of φ over each component of the free space, m²: their areas without a density."""
+        parts = self.free.geoms
+        if self.density is None or self.density.uniform:
+            weight = 1.0 if self.density is None else self.density.highest
+            return frozen([part.area * weight for part in parts])
+        return frozen(masses_of_polygons(self.density, list(parts)))
+
+    def weighed(self, density: Density | None) -> Environment:
+        """Return the same map with another density; what is derived from its geometry is kept."""
+        twin = replace(self, density=density)
+        kept = ("region", "boundary_polygon", "free", "blocked")
+        twin.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
+        return twin
+
+    def same_place(self, other: Environment) -> bool:
+        """Return whether another map has the same boundary and obstacles."""
+        return self.boundary == other.boundary and self.obstacles == other.obstacles
 
     def start(self, name: str | None = None) -> Start:
         """Return the start called `name`, by default the map's first.
@@ -212,6 +280,11 @@ class Environment:
         """Show the map where there is no HTML."""
         backend = displaying_backend()
         return None if backend is None else backend.environment_png(self)
+
+
+def _moved(points: Ring, by: Array) -> Ring:
+    dx, dy = by.tolist()
+    return tuple((x + dx, y + dy) for x, y in points)
 
 
 def _polygons(geometry: BaseGeometry) -> MultiPolygon:

@@ -1,4 +1,4 @@
-"""Groups of entries in flat arrays: where they begin, which numbers they run over, the least of each."""
+"""Groups of entries in flat arrays: where they begin, which numbers they run over, the least, the mean."""
 
 from __future__ import annotations
 
@@ -68,3 +68,15 @@ def least(target: IntArray, value: Array, best: Array, *labels: tuple[IntArray, 
     hit = (value == best[target]).nonzero()[0][::-1]
     for label, given in labels:
         label[target[hit]] = given[hit]
+
+
+def weighted_mean(values: Array, weights: Array | None = None) -> float:
+    """Return the weighted mean of (m,) values, of none, or of none with a weight, nan.
+
+    >>> weighted_mean(np.array([1.0, 4.0]), np.array([2.0, 1.0]))
+    2.0
+    """
+    if weights is None:
+        return float(values.mean()) if len(values) else np.nan
+    total = float(weights.sum())
+    return float(weights @ values) / total if total > 0.0 else np.nan

@@ -61,6 +61,12 @@ class MapReport:
     starts : tuple of StartReport
     warnings : tuple of str
         What may be a mistake, one line each.
+    density : str or None
+        Which kind of density there is; None where every place counts the same, for want of one.
+    density_range : (lowest, highest) or None
+        Bounds of its values.
+    mean_density : float
+        Its mean over the free space.
     """
 
     name: str
@@ -72,6 +78,9 @@ class MapReport:
     narrowest_gap: Gap | None
     starts: tuple[StartReport, ...]
     warnings: tuple[str, ...]
+    density: str | None = None
+    density_range: tuple[float, float] | None = None
+    mean_density: float = 1.0
 
     @property
     def free_fraction(self) -> float:
@@ -92,6 +101,9 @@ class MapReport:
             "narrowest_gap_m": None if gap is None else gap.width,
             "narrowest_gap_between": None if gap is None else [list(point) for point in gap.between],
             "starts": {start.name: {"kind": start.kind, "capacity": start.capacity} for start in self.starts},
+            "density": self.density,
+            "density_range": None if self.density_range is None else list(self.density_range),
+            "mean_density": self.mean_density,
             "warnings": list(self.warnings),
         }
 
@@ -120,6 +132,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
             f"a robot of radius {radius:g} m does not pass"
         )
     warnings += _start_warnings(environment, radius)
+    density = environment.density
     return MapReport(
         name=environment.name,
         area=environment.area,
@@ -130,6 +143,9 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
         narrowest_gap=gap,
         starts=tuple(_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(warnings),
+        density=None if density is None else density.kind,
+        density_range=None if density is None else (density.lowest, density.highest),
+        mean_density=float(environment.free_masses.sum()) / environment.free_area,
     )
 
 

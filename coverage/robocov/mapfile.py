@@ -7,10 +7,12 @@ import math
 import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from robocov.densityfile import density_document, density_from
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
 from robocov.errors import MapError, OutputError, unknown_name
+from robocov.mapfields import TINY as _TINY
 from robocov.mapmodels import (
     FORMAT,
     VERSION,
@@ -22,13 +24,20 @@ from robocov.mapmodels import (
     StartModel,
     map_schema,
     validate,
+    validate_density,
 )
 from robocov.maprules import check_rules
+from robocov.obstacle_path import ObstaclePath
 from robocov.starts import DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.strictjson import located, one_line, parse, read_bytes, require_json
 
+if TYPE_CHECKING:
+    from robocov.density import Density
+    from robocov.densitymodels import DensityModel
+
 __all__ = [
     "bundled_maps",
+    "density_of",
     "dump_document",
     "dump_map",
     "from_json",
@@ -45,15 +54,14 @@ _LINE = 100
 
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
+_MEASURED = ("boundary", "obstacles", "starts", "density")
+"""Keys of numbers that `dump_map` writes short."""
+
 _DIGITS = 9
 """Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
 
 _NOISE = 16
 """What a few sums and a rotation miss a decimal by at most, in units of the last place (of 1 m at least)."""
-
-
-_TINY = 1e-100
-"""Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
 
 
 def load_map(source: str | Path) -> Environment:
@@ -76,7 +84,7 @@ def load_map(source: str | Path) -> Environment:
     100.0
     """
     path = map_file(source)
-    return parse_map(read_bytes(path), str(path))
+    return parse_map(read_bytes(path), str(path), path.parent)
 
 
 def map_file(source: str | Path) -> Path:
@@ -97,8 +105,8 @@ def map_file(source: str | Path) -> Path:
     raise MapError(unknown_name("map", source, known))
 
 
-def parse_map(text: str | bytes, where: str) -> Environment:
-    """Return the map in the JSON `text`; messages call it `where`.
+def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
+    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures.
 
     Raises
     ------
@@ -107,13 +115,13 @@ def parse_map(text: str | bytes, where: str) -> Environment:
     """
     document = parse(text, where)
     try:
-        return _environment(document, one_line(where))
+        return _environment(document, one_line(where), folder)
     except MapError as error:
         raise located(error, text, where) from None
 
 
-def from_json(document: dict[str, Any], where: str = "map") -> Environment:
-    """Return the map in a parsed JSON `document`; messages call it `where`.
+def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
+    """Return the map in a parsed JSON `document`; messages call it `where`, and `folder` holds its pictures.
 
     Raises
     ------
@@ -122,7 +130,7 @@ def from_json(document: dict[str, Any], where: str = "map") -> Environment:
     """
     where = one_line(where)
     require_json(document, where)
-    return _environment(document, where)
+    return _environment(document, where, folder)
 
 
 def to_json(environment: Environment) -> dict[str, Any]:
@@ -137,6 +145,8 @@ def to_json(environment: Environment) -> dict[str, Any]:
     document["boundary"] = _points(environment.boundary)
     document["obstacles"] = [_obstacle_document(obstacle) for obstacle in environment.obstacles]
     document["starts"] = {name: _start_document(spec) for name, spec in environment.starts.items()}
+    if environment.density is not None:
+        document["density"] = density_document(environment.density)
     if environment.extra:
         document["extra"] = dict(environment.extra)
     return document
@@ -155,7 +165,7 @@ def dump_map(environment: Environment) -> str:
 def _file_document(environment: Environment) -> dict[str, Any]:
     """Return what stands in a map file."""
     document = to_json(environment)
-    return document | {key: _short(document[key]) for key in ("boundary", "obstacles", "starts")}
+    return document | {key: _short(document[key]) for key in _MEASURED if key in document}
 
 
 def _short(value: Any) -> Any:
@@ -177,9 +187,7 @@ def dump_document(document: dict[str, Any]) -> str:
     How it is broken into lines does not depend on the lengths of its numbers: in the next version of a
     file, a vertex that has moved changes one line.
     """
-    document = document | {
-        key: _short(document[key]) for key in ("boundary", "obstacles", "starts") if key in document
-    }
+    document = document | {key: _short(document[key]) for key in _MEASURED if key in document}
     lines = []
     for key, value in document.items():
         if key in ("obstacles", "starts"):
@@ -245,16 +253,18 @@ def _is_name(source: str) -> bool:
     return not any(char in source for char in "./\\\0")
 
 
-def _environment(document: object, where: str) -> Environment:
+def _environment(document: object, where: str, folder: Path | None = None) -> Environment:
     model = validate(document, where)
+    boundary = _ring(model.boundary)
     environment = Environment(
         name=model.name,
-        boundary=_ring(model.boundary),
+        boundary=boundary,
         obstacles=tuple(_obstacle(item) for item in model.obstacles),
         starts={name: _start(item) for name, item in model.starts.items()},
         description=model.description,
         extra=_plain(model.extra),
         schema=model.schema_,
+        density=None if model.density is None else _density(model.density, boundary, folder, where),
     )
     check_rules(environment, where)
     return environment
@@ -266,12 +276,42 @@ def _ring(vertices: list[list[float]]) -> Ring:
     return tuple((x, y) for x, y in vertices)
 
 
+def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
+    """Return the density that the JSON value at a map's ``density`` stands for.
+
+    Parameters
+    ----------
+    value : object
+    boundary : ring of [x, y], m
+        A raster that does not say what it covers covers its bounding box.
+    where : str
+        What messages call the map.
+    folder : Path or None
+        That holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    return _density(validate_density(value, where), boundary, folder, where)
+
+
+def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
+    x, y = zip(*boundary, strict=True)
+    return density_from(model, (min(x), min(y), max(x), max(y)), folder, where)
+
+
 def _obstacle(model: ObstacleModel) -> Obstacle:
+    path = None
+    if model.path is not None:
+        path = ObstaclePath(_ring(model.path.points), model.path.speed, model.path.repeat)
     if isinstance(model, PolygonModel):
-        return PolygonObstacle(_ring(model.vertices), tuple(_ring(hole) for hole in model.holes), model.name)
+        holes = tuple(_ring(hole) for hole in model.holes)
+        return PolygonObstacle(_ring(model.vertices), holes, model.name, path)
     if isinstance(model, CircleModel):
-        return CircleObstacle(_ring([model.center])[0], model.radius, model.name)
-    return WallObstacle(_ring(model.points), model.width, model.name)
+        return CircleObstacle(_ring([model.center])[0], model.radius, model.name, path)
+    return WallObstacle(_ring(model.points), model.width, model.name, path)
 
 
 def _start(model: StartModel) -> StartSpec:
@@ -313,6 +353,13 @@ def _obstacle_document(obstacle: Obstacle) -> dict[str, Any]:
         document = {"kind": "wall", "points": _points(obstacle.points), "width": _number(obstacle.width)}
     if obstacle.name is not None:
         document = {"kind": document.pop("kind"), "name": obstacle.name, **document}
+    path = obstacle.path
+    if path is not None:
+        document["path"] = {
+            "points": _points(path.points),
+            "speed": _number(path.speed),
+            "repeat": path.repeat,
+        }
     return document
 
 
@@ -352,7 +399,11 @@ def _expanded(value: dict[str, Any] | list[Any], indent: str) -> str:
         items = []
         for key, item in value.items():
             head = f"{_compact(key)}: "
-            items.append(head + _text(item, inner, len(inner) + len(head)))
+            # the rows of a raster are no points: one on a line
+            rows = key == "rows" and isinstance(item, list) and len(item) > 1
+            items.append(
+                head + (_expanded(item, inner) if rows else _text(item, inner, len(inner) + len(head)))
+            )
         left, right = "{", "}"
     else:
         items = [_text(item, inner, len(inner)) for item in value]

@@ -5,49 +5,75 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from robocov import densitymodels
+from robocov.densitymodels import DensityModel
 from robocov.errors import unknown_name
+from robocov.mapfields import COORDINATE as _COORDINATE
+from robocov.mapfields import FARTHEST as FARTHEST
+from robocov.mapfields import LABEL as _LABEL
+from robocov.mapfields import LARGEST as LARGEST
+from robocov.mapfields import (
+    LONGEST_LABEL,
+    Label,
+    Model,
+    Size,
+    Vertex,
+    VertexRing,
+    kind_field,
+)
+from robocov.mapfields import POINT as _POINT
+from robocov.mapfields import RING as _RING
+from robocov.mapfields import SIZE as _SIZE
+from robocov.mapfields import SMALLEST as SMALLEST
 from robocov.mistakes import MOST_LISTED, Mistake, place, refusal
 from robocov.strictjson import shown_json
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
+    from robocov.errors import MapError
+
 FORMAT = "robocov-map"
 VERSION = 1
-SMALLEST = 1e-3
-"""Smallest size of anything in metres."""
-LARGEST = 1e4
-"""Largest size of anything in metres."""
-FARTHEST = 1e7
-"""Largest coordinate in metres: national grids fit, and a micrometre still counts."""
+SLOWEST = 1e-3
+"""Smallest speed of an obstacle in m/s."""
+FASTEST = 10.0
+"""Largest speed of an obstacle in m/s."""
 
-_LONGEST_LABEL = 100
-_NAME = r"^[^\x00-\x1f\x7f]+$"
 
-Coordinate: TypeAlias = Annotated[
-    float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST, description="metres")
+class PathModel(Model, title="path"):
+    """The path of an obstacle that moves: it is shifted as its point goes along the line, and never turns."""
+
+    points: list[Vertex] = Field(
+        min_length=2,
+        description="The line; at time zero its point is at the first, and the obstacle where it is drawn",
+        examples=[[[2, 1], [8, 1]]],
+    )
+    speed: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SLOWEST, le=FASTEST)] = Field(
+        description="Metres a second", examples=[0.5]
+    )
+    repeat: Literal["loop", "back-and-forth"] = Field(
+        "loop",
+        description="From the last point straight to the first, or back the way it came",
+        examples=["back-and-forth"],
+    )
+
+
+PathField: TypeAlias = Annotated[
+    PathModel | None,
+    Field(
+        description="How it moves; without it, it stands",
+        examples=[{"points": [[2, 1], [8, 1]], "speed": 0.5}],
+    ),
 ]
-Size: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
-Vertex: TypeAlias = Annotated[list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]])]
-VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3)]
-Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_LABEL, pattern=_NAME)]
 
 
-def _kind(name: str) -> Any:
-    """Return the field that says which kind of obstacle or start an object is."""
-    return Field(description="Which kind it is; the other keys follow from it", examples=[name])
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=False)
-
-
-class PolygonModel(_Model, title="polygon"):
+class PolygonModel(Model, title="polygon"):
     """A solid polygon, with holes where given."""
 
-    kind: Literal["polygon"] = _kind("polygon")
+    kind: Literal["polygon"] = kind_field("polygon")
     name: Label | None = Field(None, description="What it is, for people", examples=["desk"])
     vertices: VertexRing = Field(
         description="Corners in order, either way round, the first not repeated",
@@ -58,46 +84,49 @@ class PolygonModel(_Model, title="polygon"):
         description="Rings inside that are free, such as courtyards",
         examples=[[[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]],
     )
+    path: PathField = None
 
 
-class CircleModel(_Model, title="circle"):
+class CircleModel(Model, title="circle"):
     """A round pillar."""
 
-    kind: Literal["circle"] = _kind("circle")
+    kind: Literal["circle"] = kind_field("circle")
     name: Label | None = Field(None, description="What it is, for people", examples=["pillar"])
     center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
     radius: Size = Field(description="Its radius in metres", examples=[0.5])
+    path: PathField = None
 
 
-class WallModel(_Model, title="wall"):
+class WallModel(Model, title="wall"):
     """A poly-line of some width, with flat ends."""
 
-    kind: Literal["wall"] = _kind("wall")
+    kind: Literal["wall"] = kind_field("wall")
     name: Label | None = Field(None, description="What it is, for people", examples=["west wall"])
     points: list[Vertex] = Field(
         min_length=2, description="The middle line, from end to end", examples=[[[5, 0], [5, 2.4]]]
     )
     width: Size = Field(description="Its width in metres", examples=[0.1])
+    path: PathField = None
 
 
-class DiscModel(_Model, title="disc start"):
+class DiscModel(Model, title="disc start"):
     """The robots start somewhere in a disc."""
 
-    kind: Literal["disc"] = _kind("disc")
+    kind: Literal["disc"] = kind_field("disc")
     center: Vertex = Field(description="The disc's centre [x, y] in metres", examples=[[1, 1]])
     radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
 
 
-class UniformModel(_Model, title="uniform start"):
+class UniformModel(Model, title="uniform start"):
     """The robots start anywhere in the free space."""
 
-    kind: Literal["uniform"] = _kind("uniform")
+    kind: Literal["uniform"] = kind_field("uniform")
 
 
-class PointsModel(_Model, title="points start"):
+class PointsModel(Model, title="points start"):
     """The robots start at given positions."""
 
-    kind: Literal["points"] = _kind("points")
+    kind: Literal["points"] = kind_field("points")
     positions: list[Vertex] = Field(
         min_length=1, description="One [x, y] a robot, in metres", examples=[[[1, 1], [1.5, 1]]]
     )
@@ -111,7 +140,7 @@ StartModel: TypeAlias = Annotated[
 ]
 
 
-class MapModel(_Model, title="robocov map"):
+class MapModel(Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
 
     schema_: Annotated[str, Field(strict=True)] | None = Field(
@@ -137,6 +166,13 @@ class MapModel(_Model, title="robocov map"):
         description="Named starts; the first is the default",
         examples=[{"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}],
     )
+    density: DensityModel | None = Field(
+        None,
+        description="How much each place counts; without it every place the same",
+        examples=[
+            {"kind": "gaussians", "floor": 0.2, "peaks": [{"center": [7.5, 3], "sigma": 1.5, "weight": 4}]}
+        ],
+    )
     extra: dict[str, Any] = Field(
         {}, description="Free keys of yours; kept untouched", examples=[{"author": "Ada"}]
     )
@@ -153,7 +189,7 @@ def map_schema() -> dict[str, Any]:
         "type": "string",
         "pattern": pattern,
         "minLength": 1,
-        "maxLength": _LONGEST_LABEL,
+        "maxLength": LONGEST_LABEL,
     }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
@@ -170,11 +206,34 @@ def validate(document: object, where: str) -> MapModel:
     try:
         return MapModel.model_validate(document)
     except ValidationError as error:
-        details = error.errors(include_url=False, include_context=False)
+        raise _refusal(error, where) from None
+
+
+def validate_density(value: object, where: str) -> DensityModel:
+    """Return the value at a map's ``density`` as a model.
+
+    Raises
+    ------
+    MapError
+        As `validate`.
+    """
+    try:
+        return _Weighed.model_validate({"density": value}).density
+    except ValidationError as error:
+        raise _refusal(error, where) from None
+
+
+class _Weighed(Model):
+    density: DensityModel
+
+
+def _refusal(error: ValidationError, where: str) -> MapError:
+    """Return the error of a document with structural mistakes."""
+    details = error.errors(include_url=False, include_context=False)
     # a misspelt key is also a missing one: naming the key that is there helps more
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     listed = [_mistake(detail) for detail in details[:MOST_LISTED]]
-    raise refusal(where, listed, len(details) - len(listed))
+    return refusal(where, listed, len(details) - len(listed))
 
 
 def check_header(document: object, where: str) -> None:
@@ -199,16 +258,11 @@ def check_header(document: object, where: str) -> None:
         raise refusal(where, [Mistake.at(("version",), f"{state}, but {VERSION} was wanted{advice}")])
 
 
-_CHOICES: dict[str, dict[str, type[_Model]]] = {
+_CHOICES: dict[str, dict[str, type[Model]]] = {
     "obstacles": {"polygon": PolygonModel, "circle": CircleModel, "wall": WallModel},
     "starts": {"disc": DiscModel, "uniform": UniformModel, "points": PointsModel},
 }
 
-_POINT = "a point [x, y] in metres"
-_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
-_SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
-_RING = "a list of at least 3 points [x, y]"
-_LABEL = f"a text of 1 to {_LONGEST_LABEL} characters on one line"
 _WANTED: dict[str, tuple[str, ...]] = {
     # what is wanted at a key, in its items, in their items, ...
     "boundary": (_RING, _POINT, _COORDINATE),
@@ -224,6 +278,9 @@ _WANTED: dict[str, tuple[str, ...]] = {
     "extra": ("an object",),
     "$schema": ("a text",),
     "obstacles": ("a list of obstacles",),
+    "path": ("an object with points and speed",),
+    "speed": (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",),
+    "repeat": ('"loop" or "back-and-forth"',),
     "starts": ("an object of named starts",),
 }
 
@@ -232,13 +289,21 @@ def _mistake(detail: ErrorDetails) -> Mistake:
     """Return one structural error in the project's words: place, value, what was wanted."""
     loc, value = list(detail["loc"]), detail["input"]
     group = _CHOICES.get(str(loc[0]))
-    model: type[_Model] = MapModel
-    if group is not None and len(loc) > 2:
+    model: type[Model] = MapModel
+    if loc[0] == "density":
+        if len(loc) == 1:
+            return _kind_mistake(tuple(loc), value, list(densitymodels.KINDS))
+        model = densitymodels.KINDS[str(loc.pop(1))]
+        if len(loc) > 3:
+            model = densitymodels.PARTS.get(str(loc[1]), model)
+    elif group is not None and len(loc) > 2:
         if loc[-1] == "[key]":
             text = f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
             return Mistake(tuple(loc[:-1]), text, at_key=True)
         # pydantic names the chosen kind as a step of the path
         model = group[str(loc.pop(2))]
+        if len(loc) > 3 and loc[2] == "path":
+            model = PathModel
     elif group is not None and len(loc) == 2:
         return _kind_mistake(tuple(loc), value, list(group))
     if detail["type"] == "extra_forbidden":
@@ -248,12 +313,13 @@ def _mistake(detail: ErrorDetails) -> Mistake:
         return Mistake(tuple(loc), f"{at}{unknown_name('key', str(key), known)}", at_key=True)
     found = "missing" if detail["type"] == "missing" else shown_json(value)
     steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
-    wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
+    words = densitymodels.WANTED if loc[0] == "density" else _WANTED
+    wanted = words[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
     return Mistake.at(tuple(loc), f"{found}, but {wanted} was wanted")
 
 
 def _kind_mistake(path: tuple[str | int, ...], value: object, kinds: list[str]) -> Mistake:
-    """Return what is wrong with an obstacle or a start whose kind is not known."""
+    """Return what is wrong with an obstacle, a start or a density whose kind is not known."""
     wanted = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
         return Mistake.at(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from robocov.density import WeightedArea, WeightedPolygons
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import StartError
 from robocov.mapmodels import LARGEST, SMALLEST
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.environment import Ring
     from robocov.mistakes import Path
+    from robocov.obstacle_path import ObstaclePath
 
 _FLAT = 1e-9
 """A ring whose area is below this part of its bounding box squared is a line."""
@@ -43,6 +45,11 @@ def check_rules(environment: Environment, where: str) -> None:
     found = list(_ring_mistakes(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
         found += _obstacle_mistakes(("obstacles", k), obstacle)
+        if obstacle.path is not None:
+            found += _path_mistakes(("obstacles", k, "path"), obstacle.path)
+    if isinstance(environment.density, WeightedPolygons):
+        for k, area in enumerate(environment.density.areas):
+            found += _area_mistakes(("density", "areas", k), area)
     if not found:
         found = list(_space_mistakes(environment))
     if found:
@@ -124,6 +131,22 @@ def _obstacle_mistakes(
             yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
 
 
+def _area_mistakes(at: Path, area: WeightedArea) -> Iterator[Mistake]:
+    """Yield what is wrong with the outline of a weighted area."""
+    yield from _obstacle_mistakes(at, PolygonObstacle(area.vertices, area.holes))
+
+
+def _path_mistakes(at: Path, path: ObstaclePath) -> Iterator[Mistake]:
+    """Yield what is wrong with the path of an obstacle."""
+    extent = np.ptp(np.asarray(path.points, dtype=float), axis=0)
+    if extent.max() > LARGEST:
+        size = f"{extent[0]:g} x {extent[1]:g} m"
+        yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
+    elif extent.max() < SMALLEST:
+        what = f"a path {extent.max():g} m wide, but at least {SMALLEST * 1000:g} mm was wanted"
+        yield Mistake.at((*at, "points"), what)
+
+
 def _hole_mistakes(at: Path, obstacle: PolygonObstacle) -> Iterator[Mistake]:
     """Yield what is wrong with the holes of a polygon whose rings are good one by one."""
     if obstacle.polygon.is_valid:
@@ -151,6 +174,9 @@ def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
         what = "no free space is left inside the boundary, but some was wanted"
         yield Mistake.at(("obstacles",), what)
         return
+    if environment.density is not None and not environment.free_masses.sum() > 0.0:
+        what = "all places in the free space count 0, but a weight above 0 was wanted"
+        yield Mistake.at(("density",), what)
     for name in environment.starts:
         yield from _start_mistakes(environment, name)
 

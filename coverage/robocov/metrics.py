@@ -12,11 +12,12 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.drawing import drawing_backend
 from robocov.errors import counted
+from robocov.momentary_cost import MomentaryCost
 from robocov.moments import nearest_moments
 from robocov.neighbours import close_pairs
 from robocov.record import Record
 from robocov.sensor import RangeSensor
-from robocov.solid import solid_pieces
+from robocov.solid import movers, solid_pieces
 
 SETTLED_WINDOW = 4.0
 """Seconds over which a robot at rest must not get anywhere."""
@@ -32,6 +33,9 @@ _FEW = 100
 
 _AT_ONCE = 1 << 18
 """Pairs of robots that are looked at at once, over some moments."""
+
+MOVING_RATE = 1.0
+"""Samples of the coverage cost per simulated second, at most, where obstacles move."""
 
 STUCK_WINDOW = 5.0
 """Seconds at the end over which a stuck robot gets nowhere."""
@@ -53,12 +57,16 @@ class CostHistory:
     mean_distance : (K,) m
     cost : (K,) m³
     uncovered_area : (K,) m²
+    mean_time : (K,) s or None
+        Mean time until the first robot is at a place, each at its own largest speed; None where all are
+        equally fast.
     """
 
     time: Array
     mean_distance: Array
     cost: Array
     uncovered_area: Array
+    mean_time: Array | None = None
 
     def __repr__(self) -> str:
         first, last = self.mean_distance[[0, -1]].tolist()
@@ -100,28 +108,42 @@ def cost_history(
 ) -> CostHistory:
     """Evaluate the coverage cost along a record.
 
+    Robots count while they work, and obstacles that move stand where they are at each moment.
+
     Parameters
     ----------
     record : Record
     cost : CoverageCost
         Of the record's environment.
     rate : float, Hz
-        Samples per simulated second; the last moment is always one.
+        Samples per simulated second; the last moment is always one. At most `MOVING_RATE` where obstacles
+        move, for each moment then has a map of its own.
     on_sample : callable
         Called after every evaluation, for progress.
     """
     moments = sample_moments(record, rate)
     rows = np.empty((len(moments), 3))
+    speeds = record.team.max_speed if record.team.mixed_speeds else None
+    times = None if speeds is None else np.full(len(moments), np.nan)
+    momentary = MomentaryCost(cost)
     for row, k in enumerate(moments):
-        result = cost(record.positions[k])
-        rows[row] = result.mean_distance, result.value, result.uncovered_area
+        working = None if record.conditions is None else record.working[k]
+        now = float(record.time[k]), record.positions[k], working
+        rows[row] = momentary.figures(*now)
+        if times is not None and (first := momentary(*now, speeds)) is not None:
+            times[row] = first.mean_time
         if on_sample is not None:
             on_sample()
-    return CostHistory(record.time[moments], rows[:, 0], rows[:, 1], rows[:, 2])
+    return CostHistory(record.time[moments], rows[:, 0], rows[:, 1], rows[:, 2], times)
 
 
 def sample_moments(record: Record, rate: float) -> list[int]:
-    """Return the numbers of the moments nearest to multiples of 1/rate seconds, and of the last."""
+    """Return the numbers of the moments nearest to multiples of 1/rate seconds, and of the last.
+
+    Where obstacles move, the rate is `MOVING_RATE` at most.
+    """
+    if record.environment.moves:
+        rate = min(rate, MOVING_RATE)
     return [int(k) for k in nearest_moments(record.time, rate)]
 
 
@@ -216,8 +238,11 @@ def stuck_robots(
 def clearances(record: Record) -> Array:
     """Return the gap between each robot's rim and the nearest wall at each moment, (T, n) m.
 
-    What the robots sensed is used where they sensed something; the rest is asked for here.
+    What the robots sensed is used where they sensed something, and that was right; the rest is asked for
+    here. Of robots that do not work there is none: inf.
     """
+    if record.conditions is not None or record.environment.moves:
+        return _clearances_asked_for(record)
     positions = record.positions.reshape(-1, 2)
     nearest = record.obstacle_points.reshape(-1, 2).copy()
     left = np.flatnonzero(np.isnan(nearest[:, 0]))
@@ -232,6 +257,21 @@ def clearances(record: Record) -> Array:
     return np.asarray(gap - record.team.radius)
 
 
+def _clearances_asked_for(record: Record) -> Array:
+    """Return the same where the robots sensed what was not there, or what is there changes."""
+    environment, working, radius = record.environment, record.working, record.team.radius
+    sensor = RangeSensor(solid_pieces(environment), movers(environment))
+    failed = record.present & ~working
+    reach = np.full(len(radius), float(np.hypot(*np.ptp(environment.region.vertices, axis=0))))
+    gap = np.full(working.shape, np.inf)
+    for k, places in enumerate(record.positions):
+        sensor.show(float(record.time[k]), np.column_stack([places, radius])[failed[k]])
+        rows = np.flatnonzero(working[k])
+        nearest = sensor.nearest(places[rows], reach[rows])
+        gap[k, rows] = np.sqrt(((places[rows] - nearest) ** 2).sum(axis=1)) - radius[rows]
+    return gap
+
+
 def contacts(record: Record, clearance: Array) -> int:
     """Return how many times a robot began to touch a wall or another robot.
 
@@ -239,13 +279,17 @@ def contacts(record: Record, clearance: Array) -> int:
     ----------
     record : Record
     clearance : (T, n) m
-        What `clearances` returns.
+        What `clearances` returns. A robot that has failed is a wall.
     """
     touching = clearance <= TOUCHING
     walls = int(touching[0].sum() + (touching[1:] & ~touching[:-1]).sum())
     radius = record.team.radius
     count = _meetings if len(radius) <= _FEW else _meetings_of_many
-    return walls + count(record.positions, radius)
+    positions = record.positions
+    if record.conditions is not None:
+        # who works may touch who does; what failed counts as a wall
+        positions = np.where(record.working[:, :, None], positions, np.nan)
+    return walls + count(positions, radius)
 
 
 def _meetings(positions: Array, radius: Array) -> int:
@@ -270,7 +314,9 @@ def _meetings_of_many(positions: Array, radius: Array) -> int:
     began = 0
     before: set[tuple[int, int]] = set()
     for now in positions:
-        first, second, distance = close_pairs(now, reach)
+        rows = np.flatnonzero(~np.isnan(now[:, 0]))
+        first, second, distance = close_pairs(now[rows], reach)
+        first, second = rows[first], rows[second]
         near = (first < second) & (distance <= radius[first] + radius[second] + TOUCHING)
         pairs = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
         began += len(pairs - before)
@@ -284,6 +330,7 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     return {
         "mean_distance_m": float(history.mean_distance[-1]),
         "mean_distance_over_run_m": mean_over_run(history.time, history.mean_distance),
+        **({} if history.mean_time is None else {"mean_time_s": float(history.mean_time[-1])}),
         "cost_m3": float(history.cost[-1]),
         "uncovered_area_m2": float(history.uncovered_area[-1]),
         "settled_at_s": settled_at(record.time, record.positions),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
 
 _BRUTE_FORCE_BELOW = 48
 """Teams smaller than this find close pairs by all distances: cheaper than a tree."""
@@ -48,10 +48,16 @@ class Neighbours:
             return cls(n)
         first, second, distance = close_pairs(positions, float(min(ranges.max(), 1e12)))
         linked = distance <= np.minimum(ranges[first], ranges[second])
-        first, second = first[linked], second[linked]
-        indptr = np.zeros(n + 1, dtype=np.intp)
-        np.cumsum(np.bincount(first, minlength=n), out=indptr[1:])
-        return cls(n, ranges, indptr, second)
+        return cls.of_pairs(n, first[linked], second[linked], ranges)
+
+    @classmethod
+    def of_pairs(
+        cls, count: int, robot: IntArray, neighbour: IntArray, ranges: Array | None = None
+    ) -> Neighbours:
+        """Return who hears whom from the directed pairs, sorted by robot, then neighbour."""
+        indptr = np.zeros(count + 1, dtype=np.intp)
+        np.cumsum(np.bincount(robot, minlength=count), out=indptr[1:])
+        return cls(count, ranges, indptr, neighbour)
 
     @property
     def complete(self) -> bool:
@@ -63,6 +69,32 @@ class Neighbours:
         if self.indptr is None or self.indices is None:
             return np.delete(np.arange(self.count), robot)
         return self.indices[self.indptr[robot] : self.indptr[robot + 1]]
+
+    def row(self, robot: int) -> slice:
+        """Return where in `indices` the robots are that `robot` hears; not of the complete graph."""
+        assert self.indptr is not None
+        return slice(int(self.indptr[robot]), int(self.indptr[robot + 1]))
+
+    def pairs(self) -> tuple[IntArray, IntArray]:
+        """Return all directed pairs (robot, neighbour), (m,) each, in the order of the rows."""
+        if self.indptr is None or self.indices is None:
+            others = ~np.eye(self.count, dtype=bool)
+            robot, neighbour = np.nonzero(others)
+            return robot, neighbour
+        return np.repeat(np.arange(self.count), np.diff(self.indptr)), self.indices
+
+    def among(self, working: BoolArray) -> Neighbours:
+        """Return who of the robots that work hears whom; the others neither hear nor are heard.
+
+        Parameters
+        ----------
+        working : (n,) bool
+        """
+        if working.all():
+            return self
+        first, second = self.pairs()
+        both = working[first] & working[second]
+        return Neighbours.of_pairs(self.count, first[both], second[both], self.ranges)
 
     def closer_than(self, positions: Array, reach: float) -> tuple[IntArray, IntArray, Array]:
         """Return the directed pairs of neighbours at most `reach` metres apart.

@@ -209,7 +209,7 @@ class _Search:
     component : (c,)
         Which component of the free space holds them.
     table : (c, m) m
-        Sum of the geodesic distances from each to the sites of each target.
+        Sum of the geodesic distances from each to the sites of each target, by the weights of these.
     """
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
@@ -248,9 +248,10 @@ class _Search:
         site = np.nonzero(wanted)[0]
         site = site[np.lexsort((chance[site], off[site], square[site]))]
         _, first, count = np.unique(square[site], return_index=True, return_counts=True)
+        weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
         table = cost.geodesics.distances(self.places, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHED * cost.geodesics.size
-        return table * count
+        return np.asarray(table * weight)
 
     def sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
         """Return the sources where one restart ends on the table, sorted, (n,).

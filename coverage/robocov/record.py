@@ -6,15 +6,17 @@ import json
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.atomic import written
-from robocov.controllers import CONTROLLERS, gain_values
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS
 from robocov.drawing import displaying_backend, drawing_backend
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, counted, shown
@@ -23,11 +25,13 @@ from robocov.moments import nearest_moments
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.robots import Team
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.weighted_cells import WeightedCells, weighted_partition
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from robocov.controllers.base import Controller
+    from robocov.controllers.gains import Value
 
 _COLUMNS = {
     "positions": ("x_m", "y_m"),
@@ -71,13 +75,15 @@ class Record:
     session : dict
         Where the run comes from, if it is a part of a session in the window and was not simply begun and
         left alone; see `robocov_app.demo.kept`. Empty otherwise.
+    conditions : Conditions or None
+        Under which it went; None: ideal ones.
     """
 
     environment: Environment
     team: Team
     controller: str
     label: str
-    gains: Mapping[str, float | None]
+    gains: Mapping[str, Value]
     start: str | None
     seed: int | None
     dt: float
@@ -88,6 +94,21 @@ class Record:
     goals: Array
     obstacle_points: Array
     session: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Conditions | None = None
+
+    @cached_property
+    def working(self) -> BoolArray:
+        """Which robots were there and had not failed, (T, n) bool."""
+        if self.conditions is None:
+            return np.ones(self.positions.shape[:2], dtype=bool)
+        return self.conditions.working(self.time, len(self.team))
+
+    @cached_property
+    def present(self) -> BoolArray:
+        """Which robots were there, whether they worked or had failed, (T, n) bool."""
+        if self.conditions is None:
+            return np.ones(self.positions.shape[:2], dtype=bool)
+        return self.conditions.present(self.time, len(self.team))
 
     def __len__(self) -> int:
         return len(self.time)
@@ -96,19 +117,42 @@ class Record:
         robots = counted(len(self.team), "robot")
         return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
 
+    @property
+    def by_time(self) -> bool:
+        """Whether the law divided the region by the time to a place, and that differs from by distance."""
+        return self.gains.get("cells") == "time" and self.team.mixed_speeds
+
+    def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
+        """Return the cells of moment number `k` as the law divided the region, with everybody heard.
+
+        Only robots that worked then have cells, and are counted.
+        By the time to a place where the law's gain ``cells`` says so, else by distance.
+        """
+        working = slice(None) if self.conditions is None else self.working[k]
+        positions, environment = self.positions[k][working], self.environment
+        if self.by_time:
+            speeds = self.team.max_speed[working]
+            return weighted_partition(positions, speeds, environment.region, density=environment.density)
+        return partition(positions, environment.region, density=environment.density)
+
     def snapshot(self, k: int) -> Snapshot:
         """Return the moment number `k` as far as it was recorded: without force terms and cells."""
         positions = self.positions[k]
+        working = None if self.conditions is None else self.working[k]
+        neighbours = Neighbours.within(positions, self.team.communication_range)
         seen = Observations(
             positions=positions,
             velocities=self.velocities[k],
-            neighbours=Neighbours.within(positions, self.team.communication_range),
+            neighbours=neighbours if working is None else neighbours.among(working),
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),
+            max_speeds=self.team.max_speed,
+            density=self.environment.density,
         )
         goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
-        return Snapshot(seen, Decision(forces=self.forces[k], goals=goals))
+        cells = self.cells(k) if self.by_time else None
+        return Snapshot(seen, Decision(forces=self.forces[k], goals=goals, cells=cells), working=working)
 
     def at(self, time: float) -> Snapshot:
         """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
@@ -260,6 +304,7 @@ class Record:
             "dt_s": self.dt,
             "duration_s": float(self.time[-1]),
             "lattice": lattice,
+            **({"conditions": self.conditions.to_dict()} if self.conditions else {}),
             **({"session": dict(self.session)} if self.session else {}),
             "versions": versions(),
             "summary": dict(summary or {}),
@@ -312,6 +357,7 @@ class Record:
                 seed=run["seed"],
                 dt=float(run["dt_s"]),
                 session=dict(run.get("session", {})),
+                conditions=Conditions.from_dict(run["conditions"]) if run.get("conditions") else None,
                 **arrays,
             )
         except FileNotFoundError as error:
@@ -329,70 +375,6 @@ class Record:
                     f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted"
                 )
         return record
-
-
-class Recorder:
-    """Collects snapshots into a `Record`; what was collected can be had at any time.
-
-    Parameters
-    ----------
-    environment : Environment
-    team : Team
-    controller : Controller
-    dt : float, s
-    name : str
-        The controller's name where it is not its own: ``mine.py:MyController``.
-    start : str, seed : int
-        Where the starts came from.
-    """
-
-    def __init__(
-        self,
-        environment: Environment,
-        team: Team,
-        controller: Controller,
-        dt: float,
-        *,
-        name: str | None = None,
-        start: str | None = None,
-        seed: int | None = None,
-    ) -> None:
-        self._name = controller.name if name is None else name
-        self._environment, self._team, self._controller, self._dt = environment, team, controller, dt
-        self._start, self._seed = start, seed
-        self._gains = gain_values(getattr(controller, "law", controller))
-        self._time: list[float] = []
-        self._rows: dict[str, list[Array]] = {name: [] for name in ARRAYS[1:]}
-
-    def add(self, snapshot: Snapshot) -> None:
-        """Append one moment."""
-        seen, decision = snapshot.seen, snapshot.decision
-        self._time.append(seen.time)
-        goals = decision.goals if decision.goals is not None else np.full_like(seen.positions, np.nan)
-        for name, row in (
-            ("positions", seen.positions),
-            ("velocities", seen.velocities),
-            ("forces", decision.forces),
-            ("goals", goals),
-            ("obstacle_points", seen.obstacle_points),
-        ):
-            self._rows[name].append(row)
-
-    def record(self) -> Record:
-        """Return what was collected so far."""
-        arrays: dict[str, Any] = {name: np.array(rows) for name, rows in self._rows.items()}
-        return Record(
-            environment=self._environment,
-            team=self._team,
-            controller=self._name,
-            label=self._controller.label,
-            gains=self._gains,
-            start=self._start,
-            seed=self._seed,
-            dt=self._dt,
-            time=np.array(self._time),
-            **arrays,
-        )
 
 
 def versions() -> dict[str, str]:

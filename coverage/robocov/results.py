@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pyarrow.dataset import Dataset
 
 _HISTORY = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
+_TIME = "mean_time_s"
+"""A last column, where robots are not equally fast."""
 
 _TEXTS = frozenset(("map", "controller", "start", "run", "error"))
 _WHOLES = frozenset(("robots", "seed", "contacts", "stuck_robots"))
@@ -236,15 +238,16 @@ def read_history(path: Path) -> CostHistory:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
-    if not lines or lines[0].split(",") != list(_HISTORY):
+    names = lines[0].split(",") if lines else []
+    if names not in (list(_HISTORY), [*_HISTORY, _TIME]):
         raise InputError(f"{path}: line 1: the header {','.join(_HISTORY)} was wanted")
-    rows = np.empty((len(lines) - 1, len(_HISTORY)))
+    rows = np.empty((len(lines) - 1, len(names)))
     for k, line in enumerate(lines[1:]):
         try:
             rows[k] = [float(cell) for cell in line.split(",")]
         except ValueError:
             raise InputError(
-                f"{path}: line {k + 2}: {shown(line)}, but {len(_HISTORY)} numbers were wanted"
+                f"{path}: line {k + 2}: {shown(line)}, but {len(names)} numbers were wanted"
             ) from None
     return CostHistory(*rows.T)
 
@@ -259,14 +262,24 @@ def _csv_format(path: Path) -> Any:
         names = next(csv.reader(file), [])
     if not {"run", "error"} <= set(names):
         raise ValueError("line 1: the header of a table of results was wanted")
-    types = {
-        name: string() if name in _TEXTS else int64() if name in _WHOLES else float64() for name in names
-    }
+    texts = _TEXTS | _word_columns(path.with_name("study.json"))
+    types = {name: string() if name in texts else int64() if name in _WHOLES else float64() for name in names}
     # a map may be called NA
     options = csv_files.ConvertOptions(
         column_types=types, null_values=[""], strings_can_be_null=True, quoted_strings_can_be_null=False
     )
     return datasets.CsvFileFormat(convert_options=options)
+
+
+def _word_columns(study: Path) -> set[str]:
+    """Return which columns hold gains that are words, by the content of ``study.json``."""
+    try:
+        laws = json.loads(study.read_bytes())["gains"].values()
+        choices = [choice for law in laws for choice in law["choices"]]
+        names = {name for choice in choices for name, value in choice.items() if isinstance(value, str)}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return set()  # a table without its study is read all the same, as one of numbers
+    return names | {f"gain_{name}" for name in names}
 
 
 def _reason(path: Path) -> str:

@@ -11,7 +11,7 @@ from robocov.arrays import Array, frozen
 from robocov.errors import ParameterError, counted, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 DEFAULT_RADIUS = 0.1
 """Radius of a robot in metres where nothing else is said."""
@@ -116,6 +116,24 @@ class Team:
             raise ParameterError(f"robots: {shown(n)}, but a whole number of at least 1 was wanted")
         values = (radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range)
         return cls(*(np.full(n, value, dtype=float) for value in values))
+
+    @classmethod
+    def joined(cls, teams: Sequence[Team]) -> Team:
+        """Return the robots of several teams as one team, in their order.
+
+        >>> fast, slow = Team.homogeneous(1, max_speed=1.5), Team.homogeneous(2, max_speed=0.5)
+        >>> Team.joined([fast, slow]).max_speed
+        array([1.5, 0.5, 0.5])
+        """
+        if not teams:
+            raise ParameterError("robots: 0, but a whole number of at least 1 was wanted")
+        columns = [[getattr(team, field.name) for team in teams] for field in fields(cls)]
+        return cls(*(np.concatenate(column) for column in columns))
+
+    @property
+    def mixed_speeds(self) -> bool:
+        """Whether some robots are faster than others, so that the nearest may not be there first."""
+        return bool((self.max_speed != self.max_speed[0]).any())
 
     def __len__(self) -> int:
         return int(self.radius.shape[0])

@@ -5,24 +5,30 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterator
 from copy import deepcopy
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
-from robocov.arrays import Array
-from robocov.controllers import CONTROLLERS
+from robocov.arrays import Array, BoolArray
+from robocov.changing_world import ChangingWorld
+from robocov.communication import Inbox
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS, informed
 from robocov.controllers.base import Controller
+from robocov.decisions import checked_decision, given_forces
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.record import Record, Recorder
+from robocov.perception import Perception, of_working
+from robocov.record import Record
+from robocov.recorder import Recorder
+from robocov.relocation import check_starts
 from robocov.robots import Team
+from robocov.scans import Scanning, Scans
 from robocov.sensor import RangeSensor
-from robocov.solid import solid_pieces
+from robocov.solid import movers, solid_pieces
 from robocov.world import SINK, World
 
 DEFAULT_DT = 1 / 60
@@ -46,6 +52,8 @@ class Simulation:
         At the beginning; by default the robots are at rest.
     time : float, s
         At the beginning.
+    conditions : Conditions or None
+        What goes wrong, or changes, during the run; None: nothing does.
 
     Raises
     ------
@@ -75,6 +83,7 @@ class Simulation:
         *,
         velocities: Array | None = None,
         time: float = 0.0,
+        conditions: Conditions | None = None,
     ) -> None:
         positions = np.array(starts, dtype=float)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
@@ -95,17 +104,32 @@ class Simulation:
                 raise StartError(
                     f"velocities: {shown(velocities.tolist())}, but finite [x, y] for each robot were wanted"
                 )
+        if conditions is not None:
+            conditions.check_team(len(positions))
+            conditions = None if conditions.ideal else conditions
         # who moves may lean on something, and sink in a little
-        _check_starts(environment, positions, self.team, 1e-6 if velocities is None else 2.0 * SINK)
+        slack = 1e-6 if velocities is None else 2.0 * SINK
+        there = None if conditions is None else conditions.working(time, len(positions))
+        check_starts(environment.at(time), positions, self.team, slack, there)
         self.environment = environment
         self.controller = controller
         self.dt = dt
-        pieces = solid_pieces(environment)
-        self._sensor = RangeSensor(pieces)
-        self._world = World(pieces, self.team, positions, velocities)
+        self._conditions = conditions
+        walls, moving = solid_pieces(environment), movers(environment)
+        self._sensor = RangeSensor(walls, moving)
+        self._world: World | ChangingWorld
+        if conditions is not None and conditions.comes_and_goes:
+            self._world = ChangingWorld(
+                conditions, environment, walls, moving, self.team, positions, velocities, time=time
+            )
+        else:
+            self._world = World(walls, self.team, positions, velocities, movers=moving)
+        self._perception = None if conditions is None else Perception(conditions, self.team, dt)
+        self._inbox = None if self._perception is None else self._perception.begin()
         self._began = time
         self._steps = 0
-        self._memory = self._asked(lambda: controller.begin(environment.region, self.team))
+        self._law = self._asked(lambda: informed(controller, environment.standing))
+        self._memory = self._asked(lambda: self._law.begin(environment.region, self.team))
         self._snapshot: Snapshot | None = None
 
     def __repr__(self) -> str:
@@ -129,8 +153,27 @@ class Simulation:
 
     @property
     def sensor(self) -> RangeSensor:
-        """The range sensor of the robots, for ray scans."""
+        """The range sensor of the robots, for ray scans of the present."""
+        wrecks = self._world.wrecks if isinstance(self._world, ChangingWorld) else None
+        self._sensor.show(self.time, wrecks)
         return self._sensor
+
+    @property
+    def conditions(self) -> Conditions | None:
+        """What goes wrong, or changes, during the run; None where nothing does."""
+        return self._conditions
+
+    @property
+    def working(self) -> BoolArray:
+        """Which robots are there and have not failed, (n,) bool."""
+        if isinstance(self._world, ChangingWorld):
+            return self._world.working
+        return np.ones(len(self.team), dtype=bool)
+
+    @property
+    def inbox(self) -> Inbox | None:
+        """The messages that the robots have; None where they know the others as they are."""
+        return self._inbox
 
     @property
     def memory(self) -> Any:
@@ -141,13 +184,18 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
-            seen = self.observe()
-            self._snapshot = Snapshot(seen, self._decide(seen))
+            seen, self._received = self._perceived()
+            decision = self._decide(seen)
+            if self._perception is None:
+                self._snapshot = Snapshot(seen, decision)
+            else:
+                working = self.working
+                self._snapshot = Snapshot(seen, of_working(decision, working), self.positions, working)
         return self._snapshot
 
     def _decide(self, seen: Observations) -> Decision:
-        decision = self._asked(lambda: self.controller.decide(seen, self._memory))
-        return self._checked(decision, seen.time)
+        decision = self._asked(lambda: self._law.decide(seen, self._memory))
+        return checked_decision(decision, len(self.team), self.controller.name, seen.time)
 
     def _asked(self, question: Callable[[], Any]) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
@@ -168,8 +216,19 @@ class Simulation:
 
     def observe(self) -> Observations:
         """Return what each robot knows now."""
+        return self._perceived()[0]
+
+    def _perceived(self) -> tuple[Observations, Inbox | None]:
+        """Return what each robot knows now, and the messages that it then has."""
+        seen = self._seen()
+        if self._perception is None:
+            return seen, None
+        return self._perception.known(seen, self._inbox, self.working)
+
+    def _seen(self) -> Observations:
+        """Return what each robot would know now if nothing went wrong."""
         positions = self._world.positions
-        points = self._sensor.nearest(positions, self.team.sensing_range)
+        points = self.sensor.nearest(positions, self.team.sensing_range)
         points.setflags(write=False)
         return Observations(
             positions=positions,
@@ -178,9 +237,22 @@ class Simulation:
             obstacle_points=points,
             region=self.environment.region,
             time=self.time,
+            max_speeds=self.team.max_speed,
+            density=self.environment.density,
+            scans=self._scanned(positions),
         )
 
-    def step(self, pushes: Array | None = None) -> None:
+    def _scanned(self, positions: Array) -> Scans | None:
+        """Return a scan of each robot, in the steps in which the controller wants one."""
+        scanning: Scanning | None = getattr(self.controller, "scanning", None)
+        if scanning is None or self._steps % scanning.every(self.dt):
+            return None
+        distances, hit = self._sensor.scans(positions, scanning.rays, self.team.sensing_range)
+        distances.setflags(write=False)
+        hit.setflags(write=False)
+        return Scans(distances, hit)
+
+    def step(self, pushes: Array | None = None, *, forces: Array | None = None) -> None:
         """Make one control step.
 
         Parameters
@@ -188,19 +260,21 @@ class Simulation:
         pushes : (n, 2) N or None
             Forces from outside, as by a hand, beside the controller's; see `World.step`. A record does
             not know of them.
+        forces : (n, 2) N or None
+            What drives the robots in place of the controller's forces, as by one who learns.
 
         Raises
         ------
         ParameterError
-            When the controller returns anything but finite forces of shape (n, 2), or the pushes are not.
+            When the controller returns anything but finite forces of shape (n, 2), or the pushes or
+            forces are not.
         """
-        if pushes is not None:
-            pushes = self._rows(pushes, "pushes")
-            if not np.isfinite(pushes).all():
-                raise ParameterError(f"pushes: {shown(pushes.tolist())}, but finite newtons were wanted")
+        count = len(self.team)
+        pushes, forces = given_forces(pushes, count, "pushes"), given_forces(forces, count, "forces")
         decision = self.snapshot.decision
-        self._world.step(decision.forces, self.dt, pushes)
-        self._memory = decision.memory
+        forces = decision.forces if forces is None else forces
+        self._world.step(forces, self.dt, pushes, time=self.time)
+        self._memory, self._inbox = decision.memory, self._received
         self._steps += 1
         self._snapshot = None
 
@@ -231,7 +305,15 @@ class Simulation:
         on_snapshot : callable
             Called with every snapshot, for progress.
         """
-        recorder = Recorder(self.environment, self.team, self.controller, self.dt, start=start, seed=seed)
+        recorder = Recorder(
+            self.environment,
+            self.team,
+            self.controller,
+            self.dt,
+            start=start,
+            seed=seed,
+            conditions=self.conditions,
+        )
         for snapshot in self.snapshots(duration):
             recorder.add(snapshot)
             if on_snapshot is not None:
@@ -247,15 +329,31 @@ class Simulation:
         twin._snapshot = None  # it holds the memory that the step after it will hand on
         return twin
 
-    def remembering(self, memory: Any) -> Simulation:
+    def weighed(self, environment: Environment) -> Simulation:
+        """Return a simulation that goes on from here by another density; this one stays as it is.
+
+        Parameters
+        ----------
+        environment : Environment
+            The same place as this one's, else `changed` is what is wanted.
+        """
+        twin = self.copy()
+        twin.environment = environment
+        twin._law = twin._asked(lambda: informed(twin.controller, environment.standing))
+        return twin
+
+    def remembering(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
         """Return a simulation in the same state whose controller remembers something else.
 
         Parameters
         ----------
         memory : object
             What the `memory` of a simulation was, of the same controller and number of robots.
+        inbox : Inbox or None
+            What its `inbox` was; None: as it is.
         """
         twin = self.copy()
+        twin._inbox = self._inbox if inbox is None else inbox
         twin._memory = deepcopy(memory)
         return twin
 
@@ -267,14 +365,16 @@ class Simulation:
         team: Team | None = None,
         positions: Array | None = None,
         velocities: Array | None = None,
+        conditions: Conditions | None = None,
     ) -> Simulation:
         """Return a simulation that goes on from here with something else; this one stays as it is.
 
-        What the controller remembers is kept as long as neither it nor the number of robots changes.
+        What the controller remembers is kept as long as neither it nor the number of robots changes; and
+        the messages that robots have, as long as neither that number nor the conditions do.
 
         Parameters
         ----------
-        environment, controller, team
+        environment, controller, team, conditions
             By default the same.
         positions, velocities : (n, 2) m and m/s
             By default the present ones.
@@ -294,38 +394,13 @@ class Simulation:
             self.dt,
             velocities=self.velocities if velocities is None else velocities,
             time=self.time,
+            conditions=self._conditions if conditions is None else conditions,
         )
+        if conditions is None and len(twin.team) == len(self.team):
+            twin._inbox = self._inbox
         if controller is None and len(twin.team) == len(self.team):
             twin._memory = deepcopy(self._memory)
         return twin
-
-    def _checked(self, made: Any, time: float) -> Decision:
-        """Return the decision when it is one that can be carried out and recorded."""
-        where = f"controller {self.controller.name!r}"
-        if not isinstance(made, Decision):
-            raise ParameterError(f"{where}: decide gave {shown(made)}, but a Decision was wanted")
-        decision: Decision = made
-        forces = self._rows(decision.forces, f"{where}: forces")
-        goals = None if decision.goals is None else self._rows(decision.goals, f"{where}: goals")
-        if forces is not decision.forces or goals is not decision.goals:
-            decision = replace(decision, forces=forces, goals=goals)
-        if not np.isfinite(forces).all():
-            robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
-            raise ParameterError(
-                f"{where}: force {forces[robot].tolist()} on robot {robot + 1} "
-                f"at {time:.3f} s, but finite newtons were wanted"
-            )
-        return decision
-
-    def _rows(self, values: Any, what: str) -> Array:
-        """Return two numbers for each robot as an array, the same one where it is one already."""
-        try:
-            array = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ParameterError(f"{what}: {shown(values)}, but numbers were wanted") from None
-        if array.shape != (len(self.team), 2):
-            raise ParameterError(f"{what} of shape {array.shape}, but {(len(self.team), 2)} was wanted")
-        return array
 
 
 def check_dt(dt: float) -> None:
@@ -338,31 +413,3 @@ def check_dt(dt: float) -> None:
     """
     if not 1e-4 <= dt <= 1.0:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
-
-
-def _check_starts(environment: Environment, positions: Array, team: Team, slack: float) -> None:
-    """Check that robots are free, but for so many metres."""
-    for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
-        raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
-    points = shapely.points(positions)
-    inside = shapely.contains_properly(environment.free, points)
-    wall = shapely.distance(environment.free.boundary, points)
-    for i in range(len(positions)):
-        place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
-        if not inside[i]:
-            raise StartError(
-                f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}"
-            )
-        if wall[i] < team.radius[i] - slack:
-            raise StartError(
-                f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
-            )
-    first, second, distance = Neighbours(len(positions)).closer_than(
-        positions, 2.0 * float(team.radius.max())
-    )
-    clash = distance < team.radius[first] + team.radius[second] - slack
-    if clash.any():
-        k = int(np.flatnonzero(clash)[0])
-        raise StartError(
-            f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
-        )

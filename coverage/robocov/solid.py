@@ -7,7 +7,7 @@ triangulated and the triangles are merged to larger convex pieces as long as the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.environment import Environment
+    from robocov.obstacle_path import ObstaclePath
 
 Corner: TypeAlias = tuple[float, float]
 Loop: TypeAlias = list[Corner]
@@ -30,11 +31,35 @@ def solid_pieces(environment: Environment) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that fill all that is not free.
 
     They cover the obstacles, the region outside a non-convex boundary, and a frame of thickness
-    `FRAME` around the region; they do not overlap.
+    `FRAME` around the region; they do not overlap. Obstacles that move are not among them: see `movers`.
     """
+    environment = environment.standing
     low_x, low_y, high_x, high_y = environment.region.bounds
     frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
     return convex_pieces(shapely.difference(frame, environment.free))
+
+
+class Mover(NamedTuple):
+    """An obstacle that moves.
+
+    Attributes
+    ----------
+    pieces : tuple of convex polygons, (k, 2) m each
+        Where it is at time zero.
+    path : ObstaclePath
+    """
+
+    pieces: tuple[Array, ...]
+    path: ObstaclePath
+
+
+def movers(environment: Environment) -> tuple[Mover, ...]:
+    """Return the obstacles that move."""
+    return tuple(
+        Mover(convex_pieces(shape.polygon), shape.path)
+        for shape in environment.obstacles
+        if shape.path is not None
+    )
 
 
 def convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:

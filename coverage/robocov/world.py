@@ -14,13 +14,18 @@ identically, bit for bit.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
 from pymunk import batch
 
 from robocov.arrays import Array
+from robocov.moving_bodies import MovingBodies
 from robocov.robots import Team
+
+if TYPE_CHECKING:
+    from robocov.solid import Mover
 
 LONGEST_SUBSTEP = 0.02
 """Longest substep in seconds."""
@@ -42,13 +47,24 @@ class World:
     team : Team
     positions : (n, 2) m
     velocities : (n, 2) m/s, at rest by default
+    movers : tuple of Mover
+        Obstacles that move, as kinematic bodies; see `robocov.moving_bodies`.
+    wrecks : (w, 3) m or None
+        x, y and radius of robots that have failed, and stand in the way.
     """
 
     def __init__(
-        self, pieces: tuple[Array, ...], team: Team, positions: Array, velocities: Array | None = None
+        self,
+        pieces: tuple[Array, ...],
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        movers: tuple[Mover, ...] = (),
+        wrecks: Array | None = None,
     ) -> None:
         self.team = team
-        self._pieces = pieces
+        self._pieces, self._wrecks = pieces, wrecks
         self._space = pymunk.Space()
         self._space.iterations = 20
         self._space.collision_slop = 1e-4
@@ -58,7 +74,10 @@ class World:
             wall = pymunk.Poly(self._space.static_body, ring.tolist())
             wall.friction = wall.elasticity = 0.0
             self._space.add(wall)
-        self._static_shapes = len(pieces)
+        for x, y, radius in [] if wrecks is None else wrecks.tolist():
+            wreck = pymunk.Circle(self._space.static_body, radius, (x, y))
+            wreck.friction = wreck.elasticity = 0.0
+            self._space.add(wreck)
         self._bodies: list[pymunk.Body] = []
         self._discs: list[pymunk.Circle] = []
         for mass, radius in zip(team.mass.tolist(), team.radius.tolist(), strict=True):
@@ -69,13 +88,15 @@ class World:
             self._bodies.append(body)
             self._discs.append(disc)
         self._space.on_collision(pre_solve=self._note_contact)
+        self._moving = MovingBodies(self._space, movers, self._discs) if movers else None
 
-        # pymunk.batch goes through the robots in the order in which they were added, then comes the
-        # static body: hence one row more
-        self._force = np.zeros((len(team) + 1, 2))
+        # pymunk.batch goes through the robots in the order in which they were added, then come the
+        # obstacles that move and the static body: hence some rows more
+        rows = len(team) + len(movers) + 1
+        self._force = np.zeros((rows, 2))
         self._force_buffer = batch.Buffer()
         self._force_buffer.set_float_buf(self._force)
-        self._state = np.zeros((len(team) + 1, 4))
+        self._state = np.zeros((rows, 4))
         self._state_buffer = batch.Buffer()
         self._state_buffer.set_float_buf(self._state)
         self._read_buffer = batch.Buffer()
@@ -104,9 +125,16 @@ class World:
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
-        return World(self._pieces, self.team, self._positions, self._velocities)
+        return World(
+            self._pieces,
+            self.team,
+            self._positions,
+            self._velocities,
+            movers=() if self._moving is None else self._moving.movers,
+            wrecks=self._wrecks,
+        )
 
-    def step(self, forces: Array, dt: float, pushes: Array | None = None) -> None:
+    def step(self, forces: Array, dt: float, pushes: Array | None = None, *, time: float = 0.0) -> None:
         """Move on by `dt` seconds under `forces`, (n, 2) N.
 
         The forces are the controllers'; viscosity and limits are added here, the same for all.
@@ -124,16 +152,21 @@ class World:
             speed = np.hypot(*self._velocities.T)
             gain = 0.0 if pushes is None else np.hypot(*pushes.T) / self.team.mass * dt
             fastest = max(fastest, float((speed + gain).max()))
+        if self._moving is not None:
+            fastest += self._moving.fastest
         # a robot must not cross a thin wall within one substep
         parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(fastest * dt / self._smallest))
-        for _ in range(parts):
+        for part in range(parts):
+            if self._moving is not None:
+                self._moving.place(time + part * (dt / parts), dt / parts)
             self._substep(forces, dt / parts, pushes)
 
     def _substep(self, forces: Array, dt: float, pushes: Array | None) -> None:
         limit = self._speed_limit(dt)
-        self._force[:-1] = self._net_force(forces, dt, limit)
+        robots = self._force[: len(self.team)]
+        robots[:] = self._net_force(forces, dt, limit)
         if pushes is not None:
-            self._force[:-1] += pushes
+            robots += pushes
             limit = np.maximum(
                 limit, np.hypot(*self._velocities.T) + np.hypot(*pushes.T) / self.team.mass * dt
             )
@@ -178,11 +211,20 @@ class World:
         self._forget_contacts()
         travel = min(SINK, 0.1 * self._smallest)
         fastest = max(self._fastest, float(limit.max()))
+        if self._moving is not None:
+            self._moving.back()
+            fastest += self._moving.fastest
         parts = min(_MOST_SUBSTEPS, max(2, math.ceil(fastest * dt / travel)))
         for _ in range(parts):
             batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
-            self._space.step(dt / parts)
-        self._settle_overlap(dt / parts)
+            if self._moving is None:
+                self._space.step(dt / parts)
+            else:
+                self._moving.before_walls(lambda: self._space.step(dt / parts))
+        if self._moving is None:
+            self._settle_overlap(dt / parts)
+        else:
+            self._moving.before_walls(lambda: self._settle_overlap(dt / parts))
         self._read_state()
         # impulses of a contact may exceed what a robot can do by itself
         speed_limited = _limited(self._velocities, limit)
@@ -206,10 +248,15 @@ class World:
 
     def _note_contact(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
         self._touched = True
+        if self._moving is not None:
+            self._moving.touched(arbiter)
 
     def _write_state(self) -> None:
-        self._state[:-1, :2] = self._positions
-        self._state[:-1, 2:] = self._velocities
+        count = len(self.team)
+        self._state[:count, :2] = self._positions
+        self._state[:count, 2:] = self._velocities
+        if self._moving is not None:
+            self._state[count:-1] = self._moving.state
         batch.set_space_bodies(self._space, _STATE, self._state_buffer)
 
     def _protect(self) -> None:
@@ -221,8 +268,9 @@ class World:
         self._read_buffer.clear()
         batch.get_space_bodies(self._space, _STATE, self._read_buffer)
         state = np.frombuffer(self._read_buffer.float_buf(), dtype=np.float64).reshape(-1, 4)
-        self._positions = state[:-1, :2].copy()
-        self._velocities = state[:-1, 2:].copy()
+        count = len(self.team)
+        self._positions = state[:count, :2].copy()
+        self._velocities = state[:count, 2:].copy()
         self._protect()
 
 

@@ -33,6 +33,14 @@ DOCUMENT: dict[str, Any] = {
         "all": {"kind": "uniform"},
         "given": {"kind": "points", "positions": [[1, 1], [1.5, 1.25]]},
     },
+    "density": {
+        "kind": "gaussians",
+        "floor": 0.25,
+        "peaks": [
+            {"center": [7, 4], "sigma": 1.5, "weight": 4},
+            {"center": [2, 1], "covariance": [[2, 0.5], [0.5, 1]], "weight": 0.5},
+        ],
+    },
     "extra": {"author": {"name": "Ada"}, "tags": [1, 2.5, None, True, "é"]},
 }
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from robocov.atomic import written
-from robocov.controllers import Rapf, Rpf, make_controller
+from robocov.controllers import Rapf, Rpf, gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import sample_moments
-from robocov.record import ARRAYS, Record, Recorder
+from robocov.record import ARRAYS, Record
+from robocov.recorder import Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
@@ -35,7 +36,8 @@ def test_load_gives_what_was_saved(record: Record, tmp_path: Path) -> None:
     for name in ARRAYS:
         assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
     assert again.environment == record.environment
-    assert again.gains == {"k_rep": 0.2, "rho_0": 2.0, "k_att": 30.0, "attraction_limit": None}
+    assert again.gains == gain_values(Rapf(k_rep=0.2, attraction_limit=None))
+    assert again.gains["attraction_limit"] is None and again.gains["target"] == "centroid"
     assert (again.controller, again.label, again.start, again.seed, again.dt) == (
         "rapf",
         "RAPF",

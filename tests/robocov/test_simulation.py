@@ -422,6 +422,21 @@ class TestChanges:
         np.testing.assert_array_equal(pushed.positions[1:], alone.positions[1:])
         assert pushed.velocities[0, 1] > alone.velocities[0, 1] + 0.05
 
+    def test_forces_from_outside_stand_in_for_the_controllers(self) -> None:
+        before = self.moving()
+        driven, alone = before.copy(), before.copy()
+        for _ in range(5):
+            driven.step(forces=alone.snapshot.decision.forces)
+            alone.step()
+        assert driven.positions.tobytes() == alone.positions.tobytes()
+        driven.step(forces=np.zeros((6, 2)))
+        alone.step()
+        assert driven.velocities.tobytes() != alone.velocities.tobytes()
+        with pytest.raises(ParameterError, match=r"forces of shape \(2, 2\)"):
+            driven.step(forces=np.zeros((2, 2)))
+        with pytest.raises(ParameterError, match=r"forces: .* finite newtons"):
+            driven.step(forces=np.full((6, 2), np.inf))
+
 
 def test_it_is_short_in_words(empty: Environment) -> None:
     simulation = Simulation(empty, Rapf(), empty.start().sample(3), dt=0.05)

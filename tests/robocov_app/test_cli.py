@@ -54,8 +54,10 @@ def test_controllers_lists_gains_with_units_and_marks_the_flagship(
     for name, kind in CONTROLLERS.items():
         assert [gain["name"] for gain in rows[name]["gains"]] == list(gains_of(kind))
     assert rows["rapf"]["gains"][0]["unit"] == "N m³"
+    assert (rows["rapf"]["information"], rows["geodesic-lloyd"]["information"]) == ("own", "whole map")
     assert main(["controllers"]) == 0
     out = capsys.readouterr().out
+    assert "Geodesic Lloyd   (informed: whole map)" in out
     assert "attraction_limit" in out
     assert "(recommended)" in out
 
@@ -127,7 +129,10 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --set k_rep=-1", "rapf.k_rep: -1, but a number from 0"),
         ("run rooms --set k_rep", "--set: 'k_rep', but GAIN=VALUE"),
         ("run rooms --set k_rep=1 k_rep=2", "k_rep is given twice"),
-        ("run rooms --set k_rep=big", "--set k_rep: 'big', but a number"),
+        ("run rooms --set k_rep=big", "rapf.k_rep: 'big', but a number from 0 to"),
+        ("run rooms --set k_rep=0,3", "--set k_rep: '0,3', but a number (or null), or a word, was wanted"),
+        ("run rooms --set target=mediane", "rapf.target: unknown word 'mediane': did you mean 'median'?"),
+        ("run rooms --set target=3", "rapf.target: 3, but one of centroid, sensing, median was wanted"),
         ("run rooms --set krep=1", "did you mean 'k_rep'?"),
         ("run rooms --robots 0", "--robots: 0, but a number from 1"),
         ("run rooms --robots 5000", "but 5000 were asked for"),

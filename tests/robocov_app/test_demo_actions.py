@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robocov_app.demo as package
+from robocov.controllers import CONTROLLERS, gains_of
 from robocov_app.demo import panel, window
 from robocov_app.demo.actions import all_actions, key_words, layer_actions, matching, tool_actions
 from robocov_app.demo.overlays import _GROUPS
@@ -109,6 +110,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
     tmp_path: Path,
 ) -> None:
     names = {action.name for action in ACTIONS}
+    options = {name for law in CONTROLLERS.values() for name in gains_of(law)}
     with opened(tmp_path) as driver:
         for tab in panel.TABS:
             driver.window.panel.show_tab(tab)
@@ -116,7 +118,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
             widgets = driver.window.panel.widgets
             for section in widgets._sections.values():
                 for kind, _, name in (each.partition(":") for each in section.named):
-                    own = name.partition(":")[0] in ("tab", "reset", "close")
+                    own = name.partition(":")[0] in {"tab", "reset", "close", "next", *options}
                     assert kind != "button" or own or name in names, name
 
 

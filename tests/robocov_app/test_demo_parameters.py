@@ -11,11 +11,12 @@ from robocov.controllers import Individually
 from robocov.controllers.gains import Gain, gain, gains_of
 from robocov.errors import ParameterError
 from robocov.robots import UNITS
-from robocov_app.demo.parameters import Parameter, gain_parameters, limit_parameters, with_limit
+from robocov_app.demo.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.demo.scenario import Law, Limits
 
 LAWS = [Law("rapf"), Law("rpf"), Law("lloyd")]
-ALL = [each for law in LAWS for each in gain_parameters(law)] + limit_parameters(Limits())
+GAINS = [each for law in LAWS for each in gain_parameters(law)]
+ALL = [each for each in GAINS if isinstance(each, Parameter)] + limit_parameters(Limits())
 
 
 class Odd:
@@ -39,6 +40,27 @@ def test_every_gain_has_its_slider():
     rapf = {each.name: each for each in gain_parameters(Law("rapf", {"k_rep": 0.7}))}
     assert (rapf["k_rep"].value, rapf["k_rep"].default) == (0.7, Law("rapf").known["k_rep"].default)
     assert rapf["k_rep"].meaning
+
+
+def test_gains_that_are_words_have_all_of_them():
+    (picked,) = [each for each in gain_parameters(Law("rapf", {"target": "median"})) if each.name == "target"]
+    assert isinstance(picked, Pick)
+    assert (picked.value, picked.default, picked.words()) == ("median", "centroid", "median")
+    assert picked.offered == ("centroid", "sensing", "median")
+    assert [picked.read(text) for text in ("sensing", " Median ", "c", "SENS")] == [
+        *("sensing", "median", "centroid", "sensing")
+    ]
+    for wrong in ("", "mediane", "x", "0.3"):
+        with pytest.raises(
+            ParameterError, match=r"target: .*, but one of centroid, sensing, median was wanted"
+        ):
+            picked.read(wrong)
+    for word in picked.offered:
+        law = Law("rapf").with_gain("target", word)
+        assert law.value("target") == word
+        assert law.gains == ({} if word == "centroid" else {"target": word})
+    near = Pick("n", "n", "", "on", "on", ("on", "once"))
+    assert near.read("on") == "on" and near.read("onc") == "once"
 
 
 def test_every_limit_but_the_mass_has_its_slider():

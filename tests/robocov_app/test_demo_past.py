@@ -94,7 +94,7 @@ def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
     session = stepped(begun(RAPF, RPF, LLOYD, RAPF), 3)
     made = []
     real = module.RangeSensor
-    monkeypatch.setattr(module, "RangeSensor", lambda pieces: made.append(1) or real(pieces))
+    monkeypatch.setattr(module, "RangeSensor", lambda pieces, movers=(): made.append(1) or real(pieces))
     module._sensor_in.cache_clear()
     session.look_at(0.0)
     for _ in range(5):

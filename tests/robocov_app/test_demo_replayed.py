@@ -300,13 +300,24 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
         ),
         (
             lambda record: replace(record, team=replace(record.team, radius=np.array([0.1, 0.1, 0.1, 0.2]))),
-            "saved/1/run.json: robots of different radius",
+            "saved/1: team: .*, but .* as in saved/0 was wanted",
         ),
     ],
 )
 def test_what_does_not_go_together_is_refused(record: Record, other, message: str) -> None:
     with pytest.raises(InputError, match=message):
         replayed(record, other(record))
+
+
+def test_robots_that_differ_are_as_they_were(record: Record) -> None:
+    radius, speeds = np.array([0.1, 0.1, 0.1, 0.2]), np.array([1.0, 0.5, 0.5, 1.0])
+    team = replace(record.team, radius=radius, max_speed=speeds)
+    session = replayed(replace(record, team=team, gains={**record.gains, "cells": "time"}))
+    circumstances = session.circumstances(session.lanes[0])
+    assert circumstances.team.to_dict() == team.to_dict()
+    seen = session.snapshot(session.lanes[0]).seen
+    assert seen.max_speeds is not None
+    assert seen.max_speeds.tolist() == [1.0, 0.5, 0.5, 1.0]
 
 
 def test_more_than_there_is_room_for_is_refused(record: Record) -> None:

@@ -10,6 +10,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF
 from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError
 from robocov.robots import Team
+from robocov_app.demo.parameters import limit_parameters, with_limit
 from robocov_app.demo.scenario import (
     MOST_PANES,
     MOST_ROBOTS,
@@ -92,6 +93,22 @@ class TestLimits:
         assert len(team) == 3
         assert team.radius.tolist() == [0.2] * 3
         assert Limits.of(team) == limits
+
+    def test_robots_may_differ(self):
+        team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.1, 0.3]), mass=np.array([2.0, 1.0, 1.0]))
+        limits = Limits.of(team)
+        assert limits.team(3).to_dict() == team.to_dict()
+        # robots keep what is theirs under their numbers; a new one is as the first
+        assert limits.team((1, 3)).radius.tolist() == [0.1, 0.3]
+        assert limits.team(4).mass.tolist() == [2.0, 1.0, 1.0, 2.0]
+        assert limits.radius_of(3) == 0.3
+        assert Limits.of(team, (2, 5, 7)).team((7, 1)).radius.tolist() == [0.3, 0.1]
+        equal = with_limit(limits, "team.radius", 0.2)
+        assert equal.team(3).radius.tolist() == [0.2] * 3
+        assert equal.team(3).mass.tolist() == [2.0, 1.0, 1.0]
+        assert [each.label for each in limit_parameters(limits) if "≠" in each.label] == ["radius ≠"]
+        with pytest.raises(ParameterError, match="radius"):
+            replace(limits, different=(("radius", ((1, -1.0),)),)).team(1)
 
     def test_they_are_the_papers_by_default(self):
         assert Limits.of(Team.homogeneous(2)) == Limits()

@@ -52,7 +52,9 @@ def place_of(session, number) -> list[float]:
 
 def test_the_box_has_every_tool_once():
     tools = toolbox()
-    assert list(tools) == ["hand", "polygon", "wall", "circle", "eraser", "robot", "failure", "ruler"]
+    assert list(tools) == [
+        *("hand", "polygon", "wall", "circle", "brush", "eraser", "robot", "failure", "ruler")
+    ]
     for name, tool in tools.items():
         assert tool.name == name
         assert tool.title

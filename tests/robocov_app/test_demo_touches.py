@@ -11,6 +11,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, step
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
+from robocov.robots import Team
 from robocov_app.demo import touches as module
 from robocov_app.demo.scenario import Limits
 from robocov_app.demo.touches import nearest_free
@@ -367,3 +368,29 @@ def test_undo_is_of_the_present():
     assert session.undo.redo() == "robot 2 taken out"
     assert robots_of(session) == ((1, 3), ())
     assert session.live
+
+
+def test_robots_that_differ_keep_what_is_theirs():
+    """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
+    radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
+    limits = Limits.of(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
+    session = begun(RAPF, robots=3, limits=limits)
+    team = session.lanes[0].simulation.team
+    assert team.radius.tolist() == radius.tolist()
+    positions = session.lanes[0].simulation.positions
+    apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))[np.triu_indices(3, 1)]
+    assert apart.min() >= 0.6, "room for the largest"
+    session.fail_robot(2)
+    assert session.lanes[0].simulation.team.radius.tolist() == [0.1, 0.2]
+    (wreck,) = session.lanes[0].circumstances.solid.obstacles[len(HALL.obstacles) :]
+    assert wreck.radius == 0.3
+    session.revive_robot(2)
+    assert session.lanes[0].simulation.team.radius.tolist() == radius.tolist()
+    session.place(3, place_of(session, 2))
+    gap = np.hypot(*np.subtract(place_of(session, 3), place_of(session, 2)))
+    assert gap >= 0.5 - 1e-6
+    session.add_robot((3.0, 2.0))
+    assert session.lanes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
+    stepped(session, 3)
+    session.set_limits(Limits())
+    assert set(session.lanes[0].simulation.team.radius.tolist()) == {0.1}

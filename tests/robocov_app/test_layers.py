@@ -50,6 +50,38 @@ def test_a_cell_has_the_tint_of_the_nearest_robot(n, theme):
         assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
 
 
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_cells_by_time_have_the_tint_of_who_is_there_first(theme):
+    """Slow robots' cells are holes in those of fast ones, with arcs for borders."""
+    record = run_of(SQUARE, 6)
+    speeds = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
+    team = replace(record.team, max_speed=speeds)
+    record = replace(record, team=team, gains={"cells": "time"})
+    scene = scene_of(record)
+    assert scene.cell_owners is not None
+    assert scene.cell_owners[0] in (0, 1), "the fast ones come first"
+    frame, painter = drawn(scene, "cells", theme=theme)
+    points = inside(SQUARE.boundary_polygon.buffer(-0.1), 400)
+    times = np.linalg.norm(points[:, None] - record.positions[-1][None], axis=2) / speeds
+    two = np.sort(times, axis=1)[:, :2]
+    clear = two[:, 1] - two[:, 0] > 0.4  # away from edges
+    assert clear.sum() > 100
+    assert set(times[clear].argmin(axis=1)) > {0, 1}
+    pixels = painter.camera.to_pixels(points[clear])
+    for pixel, robot in zip(pixels, times[clear].argmin(axis=1), strict=True):
+        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+
+
+def test_robots_of_different_size_are_drawn_to_scale():
+    record = run_of(SQUARE, 3)
+    record = replace(record, team=replace(record.team, radius=np.array([0.3, 0.6, 0.9])))
+    scene = scene_of(record)
+    _, painter = drawn(scene, "robots")
+    canvas = Canvas(pygame.Surface(SIZE), painter.camera, LIGHT, 1.0, robot_hues(3))
+    expected = record.team.radius * painter.camera.zoom
+    np.testing.assert_allclose(drawn_radii(canvas, scene), expected, atol=0.26)
+
+
 def test_edges_of_cells_are_drawn_between_robots():
     scene = explained(TWO)
     frame, painter = drawn(scene, "cells")

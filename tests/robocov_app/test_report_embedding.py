@@ -48,6 +48,20 @@ def places_of(data: dict, record, name: str = "positions") -> np.ndarray:
     return np.array([low_x, low_y]) + flat * np.array([high_x - low_x, high_y - low_y])
 
 
+def test_speeds_are_there_where_cells_are_by_time() -> None:
+    run = run_of()
+    size = len(run.record.team)
+    speeds = np.where(np.arange(size) == 0, 1.0, 0.4)
+    mixed = replace(run.record, team=replace(run.record.team, max_speed=speeds))
+    timed = replace(mixed, gains={**mixed.gains, "cells": "time"})
+    found = [
+        embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)
+        for record in (run.record, mixed, timed)
+    ]
+    assert ["speeds" in data for data in found] == [False, False, True]
+    assert found[2]["speeds"] == speeds.tolist()
+
+
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=50))
 def test_numbers_come_back_to_within_half_a_step(values) -> None:
     array = np.array(values)

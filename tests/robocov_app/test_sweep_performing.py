@@ -19,6 +19,7 @@ from robocov.record import ARRAYS, Record
 from robocov.results import read_history
 from robocov_app.sweep.performing import FIGURES, Outcome, perform, prepared, simulated
 from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.table import columns_of
 from robocov_app.sweep.task import Task, tasks_of
 
 
@@ -173,3 +174,18 @@ def test_runs_without_a_moment_but_the_first() -> None:
     assert outcome.figures["mean_distance_over_run_m"] == outcome.figures["mean_distance_m"]
     assert outcome.figures["settled_at_s"] is None
     assert outcome.figures["stuck_robots"] is None
+
+
+def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
+    group = ({"count": 1, "max_speed": 1.0, "radius": 0.2}, {"count": 2, "max_speed": 0.4})
+    study = small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
+    outcome = perform(first(study))
+    assert outcome.error is None
+    known = [column.name for column in columns_of(study)]
+    assert set(outcome.figures) <= {*known, "range_area_m2", "wall_clearance_m"}
+    assert {"mean_time_s", "sensed_area_m2", "near_final_s", "robot_clearance_m"} <= set(outcome.figures)
+    assert outcome.figures["mean_time_s"] > outcome.figures["mean_distance_m"]
+    assert outcome.files["cost.csv"].splitlines()[0].endswith(b",mean_time_s")
+    plain = small_study()
+    assert set(perform(first(plain)).figures) == set(FIGURES)
+    assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in columns_of(plain)}

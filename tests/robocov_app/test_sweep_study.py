@@ -10,6 +10,7 @@ from swept import HALL, ROOM, controller, small_study
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.gain_choices import Range, Sampling
 from robocov_app.sweep.study import Study, StudyMap, team_of
+from robocov_app.sweep.task import tasks_of
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
@@ -142,3 +143,31 @@ def test_a_study_cannot_be_changed() -> None:
     with pytest.raises(AttributeError):
         study.seeds = (1,)
     assert isinstance(study, Study)
+
+
+GROUPS = ({"count": 1, "max_speed": 1.0, "radius": 0.15}, {"count": 2, "max_speed": 0.4})
+
+
+def test_a_team_of_groups() -> None:
+    study = small_study(group=GROUPS, robots=(6,), viscosity=(1.0, 2.0))
+    assert study.robots == (3,)
+    assert study.mixed_speeds
+    assert study.swept == ("viscosity",)
+    task = next(tasks_of(study))
+    team = team_of(task.robots, task.team)
+    assert team.max_speed.tolist() == [1.0, 0.4, 0.4]
+    assert team.radius.tolist() == [0.15, 0.1, 0.1]
+    assert team.viscosity.tolist() == [1.0, 1.0, 1.0]
+    assert not small_study().mixed_speeds
+    with pytest.raises(ParameterError, match=r"robots: \[2, 4\], but the groups of the team have 3"):
+        small_study(group=GROUPS, robots=(2, 4))
+    with pytest.raises(InputError, match=r"team.group\[1\].max_speed: -1.0 m/s"):
+        small_study(group=(GROUPS[0], {"count": 2, "max_speed": -1.0}), robots=(3,))
+
+
+def test_metrics_are_another_task() -> None:
+    tasks = [next(tasks_of(small_study(metrics=value))) for value in (False, True)]
+    assert [task.metrics for task in tasks] == [False, True]
+    assert tasks[0].digest != tasks[1].digest
+    with pytest.raises(ParameterError, match="metrics: 1, but true or false was wanted"):
+        small_study(metrics=1)

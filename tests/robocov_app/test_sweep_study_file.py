@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from swept import HALL, controller
 
 from robocov.errors import InputError
 from robocov.mapfile import bundled_maps, save_map
+from robocov_app.sweep.study import team_of
 from robocov_app.sweep.study_file import read_study
 
 STUDY = """
@@ -100,7 +102,7 @@ def test_all_bundled_maps(folder: Path) -> None:
 
 
 KNOWN = (
-    "controllers, cost_hz, dt, duration, gains, lattice, maps, "
+    "conditions, controllers, cost_hz, dt, duration, gains, lattice, maps, metrics, "
     "record_hz, robots, sampling, seeds, starts, team"
 )
 WRONG = [
@@ -196,7 +198,7 @@ WRONG = [
     (
         "k_att = 3",
         "k_att = [[3]]",
-        'gains.rapf.k_att[0]: [3], but a number, or "null" for no limit, was wanted',
+        'gains.rapf.k_att[0]: [3], but a number, "null" for no limit, or a word, was wanted',
     ),
     ("k_att = 3", "k_att = [3, 3.0]", "gains.rapf.k_att[1]: 3.0 is given already at gains.rapf.k_att[0]"),
     ("k_att = 3", 'k_att = "null"', "gains.rapf.k_att: 'null', but a number from "),
@@ -204,11 +206,11 @@ WRONG = [
     (
         '"null"]\nk_att',
         '"nul"]\nk_att',
-        "gains.rapf.attraction_limit[1]: 'nul', but a number, or \"null\" for no limit, ",
+        "gains.rapf.attraction_limit[1]: 'nul', but a number from 1e-06 to 1e+06 N, or null for no limit, ",
     ),
     ("[gains.rapf]", "[gains.raf]", "gains.raf: unknown controller of the study 'raf': did you mean 'rapf'?"),
     ("[gains.rapf]", "[gain.rapf]", "unknown key 'gain': did you mean 'gains'? (known: "),
-    ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: {}, but a number, or '),
+    ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: {}, but a number, "null" for'),
     ("pull = [1, 2]", "push = 1", "gains[\"mine.py:Mine\"]: unknown gain 'push': did you mean 'pull'?"),
     ("samples = 5", "samples = 0", "sampling.samples: 0, but a whole number from 1 to 100000 was wanted"),
     ("samples = 5", "", "sampling.samples: missing, but a whole number was wanted"),
@@ -298,3 +300,54 @@ def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
 
 def test_the_readme_way_of_writing_it_is_toml() -> None:
     assert tomllib.loads(STUDY)["gains"]["mine.py:Mine"] == {"pull": [1, 2]}
+
+
+GROUPS = """
+maps = ["rooms"]
+controllers = ["rapf"]
+metrics = true
+
+[team]
+sensing_range = 4.0
+
+[[team.group]]
+count = 2
+max_speed = 1.0
+
+[[team.group]]
+count = 1
+max_speed = 0.3
+sensing_range = "null"
+"""
+
+
+def test_a_team_of_groups(folder: Path) -> None:
+    study = read_study(written(folder, GROUPS))
+    assert study.robots == (3,)
+    assert study.metrics
+    team = team_of(3, study.teams[0])
+    assert team.max_speed.tolist() == [1.0, 1.0, 0.3]
+    assert team.sensing_range.tolist() == [4.0, 4.0, math.inf]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("max_speed = 0.3", "max_sped = 0.3", "team.group[1]: unknown key 'max_sped': did you mean"),
+        ("count = 1\n", "", "team.group[1].count: missing, but a whole number from 1 to 10000 was wanted"),
+        ("metrics = true", "metrics = 1", "metrics: 1, but true or false was wanted"),
+        ("metrics = true", "robots = [4]", "robots: [4], but the groups of the team have 3"),
+        ("max_speed = 1.0", "max_speed = 0", "team.group[0].max_speed: 0.0 m/s, but a number from 1e-06"),
+    ],
+)
+def test_groups_that_are_none(folder: Path, before: str, after: str, message: str) -> None:
+    path = written(folder, GROUPS.replace(before, after))
+    with pytest.raises(InputError) as told:
+        read_study(path)
+    assert str(told.value).startswith(f"{path}: {message}")
+
+
+def test_a_group_that_is_no_table(folder: Path) -> None:
+    path = written(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
+    with pytest.raises(InputError, match=r"team.group: 3, but tables \[\[team.group\]\] was wanted"):
+        read_study(path)

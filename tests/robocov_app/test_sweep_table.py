@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from swept import small_study, tables
 
+from robocov.controllers import Rapf, gains_of
 from robocov.errors import OutputError
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
@@ -43,7 +44,7 @@ def test_the_columns_are_those_of_the_study() -> None:
     study = small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
     assert [column.name for column in columns_of(study)] == [
         *("map", "controller", "robots", "start", "seed"),
-        *("k_rep", "rho_0", "k_att", "attraction_limit"),
+        *gains_of(Rapf),
         "max_speed_m_s",
         "duration_s",
         *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),

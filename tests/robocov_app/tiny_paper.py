@@ -11,6 +11,7 @@ import pytest
 
 from robocov.errors import OutputError
 from robocov_app.interruption import Interruption
+from robocov_app.paper.beyond_plan import BeyondPlan
 from robocov_app.paper.plan import Plan
 from robocov_app.paper.studying import Means
 from robocov_app.sweep.lock import locked
@@ -30,6 +31,25 @@ TINY = Plan(
     convex_seeds=(0,),
     restarts=2,
     lattice=16,
+)
+
+
+TINY_BEYOND = BeyondPlan(
+    bundled=None,
+    generated=None,
+    starts=("corner",),
+    seeds=(0,),
+    own_seeds=(0,),
+    shared_seeds=(0,),
+    maps=(1, 2),
+    map_starts=("corner",),
+    conditions_maps=("rooms",),
+    conditions_seeds=1,
+    conditions_duration=3.0,
+    probe=2.0,
+    worst=1,
+    warm_up=1,
+    blocks=2,
 )
 
 

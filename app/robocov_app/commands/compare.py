@@ -46,7 +46,15 @@ def command(options: Arguments) -> int:
     )
     from robocov_app.interruption import Interruption
     from robocov_app.output import cleared, finite, listed, prepared, results
-    from robocov_app.run import check_layers, evaluated, save_numbers, simulated, starts_of, team_of
+    from robocov_app.run import (
+        check_layers,
+        conditions_of,
+        evaluated,
+        save_numbers,
+        simulated,
+        starts_of,
+        team_of,
+    )
 
     names = options.controllers
     if not names:
@@ -59,8 +67,9 @@ def command(options: Arguments) -> int:
     for name, chosen in zip(names, gains, strict=True):
         make_controller(name, chosen)
     team_of(options)
+    conditions_of(options)
     starts_of(environment, options)
-    check_layers(options)
+    check_layers(options, environment)
     target = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = built_cost(environment, options.lattice, quiet=options.json)
     runs: dict[str, Run] = {}
@@ -92,16 +101,20 @@ def print_table(runs: dict[str, Run]) -> None:
 
     from robocov_app.compare import rows_of
     from robocov_app.console import console
+    from robocov_app.weighing import weighed_lines
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("", style="bold", no_wrap=True)
-    for title in ("mean distance", "above best", "cost", "settled", "contacts", "clearance", "path"):
+    timed = all(run.history.mean_time is not None for run in runs.values())
+    titles = ["mean distance", *(["mean time"] if timed else []), "above best"]
+    for title in (*titles, "cost", "settled", "contacts", "clearance", "path"):
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows_of(runs):
         settled = row["settled_at_s"]
         table.add_row(
             row["label"],
             f"{row['mean_distance_m']:.3f} m",
+            *([f"{row['mean_time_s']:.3f} s"] if timed else []),
             f"{row['above_best']:.1%}",
             f"{row['cost_m3']:.2f} m³",
             "not yet" if settled is None else f"{settled:.1f} s",
@@ -110,3 +123,5 @@ def print_table(runs: dict[str, Run]) -> None:
             f"{row['mean_path_length_m']:.2f} m",
         )
     console().print(table)
+    for line in weighed_lines(next(iter(runs.values())).record.environment):
+        print(line)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import Any
 
-from robocov.controllers import FLAGSHIP, controller_kinds, gains_of
+from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
+from robocov.controllers.gains import Gain, Option, value_text
 from robocov_app.console import console
 
 
@@ -30,18 +32,8 @@ def command(options: Arguments) -> None:
                 "label": getattr(kind, "label", name),
                 "summary": getattr(kind, "summary", ""),
                 "flagship": name == FLAGSHIP,
-                "gains": [
-                    {
-                        "name": gain.name,
-                        "default": gain.default,
-                        "unit": gain.unit,
-                        "low": gain.low,
-                        "high": gain.high,
-                        "nullable": gain.optional,
-                        "meaning": gain.meaning,
-                    }
-                    for gain in gains_of(kind).values()
-                ],
+                "information": information_of(kind),
+                "gains": [_told(gain) for gain in gains_of(kind).values()],
             }
             for name, kind in kinds.items()
         ]
@@ -53,20 +45,39 @@ def command(options: Arguments) -> None:
     out = console()
     for name, kind in kinds.items():
         mark = "   (recommended)" if name == FLAGSHIP else ""
+        information = information_of(kind)
+        if information != "own":
+            mark += f"   (informed: {information})"
         out.print(Text.assemble((name, "bold"), f"   {getattr(kind, 'label', name)}{mark}"))
         out.print(Text(f"  {getattr(kind, 'summary', '')}"))
         table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
         for gain in gains_of(kind).values():
-            default = "null" if gain.default is None else f"{gain.default:g}"
-            also = ", or null" if gain.optional else ""
-            table.add_row(
-                "   ",
-                gain.name,
-                f"{default} {gain.unit}",
-                f"{gain.low:g} to {gain.high:g}{also}",
-                gain.meaning,
-            )
+            default = value_text(gain.default, none="null")
+            table.add_row("   ", gain.name, f"{default} {gain.unit}", _span(gain), gain.meaning)
         out.print(table)
     out.print(
         Text("A law of your own: robocov run rooms --controller mine.py:MyController (see the README).")
     )
+
+
+def _told(gain: Gain | Option) -> dict[str, Any]:
+    """Return what is known of a gain as it is printed in JSON."""
+    values = (
+        {"words": list(gain.words)}
+        if isinstance(gain, Option)
+        else {"low": gain.low, "high": gain.high, "nullable": gain.optional}
+    )
+    return {
+        "name": gain.name,
+        "default": gain.default,
+        "unit": gain.unit,
+        **values,
+        "meaning": gain.meaning,
+    }
+
+
+def _span(gain: Gain | Option) -> str:
+    """Return what values a gain may have."""
+    if isinstance(gain, Option):
+        return " | ".join(gain.words)
+    return f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"

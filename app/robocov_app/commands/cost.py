@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -16,6 +16,7 @@ from robocov.errors import InputError, ParameterError, shown
 from robocov.mapfile import load_map
 from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite
+from robocov_app.weighing import density_kind, weighed_lines
 
 if TYPE_CHECKING:
     from robocov.cost import CoverageCost, CoverageResult
@@ -33,10 +34,13 @@ class Arguments:
     """Path to a map JSON, or the name of a bundled map."""
     positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """JSON file with a list of [x, y] in metres, one for each robot."""
+    speeds: tuple[float, ...] = ()
+    """How fast each robot goes in m/s, in the order of the positions; one number stands for all. Then the one
+    counts that is first at a place, and the cost is in seconds as well."""
     lattice: int = 64
     """Evaluate on N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
-    """Save per-site points (m,2), distances (m,) and owner (m,) there."""
+    """Save per-site points (m,2), distances (m,) and owner (m,) there, with speeds also times (m,)."""
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Draw a map of the distances to a PNG, SVG or PDF."""
     theme: Literal["light", "dark"] = "light"
@@ -57,30 +61,63 @@ def command(options: Arguments) -> None:
         check_figure_path(options.plot)
     environment = load_map(options.map)
     robots = read_positions(options.positions)
+    speeds = speeds_of(options.speeds, len(robots))
     cost = built_cost(environment, options.lattice, quiet=options.json)
     try:
         result = cost(robots)
+        timed = None if speeds is None else cost(robots, speeds)
     except InputError as error:
         raise InputError(f"{options.positions}: {error}") from error
+    shown = result if timed is None else timed
     if options.sites is not None:
         with written(options.sites) as part, part.open("wb") as file:
-            np.savez(file, points=cost.points, distances=result.distances, owner=result.owner)
+            arrays: dict[str, Any] = {"points": cost.points}
+            arrays |= {"distances": shown.distances, "owner": shown.owner}
+            if timed is not None:
+                arrays["times"] = timed.times
+            np.savez(file, **arrays)
     if options.plot is not None:
-        draw(options, environment, cost_for_pictures(environment, cost), result)
+        draw(options, environment, cost_for_pictures(environment, cost), shown)
     answer = {
         "mean_distance_m": result.mean_distance,
+        **({} if timed is None else {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}),
         "cost_m3": result.value,
         "uncovered_area_m2": result.uncovered_area,
         "robots": len(robots),
         "sites": len(cost.points),
+        "density": density_kind(environment),
     }
     if options.json:
         print(json.dumps(finite(answer)))
         return
     print(f"mean distance   {result.mean_distance:.4f} m")
+    if timed is not None:
+        print(f"mean time       {timed.mean_time:.4f} s")
     print(f"coverage cost   {result.value:.3f} m³")
     print(f"uncovered area  {result.uncovered_area:.3f} m²")
+    for line in weighed_lines(environment):
+        print(line)
     print(f"on {len(cost.points)} sites, {len(robots)} robots")
+
+
+def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
+    """Return the speeds of so many robots, (n,) m/s, from one for all or one for each; None for none.
+
+    Raises
+    ------
+    ParameterError
+        When they are neither, or not positive.
+    """
+    if not given:
+        return None
+    if len(given) not in (1, robots):
+        raise ParameterError(
+            f"--speeds: {len(given)} numbers, but one, or one for each of {robots} robots, was wanted"
+        )
+    for speed in given:
+        if not 0.0 < speed < np.inf:
+            raise ParameterError(f"--speeds: {speed!r} m/s, but a number above 0 was wanted")
+    return np.array(given if len(given) == robots else given * robots)
 
 
 def draw(options: Arguments, environment: Environment, cost: CoverageCost, result: CoverageResult) -> None:
@@ -89,11 +126,15 @@ def draw(options: Arguments, environment: Environment, cost: CoverageCost, resul
     from robocov_app.plot_coverage import Moment, plot_coverage
     from robocov_app.plots import save_figure
     from robocov_app.view.field import Field, FieldLattice
+    from robocov_app.view.phi import mean_words
 
     assert options.plot is not None
     n = len(result.positions)
-    facts = f"{n} robot{'s' if n > 1 else ''}, mean distance {result.mean_distance:.3f} m"
-    field = Field(FieldLattice(cost.sites), cost(result.positions))
+    mean = f"{mean_words(environment)} {result.mean_distance:.3f} m"
+    if result.mean_time is not None:
+        mean = f"mean time {result.mean_time:.3f} s"
+    facts = f"{n} robot{'s' if n > 1 else ''}, {mean}"
+    field = Field(FieldLattice(cost.sites), cost(result.positions, result.speeds))
     moment = Moment(environment, Team.homogeneous(n), field, environment.name, facts)
     save_figure(plot_coverage([], [moment], options.theme, title="Coverage cost"), options.plot)
 

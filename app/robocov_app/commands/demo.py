@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.options import in_range, parsed_gains, parsed_size
+from robocov_app.condition_options import ConditionOptions
+from robocov_app.options import in_range, parsed_gains, parsed_size, robots_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,8 +69,11 @@ class Arguments:
     """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
     out: Path | None = None
     """Folder for these frames: 000000.png, 000001.png, ..."""
+    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
     video: Path | None = None
     """Render the window without a display to this film; with --tour, all of the tour."""
+    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
+    """Robots that differ: a TOML or JSON file of groups, as for `robocov run`; it says how many there are."""
 
     def __post_init__(self) -> None:
         in_range("--robots", self.robots, 1, 1000)
@@ -133,19 +137,25 @@ def command(options: Arguments) -> int:
 def session_of(options: Arguments) -> Session:
     """Return the session that the options describe."""
     from robocov.mapfile import load_map
+    from robocov.teamfile import read_team
     from robocov_app.demo.scenario import Law, Limits, Scenario
     from robocov_app.demo.session import Session
 
+    robots, limits = options.robots, Limits(radius=options.radius)
+    if options.team is not None:
+        team = read_team(options.team, {"radius": options.radius})
+        robots, limits = robots_of(team, robots, Arguments.robots, options.team), Limits.of(team)
     laws = tuple(Law(name) for name in options.controllers)
     laws = (Law(options.controllers[0], parsed_gains(options.gains)), *laws[1:])
     scenario = Scenario(
         load_map(options.map),
         laws,
-        options.robots,
+        robots,
         options.start,
         options.seed,
-        Limits(radius=options.radius),
+        limits,
         options.dt,
+        conditions=options.conditions.conditions(options.seed, robots),
     )
     session = Session(scenario)
     session.clock.speed = options.speed

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.console import console
+from robocov_app.weighing import density_kind
 
 
 @dataclass
@@ -36,6 +37,7 @@ def command(options: Arguments) -> None:
                     "height_m": high_y - low_y,
                     "free_area_m2": environment.free_area,
                     "starts": list(environment.starts),
+                    "density": density_kind(environment),
                 }
             )
         print(json.dumps({"maps": rows}, indent=1))
@@ -50,5 +52,8 @@ def command(options: Arguments) -> None:
     for name, environment in maps.items():
         low_x, low_y, high_x, high_y = environment.region.bounds
         size = f"{high_x - low_x:.3g} x {high_y - low_y:.3g}"
-        table.add_row(name, size, ", ".join(environment.starts), environment.description)
+        what = environment.description
+        if environment.density is not None:
+            what += f" Density: {environment.density.kind}."
+        table.add_row(name, size, ", ".join(environment.starts), what)
     console().print(table)

@@ -21,6 +21,7 @@ from robocov.robots import DEFAULT_RADIUS
 from robocov_app.building import PATIENCE, built_cost
 from robocov_app.output import finite
 from robocov_app.progress import progress
+from robocov_app.weighing import density_kind, weighed_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -112,9 +113,9 @@ def command(options: Arguments) -> None:
     if options.plot is not None:
         _draw(options.plot, options.theme, environment, best, radius)
     if options.json:
-        print(json.dumps(finite(_answer(best, gaps))))
+        print(json.dumps(finite(_answer(environment, best, gaps))))
     else:
-        _print(options, best, gaps, seconds)
+        _print(options, environment, best, gaps, seconds)
 
 
 def _check(options: Arguments) -> None:
@@ -185,11 +186,12 @@ def _gaps(options: Arguments, environment: Environment, best: Optimum, saved: li
     return gaps
 
 
-def _answer(best: Optimum, gaps: list[_Gap]) -> dict[str, Any]:
+def _answer(environment: Environment, best: Optimum, gaps: list[_Gap]) -> dict[str, Any]:
     return {
         "mean_distance_m": best.mean_distance,
         "cost_m3": best.value,
         "uncovered_area_m2": best.uncovered_area,
+        "density": density_kind(environment),
         "robots": len(best.positions),
         "positions_m": best.positions.tolist(),
         "restarts": len(best.costs),
@@ -200,12 +202,16 @@ def _answer(best: Optimum, gaps: list[_Gap]) -> dict[str, Any]:
     }
 
 
-def _print(options: Arguments, best: Optimum, gaps: list[_Gap], seconds: float) -> None:
+def _print(
+    options: Arguments, environment: Environment, best: Optimum, gaps: list[_Gap], seconds: float
+) -> None:
     """Print the answer for people."""
     count, robots = len(best.costs), len(best.positions)
     print(f"mean distance   {best.mean_distance:.4f} m")
     print(f"coverage cost   {best.value:.3f} m³")
     print(f"uncovered area  {best.uncovered_area:.3f} m²")
+    for line in weighed_lines(environment):
+        print(line)
     print(f"{robots} robot{'s' if robots > 1 else ''}, {count} restarts in {seconds:.1f} s, of these")
     for within in _WITHIN:
         print(f"  within {within:.1%} of the best  {round(best.agreement(within) * count):>4}")
@@ -225,10 +231,11 @@ def _draw(path: Path, theme: str, environment: Environment, best: Optimum, radiu
     from robocov_app.plot_coverage import Moment, plot_coverage
     from robocov_app.plots import save_figure
     from robocov_app.view.field import Field, FieldLattice
+    from robocov_app.view.phi import mean_words
 
     cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
     n = len(best.positions)
-    facts = f"{n} robot{'s' if n > 1 else ''}, mean distance {best.mean_distance:.3f} m"
+    facts = f"{n} robot{'s' if n > 1 else ''}, {mean_words(environment)} {best.mean_distance:.3f} m"
     field = Field(FieldLattice(cost.sites), cost(best.positions))
     moment = Moment(environment, Team.homogeneous(n, radius=radius), field, environment.name, facts)
     save_figure(plot_coverage([], [moment], theme, title="Best positions found"), path)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from robocov.errors import InputError
 from robocov_app.options import in_range
 
 if TYPE_CHECKING:
@@ -28,8 +29,9 @@ class Arguments:
     """Run the paper's figures 1 to 8 and test its claims over many maps, starts and seeds.
 
     The folder gets index.html, a page with every figure beside what the paper claims of it and a plain
-    verdict on every claim; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their
-    tables. How long it takes is told before it begins. Ctrl-C keeps what is done, and the same command goes
+    verdict on every claim; beyond.html, with every registered controller side by side and what the paper
+    leaves to others; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their tables. How
+    long it takes is told before it begins. Ctrl-C keeps what is done, and the same command goes
     on from there.
 
     Example: robocov paper --quick --out paper
@@ -38,9 +40,13 @@ class Arguments:
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the results; one that holds a part of the same study is gone on with."""
     quick: bool = False
-    """A small study of about two minutes, to see that all is well; the full one takes about half an hour."""
+    """A small study of three to four minutes, to see that all is well; the full one takes an hour or more."""
     figures_only: bool = False
     """Only the figures, without the claims."""
+    without_beyond: bool = False
+    """Leave out what goes beyond the paper."""
+    beyond_only: bool = False
+    """Only the figures and what goes beyond the paper: pages and claims.json leave the paper's claims out."""
     workers: int | None = None
     """Processes; by default one a processor."""
     scheduler: str | None = None
@@ -51,6 +57,21 @@ class Arguments:
     def __post_init__(self) -> None:
         if self.workers is not None:
             in_range("--workers", self.workers, 1, _MOST_WORKERS)
+        chosen = [option for option, wanted in self._parts().items() if wanted]
+        if len(chosen) > 1:
+            raise InputError(f"{chosen[0]} and {chosen[1]}: one of them was wanted")
+
+    def _parts(self) -> dict[str, bool]:
+        return {
+            "--figures-only": self.figures_only,
+            "--without-beyond": self.without_beyond,
+            "--beyond-only": self.beyond_only,
+        }
+
+    @property
+    def part(self) -> str:
+        """The option that says which part is wanted, with a space before it; empty where all is."""
+        return "".join(f" {option}" for option, wanted in self._parts().items() if wanted)
 
 
 def command(options: Arguments) -> int:
@@ -58,6 +79,12 @@ def command(options: Arguments) -> int:
     from robocov_app.interruption import Interruption
     from robocov_app.output import finite
     from robocov_app.paper.asking import asked
+    from robocov_app.paper.beyond import forecast_beyond, studied_beyond
+    from robocov_app.paper.beyond_writing import (
+        beyond_claims,
+        save_beyond_page,
+        save_beyond_pictures,
+    )
     from robocov_app.paper.plan import FULL, QUICK
     from robocov_app.paper.studying import (
         Means,
@@ -67,6 +94,7 @@ def command(options: Arguments) -> int:
         forecast,
         studied,
         studied_figures,
+        together,
     )
     from robocov_app.paper.writing import save_claims, save_page, save_pictures
     from robocov_app.sweep.pool import processors
@@ -76,23 +104,35 @@ def command(options: Arguments) -> int:
     begun(out, plan)
     workers = options.workers or processors()
     claims: Sequence[Claim] = ()
-    material = None
+    more: Sequence[Claim] = ()
+    material = beyond = None
+    wanted = plan.beyond is not None and not (options.figures_only or options.without_beyond)
+    alone = options.beyond_only
     with Interruption() as stop:
         means = Means(workers, options.scheduler, quiet, stop)
         if not quiet:
-            _announce(forecast(out, plan, workers, figures_only=options.figures_only), plan.name, means)
+            expected = [forecast(out, plan, workers, figures_only=options.figures_only or alone)]
+            if wanted:
+                expected.append(forecast_beyond(out, plan, workers, alone=alone))
+            _announce(together(expected), plan.name, means)
         try:
             runs: Mapping[str, Shown]
-            if options.figures_only:
+            if options.figures_only or alone:
                 runs = studied_figures(out, plan, means)
             else:
                 material = studied(out, plan, means)
                 runs = material.figures
                 claims = asked(material.convex, material.claims, material.gains)
                 save_claims(out, claims)
+            if wanted:
+                beyond = studied_beyond(out, plan, means, material)
+                more = beyond_claims(beyond)
+                save_claims(out, [*claims, *more])
             first = first_record()
             images = save_pictures(out, runs, first, material, quiet=quiet)
-            save_page(out, plan, images, runs, first, material, claims)
+            if beyond is not None:
+                save_beyond_page(out, save_beyond_pictures(out, beyond, quiet=quiet), beyond)
+            save_page(out, plan, images, runs, first, material, claims, more)
         except Stopped:
             return _stopped(options)
     if options.json:
@@ -100,16 +140,17 @@ def command(options: Arguments) -> int:
             "out": str(out),
             "plan": plan.name,
             "interrupted": False,
-            "runs": material.runs if material else len(runs),
-            "failed": material.failed if material else 0,
+            "runs": (material.runs if material else len(runs)) + (beyond.runs if beyond else 0),
+            "failed": (material.failed if material else 0) + (beyond.failed if beyond else 0),
             "page": str(out / "index.html"),
-            "claims": [claim.to_json() for claim in claims],
+            "claims": [claim.to_json() for claim in (*claims, *more)],
         }
         print(json.dumps(finite(answer)))
         return 0
-    if claims:
-        print_claims(claims)
-    print(f"saved in {out}/: index.html{', claims.json' if claims else ''}, figures/, studies/")
+    if claims or more:
+        print_claims((*claims, *more))
+    written = ["index.html", *["beyond.html"] * wanted, *["claims.json"] * bool(claims or more)]
+    print(f"saved in {out}/: {', '.join(written)}, figures/, studies/")
     return 0
 
 
@@ -156,6 +197,5 @@ def _stopped(options: Arguments) -> int:
         print(json.dumps({"out": str(options.out), "interrupted": True}))
     else:
         quick = " --quick" if options.quick else ""
-        only = " --figures-only" if options.figures_only else ""
-        print(f"stopped; to go on: robocov paper --out {options.out}{quick}{only}")
+        print(f"stopped; to go on: robocov paper --out {options.out}{quick}{options.part}")
     return INTERRUPTED

@@ -39,6 +39,7 @@ def command(options: Arguments) -> int:
     from robocov_app.output import cleared, finite, listed, results
     from robocov_app.run import (
         check_layers,
+        conditions_of,
         evaluated,
         save_numbers,
         save_pictures,
@@ -53,8 +54,9 @@ def command(options: Arguments) -> int:
     # everything that the user gave is checked before a folder is made
     make_controller(options.controller, gains)
     team_of(options)
+    conditions_of(options)
     starts_of(environment, options)
-    check_layers(options)
+    check_layers(options, environment)
     cost = built_cost(environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
@@ -75,13 +77,20 @@ def command(options: Arguments) -> int:
 
 def print_summary(run: Run) -> None:
     """Print what is worth knowing of a run."""
+    from robocov_app.weighing import weighed_lines
+
     summary, record = run.summary, run.record
     settled = summary["settled_at_s"]
     first = run.history.mean_distance[0]
     path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
     print(f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s")
     print(f"  mean distance   {summary['mean_distance_m']:.3f} m   (at the start {first:.3f} m)")
+    if run.history.mean_time is not None:
+        at_first = f"(at the start {run.history.mean_time[0]:.3f} s)"
+        print(f"  mean time       {summary['mean_time_s']:.3f} s   {at_first}")
     print(f"  coverage cost   {summary['cost_m3']:.2f} m³")
+    for line in weighed_lines(record.environment):
+        print(f"  {line}")
     if summary["uncovered_area_m2"] > 0:
         print(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
     print(f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}")

@@ -62,6 +62,7 @@ _LAYER_KEYS = (
     ("scale_bar", "alt+8"),
     ("status", "alt+9"),
     ("colour_bar", "alt+0"),
+    ("density", "alt+d"),
 )
 
 _TOOL_KEYS = {
@@ -69,6 +70,7 @@ _TOOL_KEYS = {
     "polygon": "p",
     "wall": "w",
     "circle": "c",
+    "brush": "g",
     "eraser": "x",
     "robot": "a",
     "failure": "d",
@@ -107,8 +109,8 @@ _OTHERS = (
     Action("robot:remove", "Take the robot that is asked out", "Touch", ("delete",)),
     Action("finish", "Finish what is being drawn", "Touch", ("return", "enter")),
     Action("cancel", "Give up; close", "Touch", ("escape",)),
-    Action("wider", "Wider walls", "Touch", ("]",)),
-    Action("narrower", "Narrower walls", "Touch", ("[",)),
+    Action("wider", "Wider walls; a larger brush", "Touch", ("]",)),
+    Action("narrower", "Narrower walls; a smaller brush", "Touch", ("[",)),
     Action("fit", "Show the whole map", "View", ("f",)),
     Action("zoom:in", "Zoom in", "View", ("ctrl+=", "ctrl++")),
     Action("zoom:out", "Zoom out", "View", ("ctrl+-",)),

@@ -16,6 +16,7 @@ from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.furniture import Status, legend_rows, legend_strip
 from robocov_app.view.layers import drawn_radii
+from robocov_app.view.phi import mean_words
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.scene import Scene
 from robocov_app.view.shading import round_limit
@@ -191,7 +192,7 @@ class Arena:
         trail, times = session.trail(lane)
         team = lane.simulation.team
         if not session.live:
-            team = circumstances.limits.team(len(circumstances.numbers))
+            team = circumstances.team
         known = desk.costs.known.get(lane.number)
         field = None
         if known is not None and painter.needs_field:
@@ -199,10 +200,11 @@ class Arena:
             self._scale_colours(known.field.largest)
         number = desk.selected
         selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
-        cost = "" if known is None else f"mean distance {known.result.mean_distance:.3f} m"
+        what = mean_words(circumstances.environment)
+        cost = "" if known is None else f"{what} {known.result.mean_distance:.3f} m"
         starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
         scene = Scene.of(
-            circumstances.environment,
+            circumstances.environment.at(snapshot.time),
             team,
             snapshot,
             starts=starts,
@@ -217,6 +219,7 @@ class Arena:
             scene,
             numbers=circumstances.numbers,
             failed=circumstances.failed,
+            failed_radii={number: circumstances.limits.radius_of(number) for number in circumstances.failed},
             selected=selected,
             scans=self._scans(lane, snapshot, team.sensing_range, selected) if "scan" in desk.shown else (),
             sensed=lane.sensed,
@@ -268,7 +271,7 @@ class Arena:
         asked = self.desk.selected
         if asked is not None and asked in scene.failed:
             center = canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist()
-            radius = max(float(scene.team.radius[0]) * canvas.camera.zoom, 9.0 * canvas.scale)
+            radius = max(scene.failed_radius(asked) * canvas.camera.zoom, 9.0 * canvas.scale)
             ring = partial(
                 sprites.ring, round(radius) + 4.0 * canvas.scale, self.theme.ink, 2.2 * canvas.scale
             )
@@ -309,7 +312,7 @@ class Arena:
             canvas.outline(points, accent, canvas.width(1.5), closed=False)
             if preview.closed:
                 canvas.dashes(points[-1].tolist(), points[0].tolist(), accent, canvas.width(1.0))
-        for x, y in canvas.camera.to_pixels(np.array(preview.line)).tolist():
+        for x, y in canvas.camera.to_pixels(np.array(preview.line)).tolist() if preview.marks else ():
             size = 3 * canvas.scale
             box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
             pygame.draw.rect(canvas.surface, self.theme.background, box)

@@ -21,7 +21,7 @@ def report_on(desk: Desk, number: int) -> Report:
         return Report(f"Robot {number}", verdict, ())
     return explain(
         session.snapshot(lane),
-        circumstances.limits.team(len(circumstances.numbers)),
+        circumstances.team,
         with_failed(circumstances),
         circumstances.numbers.index(number),
         names=circumstances.numbers,

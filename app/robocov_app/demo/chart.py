@@ -13,6 +13,7 @@ from robocov_app.demo.overlays import tag
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera, round_length
 from robocov_app.view.canvas import Canvas
+from robocov_app.view.phi import density_words
 from robocov_app.view.theme import mix
 
 if TYPE_CHECKING:
@@ -35,7 +36,15 @@ SHORTEST = 10.0
 REFRESHED = 0.1
 """Seconds after which growing curves are drawn anew."""
 
-_GLYPHS = {"obstacle": "■", "robot": "+", "failure": "×", "law": "◆", "limits": "◆", "hand": "●"}
+_GLYPHS = {
+    "obstacle": "■",
+    "robot": "+",
+    "failure": "×",
+    "law": "◆",
+    "limits": "◆",
+    "hand": "●",
+    "density": "▲",
+}
 
 
 _FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
@@ -139,7 +148,9 @@ class Chart:
         left, right, end = self._span
         height = self.layout.chart[3]
         top, bottom = TOP * scale, height - BOTTOM * scale
-        canvas.text("Mean distance to the nearest robot, m", (12 * scale, 0.5 * TOP * scale), bold=True)
+        weighed = ", weighed by φ" if density_words(session.environment) else ""
+        title = f"Mean distance to the nearest robot{weighed}, m"
+        canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
         if self.desk.costs.state:
             canvas.text(self.desk.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
         values = [lane.curve.value for lane in session.lanes] + [ghost.value for ghost in session.ghosts]
@@ -262,6 +273,8 @@ class Chart:
         words = "live" if session.live else "past"
         if session.live and session.history.thinned:
             words = "live · past thinned"
+            if right + 9 * scale + canvas.text_width(words, size=theme.small_text) > self.layout.track[2]:
+                words = "thinned"
         colour = theme.start if session.live else theme.final
         canvas.text(
             words,

@@ -27,6 +27,9 @@ LATTICE = 128
 _PANES = 1 << 20
 """More than there will ever be."""
 
+_MOVES = "no live cost: obstacles move"
+"""A map must be known for a moment before its cost is quick to say; saved runs tell it once a second."""
+
 _PATIENCE = 0.5
 """Seconds after which an answer is not waited for any more."""
 
@@ -97,7 +100,14 @@ class DirectCosts:
 
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
+        before = self._cost
         self.known, self.state, self._cost, self._asked = {}, "", None, {}
+        if environment.moves:
+            self.state = _MOVES
+            return
+        if before is not None and before.environment.same_place(environment):
+            self._cost = before.weighed(environment)
+            return
         try:
             self._cost = CoverageCost(environment, self._lattice)
         except RobocovError as error:
@@ -154,8 +164,11 @@ class WorkerCosts:
 
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
-        self._generation = self._worker.environment(environment, self._lattice)
         self.known, self._waiting, self._ready, self._out = {}, {}, False, -1.0
+        if environment.moves:
+            self._generation, self.state = -1, _MOVES
+            return
+        self._generation = self._worker.environment(environment, self._lattice)
         self.state = "cost: preparing the map"
 
     def forget(self) -> None:

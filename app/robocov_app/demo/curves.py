@@ -32,7 +32,7 @@ class Event:
 
 
 class Curve:
-    """The mean distance to the nearest robot, (22) by area, at ascending times."""
+    """The mean distance to the nearest robot, (22) by area or by ∫φ, at ascending times."""
 
     def __init__(self) -> None:
         self._time: list[float] = []

@@ -9,15 +9,16 @@ from robocov.controllers import controller_kinds
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
-from robocov_app.demo.parameters import Parameter, gain_parameters, limit_parameters, with_limit
+from robocov_app.demo.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.demo.scenario import Law
-from robocov_app.demo.tools import Hand, Wall, toolbox
+from robocov_app.demo.tools import Brush, Hand, Wall, toolbox
 from robocov_app.demo.typed import command
 from robocov_app.output import free_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from robocov.controllers.gains import Value
     from robocov_app.demo.costs import Costs
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.session import Session
@@ -110,8 +111,8 @@ class Desk:
         self.active = min(self.active, len(self.session.lanes) - 1)
         return self.session.lanes[self.active]
 
-    def parameters(self) -> list[Parameter]:
-        """Return all sliders: the chosen controller's gains, then the team's limits."""
+    def parameters(self) -> list[Parameter | Pick]:
+        """Return all sliders and words: the chosen controller's gains, then the team's limits."""
         circumstances = self.session.circumstances(self.lane)
         return [*gain_parameters(circumstances.law), *limit_parameters(circumstances.limits)]
 
@@ -147,7 +148,8 @@ class Desk:
     def look_at_map(self) -> None:
         """Let the cost know when there is another map."""
         environment = self.session.environment
-        if environment is not self._mapped:
+        # while it is painted the cost would never be ready
+        if environment is not self._mapped and not getattr(self.tool, "painting", False):
             self._mapped = environment
             self.costs.environment(environment)
 
@@ -357,7 +359,10 @@ class Desk:
             self.tool = self.hand
 
     def widen(self, factor: float) -> None:
-        """Draw wider walls, or narrower ones."""
+        """Draw wider walls, or narrower ones; with the brush in hand, take a larger or smaller one."""
+        if isinstance(self.tool, Brush):
+            self.say(self.tool.widen(self.session, factor))
+            return
         wall = self.tools["wall"]
         assert isinstance(wall, Wall)
         wall.widen(factor)
@@ -384,10 +389,10 @@ class Desk:
         self.map_name = str(target)
         self.say(f"map saved: {target}")
 
-    def set_parameter(self, name: str, value: float | None) -> None:
+    def set_parameter(self, name: str, value: Value) -> None:
         """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""
         circumstances = self.session.circumstances(self.lane)
-        if name.startswith("team."):
+        if name.startswith("team.") and not isinstance(value, str):
             self.session.set_limits(with_limit(circumstances.limits, name, value))
         else:
             self.session.set_law(self.lane, circumstances.law.with_gain(name, value))

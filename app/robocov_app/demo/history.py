@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from robocov.arrays import Array, IntArray
+    from robocov.communication import Inbox
+    from robocov.conditions import Conditions
     from robocov.environment import Environment
     from robocov.observation import Decision
+    from robocov.robots import Team
     from robocov_app.demo.scenario import Law, Limits
 
 MOST_BYTES = 24_000_000
@@ -47,6 +50,8 @@ class Circumstances:
         What people call the robots that work, in the order of the rows.
     failed : dict of number to (x, y) m
         Robots that stand where they failed.
+    conditions : Conditions or None
+        What goes wrong with messages and sensors; None: nothing. Failing and joining is not among it.
     """
 
     environment: Environment
@@ -54,21 +59,28 @@ class Circumstances:
     limits: Limits
     numbers: tuple[int, ...]
     failed: Mapping[int, tuple[float, float]]
+    conditions: Conditions | None = None
 
     @property
     def solid(self) -> Environment:
         """The map with the robots that failed as obstacles, which is what the others sense."""
         if not self.failed:
             return self.environment
-        return _with_wrecks(self.environment, tuple(self.failed.values()), self.limits.radius)
+        radii = tuple(map(self.limits.radius_of, self.failed))
+        return _with_wrecks(self.environment, tuple(self.failed.values()), radii)
+
+    @property
+    def team(self) -> Team:
+        """The robots that work."""
+        return self.limits.team(self.numbers)
 
 
 # circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
 @lru_cache(maxsize=8)
 def _with_wrecks(
-    environment: Environment, places: tuple[tuple[float, float], ...], radius: float
+    environment: Environment, places: tuple[tuple[float, float], ...], radii: tuple[float, ...]
 ) -> Environment:
-    wrecks = tuple(CircleObstacle(place, radius) for place in places)
+    wrecks = tuple(map(CircleObstacle, places, radii))
     return replace(environment, obstacles=(*environment.obstacles, *wrecks))
 
 
@@ -83,6 +95,8 @@ class State(NamedTuple):
         What the controller remembered; None where it can do without.
     recorded : Decision or None
         What was decided then, where it comes from a record.
+    inbox : Inbox or None
+        The messages that the robots had; None where they know the others as they are.
     """
 
     circumstances: Circumstances
@@ -90,6 +104,7 @@ class State(NamedTuple):
     velocities: Array
     memory: Any
     recorded: Decision | None = None
+    inbox: Inbox | None = None
 
 
 class Moment(NamedTuple):
@@ -237,7 +252,11 @@ def _changes(before: Moment, after: Moment) -> bool:
 def _size(moment: Moment) -> int:
     """Return about how many bytes a moment takes."""
     return sum(
-        _OVERHEAD + state.positions.nbytes + state.velocities.nbytes + _bytes_of(state.memory)
+        _OVERHEAD
+        + state.positions.nbytes
+        + state.velocities.nbytes
+        + _bytes_of(state.memory)
+        + _bytes_of(state.inbox)
         for state in moment.states.values()
     )
 

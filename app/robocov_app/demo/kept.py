@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS
+from robocov.controllers import remembers
 from robocov.environment import CircleObstacle
 from robocov.errors import RobocovError
 from robocov.observation import Decision, Snapshot
-from robocov.record import Recorder
+from robocov.recorder import Recorder
 from robocov_app.demo.editing import with_obstacle
 from robocov_app.demo.history import State
 from robocov_app.demo.lane import simulation_of
@@ -190,7 +190,7 @@ class Retracing:
                 self.proven = False
         self.snapshots: dict[int, Snapshot] = {}
         self.moved: list[Moved] = []
-        self._past = Past()
+        self._past = Past(dt)
         self._simulation: Simulation | None = None
         self._at = 0
 
@@ -295,9 +295,16 @@ def records_of(job: Job, retracings: Sequence[Retracing]) -> list[Record]:
 def _record_of(job: Job, part: Part, retracing: Retracing, steps: range) -> Record:
     circumstances, controller = part.circumstances, retracing.controller
     environment = with_wrecks(circumstances)
-    team = circumstances.limits.team(len(circumstances.numbers))
+    team = circumstances.team
     name = circumstances.law.name
-    recorder = Recorder(environment, team, controller, job.dt * steps.step, name=name)
+    recorder = Recorder(
+        environment,
+        team,
+        controller,
+        job.dt * steps.step,
+        name=name,
+        conditions=circumstances.conditions,
+    )
     for step in steps:
         recorder.add(retracing.snapshots[step])
     record = replace(recorder.record(), time=np.arange(len(steps), dtype=float) * (job.dt * steps.step))
@@ -314,7 +321,7 @@ def with_wrecks(circumstances: Circumstances) -> Environment:
     """Return the map with the robots that failed as obstacles with names."""
     environment = circumstances.environment
     for number, place in circumstances.failed.items():
-        wreck = CircleObstacle(place, circumstances.limits.radius, wreck_name(number))
+        wreck = CircleObstacle(place, circumstances.limits.radius_of(number), wreck_name(number))
         environment = with_obstacle(environment, wreck)
     return environment
 
@@ -323,7 +330,7 @@ def _start_of(job: Job, environment: Environment, record: Record) -> str | None:
     """Return the name of the start if that is where the record begins, as whoever repeats it will find."""
     try:
         start = environment.start(job.start)
-        radius = float(record.team.radius[0])
+        radius = float(record.team.radius.max())
         positions = start.sample(len(record.team), seed=job.seed, radius=radius)
     except RobocovError:
         return None
@@ -342,8 +349,8 @@ def _session_of(job: Job, part: Part, retracing: Retracing, steps: range, record
         for each in retracing.moved
         if each.until > began and each.since < steps[-1]
     ]
-    # what a controller of the user's remembers, and what it makes of the time, no file tells
-    known = type(retracing.controller) in CONTROLLERS.values() or began == 0
+    # what a controller remembers, and what one of the user's makes of the time, no file tells
+    known = not remembers(retracing.controller) or began == 0
     repeatable = retracing.proven and not touched and known
     said: dict[str, Any] = {}
     if began:

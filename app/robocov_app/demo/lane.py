@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS, Individually
+from robocov.controllers import remembers
 from robocov.errors import StartError
 from robocov.relocation import relocated
 from robocov.simulation import Simulation
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 SENSED_EVERY = 3
 """What is sensed is noted at every so many steps."""
-
-_WITHOUT_MEMORY = (*CONTROLLERS.values(), Individually)
-"""Controllers that remember nothing but what makes the next decision quicker."""
 
 
 class Wanted(NamedTuple):
@@ -130,10 +127,11 @@ class Lane:
     def state(self) -> State:
         """Return what is needed to go on from here."""
         simulation = self.simulation
-        without = type(simulation.controller) in _WITHOUT_MEMORY
         # who wrote a controller may have it change what it remembers
-        memory = None if without else deepcopy(simulation.memory)
-        return State(self.circumstances, simulation.positions, simulation.velocities, memory)
+        memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
+        return State(
+            self.circumstances, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox
+        )
 
     def resume(self, state: State, simulation: Simulation, starts: Array, trail: Trail) -> None:
         """Go on from an earlier state.
@@ -165,10 +163,12 @@ class Lane:
             When the controller or the team does not take a value.
         """
         old, circumstances = self.simulation, wanted.circumstances
-        environment, team = circumstances.solid, circumstances.limits.team(len(circumstances.numbers))
+        environment, team = circumstances.solid, circumstances.team
         # the same controller goes on remembering
         controller = None if circumstances.law == self.law else circumstances.law.made()
-        return _fitted(
+        if self._only_weighed(wanted):
+            return old.weighed(environment)
+        changed = _fitted(
             lambda positions, velocities: old.changed(
                 environment=environment,
                 controller=controller,
@@ -176,11 +176,25 @@ class Lane:
                 positions=positions,
                 velocities=velocities,
             ),
-            environment,
+            environment.at(old.time),
             team,
             old.positions if wanted.positions is None else wanted.positions,
             old.velocities if wanted.velocities is None else wanted.velocities,
         )
+        if old.inbox is not None and circumstances.numbers != self.numbers:
+            # who stays keeps the messages of who stays
+            rows = [-1 if self.row(number) is None else self.row(number) for number in circumstances.numbers]
+            changed = changed.remembering(changed.memory, old.inbox.rearranged(np.array(rows, dtype=np.intp)))
+        return changed
+
+    def _only_weighed(self, wanted: Wanted) -> bool:
+        """Return whether nothing is wanted to be otherwise but the density, as when it is painted."""
+        now, then = self.circumstances, wanted.circumstances
+        alike = all(
+            getattr(now, name) == getattr(then, name) for name in ("law", "limits", "numbers", "failed")
+        )
+        placed = wanted.positions is not None or wanted.velocities is not None
+        return alike and not placed and then.environment.same_place(now.environment)
 
     def take(self, circumstances: Circumstances, simulation: Simulation) -> None:
         """Go on with what `changed` returned."""
@@ -223,10 +237,11 @@ def simulation_of(
         circumstances.solid,
         circumstances.law.made(),
         positions,
-        circumstances.limits.team(len(circumstances.numbers)),
+        circumstances.team,
         dt,
         velocities=velocities,
         time=time,
+        conditions=circumstances.conditions,
     )
 
 
@@ -242,13 +257,14 @@ def resumed(state: State, dt: float, time: float) -> Simulation:
     circumstances = state.circumstances
     simulation = _fitted(
         lambda positions, velocities: simulation_of(circumstances, positions, dt, velocities, time),
-        circumstances.solid,
-        circumstances.limits.team(len(circumstances.numbers)),
+        circumstances.solid.at(time),
+        circumstances.team,
         state.positions,
         state.velocities,
     )
-    if state.memory is not None:
-        simulation = simulation.remembering(state.memory)
+    if state.memory is not None or state.inbox is not None:
+        memory = simulation.memory if state.memory is None else state.memory
+        simulation = simulation.remembering(memory, state.inbox)
     return simulation
 
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from robocov_app.demo.actions import key_words, layer_actions
+from robocov_app.demo.look import TEXT
+from robocov_app.demo.parameters import Pick
+from robocov_app.view.fonts import shortened
 
 if TYPE_CHECKING:
     from robocov_app.demo.desk import Desk
@@ -61,7 +65,10 @@ def parameters_page(widgets: Widgets, desk: Desk, top: float) -> None:
             if not group:
                 widgets.label("none", widgets.rect(MARGIN, y, wide, 20), style="#unit")
             for each in group:
-                _slider(widgets, desk, each, y, wide)
+                if isinstance(each, Pick):
+                    _words(widgets, desk, each, y, wide)
+                else:
+                    _slider(widgets, desk, each, y, wide)
                 y += _ROW
             y += 6 if group else _ROW
 
@@ -97,6 +104,41 @@ def _slider(widgets: Widgets, desk: Desk, each: Parameter, y: float, wide: float
         lambda: put(each.default),
         name=f"reset:{each.name}",
         tip=f"Back to the default: {usual}",
+        style="#small",
+    )
+
+
+def _words(widgets: Widgets, desk: Desk, each: Pick, y: float, wide: float) -> None:
+    """Buttons side by side, one for each word; where they do not fit, one that goes on to the next."""
+    rect = widgets.rect
+    left, room = MARGIN + 103, wide - 103 - 26
+
+    def put(word: str) -> None:
+        desk.attempt(lambda: desk.set_parameter(each.name, word))
+
+    def go_on() -> None:
+        now = next(known for known in desk.parameters() if known.name == each.name)
+        place = each.offered.index(now.words())
+        put(each.offered[(place + 1) % len(each.offered)])
+
+    widgets.label(each.label, rect(MARGIN, y, 100, 24), tip=each.meaning)
+    width = (room - 3 * (len(each.offered) - 1)) / len(each.offered)
+    size = TEXT["#small"][0]
+    if all(shortened(word, round(size), width - 6) == word for word in each.offered):
+        for k, word in enumerate(each.offered):
+            place = rect(left + k * (width + 3), y + 1, width, 22)
+            name = f"{each.name}:{word}"
+            widgets.button(word, place, partial(put, word), name=name, tip=each.meaning, style="#small")
+    else:
+        tip = f"{each.meaning}: {', '.join(each.offered)}"
+        place = rect(left, y + 1, room, 22)
+        widgets.button(f"{each.value} ›", place, go_on, name=f"next:{each.name}", tip=tip, style="#small")
+    widgets.button(
+        "↺",
+        rect(MARGIN + wide - 22, y + 1, 22, 22),
+        lambda: put(each.default),
+        name=f"reset:{each.name}",
+        tip=f"Back to the default: {each.default}",
         style="#small",
     )
 

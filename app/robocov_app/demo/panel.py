@@ -20,6 +20,7 @@ from robocov_app.demo.pages import (
     robot_page,
     show_page,
 )
+from robocov_app.demo.parameters import Pick
 from robocov_app.demo.scenario import MOST_PANES
 from robocov_app.view.theme import LIGHT
 
@@ -172,9 +173,9 @@ class Panel(Paged):
         def build() -> None:
             widgets.label("MOUSE", widgets.rect(MARGIN, 0, WIDE, 18), style="#header")
             for k, tool in enumerate(self.desk.tools.values()):
-                x, width = columns(4)[k % 4]
-                place = widgets.rect(x, 20 + 30 * (k // 4), width, 26)
-                widgets.does(tool.title, place, f"tool:{tool.name}")
+                x, width = columns(5)[k % 5]
+                place = widgets.rect(x, 20 + 30 * (k // 5), width, 26)
+                widgets.does(tool.title, place, f"tool:{tool.name}", style="#small")
 
         widgets.section("tools", None, y, build)
         return y + 86
@@ -193,13 +194,18 @@ class Panel(Paged):
         widgets.say("button", "theme", "Dark" if self._theme is LIGHT else "Light")
         self._mark_tabs(widgets)
         for name in desk.tools:
-            widgets.mark(f"tool:{name}", desk.tool.name == name)
+            widgets.mark(f"tool:{name}", desk.tool.name == name, ("#chosen_tab", "#small"))
         widgets.fill("robots", str(session.scenario.robots))
         widgets.fill("seed", str(session.scenario.seed))
         speed = session.clock.speed
         widgets.slide("speed", speed_index(speed))
         widgets.say("label", "speed", speed_words(speed))
         for each in desk.parameters():
+            if isinstance(each, Pick):
+                for word in each.offered:
+                    widgets.mark(f"{each.name}:{word}", word == each.value, ("#chosen_tab", "#small"))
+                widgets.say("button", f"next:{each.name}", f"{each.value} ›")
+                continue
             widgets.slide(each.name, each.place())
             widgets.fill(each.name, each.words())
         for name in self.titles:

@@ -1,4 +1,4 @@
-"""What the sliders of the panel set: gains of a controller and limits of the team. Knows no pygame."""
+"""What the panel's sliders and words set: gains of a controller, limits of the team. Knows no pygame."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, shown
 from robocov.robots import UNITS
 from robocov_app.demo.scenario import Limits
@@ -119,10 +120,56 @@ class Parameter:
         return value
 
 
-def gain_parameters(law: Law) -> list[Parameter]:
-    """Return a slider for each gain of a controller."""
-    found = []
+@dataclass(frozen=True)
+class Pick:
+    """One of several words, which stand side by side.
+
+    Attributes
+    ----------
+    name, label, meaning : str
+    value, default : str
+    offered : tuple of str
+        The words.
+    """
+
+    name: str
+    label: str
+    meaning: str
+    value: str
+    default: str
+    offered: tuple[str, ...]
+
+    def words(self) -> str:
+        """Return the value as people type it."""
+        return self.value
+
+    def read(self, text: str) -> str:
+        """Return the word that was typed, or begun.
+
+        Raises
+        ------
+        ParameterError
+            When it is none of them.
+        """
+        plain = text.strip().lower()
+        begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
+        exact = [word for word in begun if word.lower() == plain]
+        if len(exact or begun) != 1:
+            wanted = f"one of {', '.join(self.offered)} was wanted"
+            raise ParameterError(f"{self.label}: {shown(text)}, but {wanted}")
+        return (exact or begun)[0]
+
+
+def gain_parameters(law: Law) -> list[Parameter | Pick]:
+    """Return a slider for each gain of a controller that is a number, and the words of each other."""
+    found: list[Parameter | Pick] = []
     for name, gain in law.known.items():
+        value = law.value(name)
+        if isinstance(gain, Option):
+            word = value if isinstance(value, str) else gain.default
+            found.append(Pick(name, name, gain.meaning, word, gain.default, gain.words))
+            continue
+        number = None if isinstance(value, str) else value
         usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
         if usual > 0 and gain.low >= 0:
             low, high = max(usual / SPAN, gain.low), min(usual * SPAN, gain.high)
@@ -130,22 +177,21 @@ def gain_parameters(law: Law) -> list[Parameter]:
         else:
             low, high = max(gain.low, -SPAN * abs(usual)), min(gain.high, SPAN * abs(usual))
         found.append(
-            Parameter(
-                name, name, gain.unit, gain.meaning, law.value(name), gain.default, low, high, gain.optional
-            )
+            Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
         )
     return found
 
 
 def limit_parameters(limits: Limits) -> list[Parameter]:
-    """Return a slider for each limit of the team."""
+    """Return a slider for each limit of the team; what it sets, it sets for all robots."""
     usual = Limits()
+    mixed = {name for name, _ in limits.different}
     return [
         Parameter(
             f"team.{name}",
-            label,
+            f"{label} ≠" if name in mixed else label,
             UNITS[name],
-            _MEANINGS[name],
+            _MEANINGS[name] + ("; robots differ in it until it is set here" if name in mixed else ""),
             _finite(getattr(limits, name)),
             _finite(getattr(usual, name)),
             *_LIMIT_SPANS[name],
@@ -157,8 +203,11 @@ def limit_parameters(limits: Limits) -> list[Parameter]:
 
 def with_limit(limits: Limits, name: str, value: float | None) -> Limits:
     """Return the limits with another value of one; `name` may begin with ``team.``."""
+    name = name.removeprefix("team.")
     number = math.inf if value is None else value
-    return replace(limits, **{name.removeprefix("team."): number})
+    # set for all: what robots had of their own is gone
+    different = tuple(each for each in limits.different if each[0] != name)
+    return replace(limits, **{name: number}, different=different)
 
 
 def _finite(value: float) -> float | None:

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.controllers import informed
 from robocov.errors import ParameterError
 from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
+from robocov.perception import Perception
 from robocov.sensor import RangeSensor
-from robocov.solid import solid_pieces
+from robocov.simulation import DEFAULT_DT
+from robocov.solid import movers, solid_pieces
 
 if TYPE_CHECKING:
     from robocov.controllers.base import Controller
@@ -22,9 +25,16 @@ if TYPE_CHECKING:
 
 
 class Past:
-    """Explains states; it keeps what many of them have in common."""
+    """Explains states; it keeps what many of them have in common.
 
-    def __init__(self) -> None:
+    Attributes
+    ----------
+    dt : float, s
+        The control period, which messages and noise depend on.
+    """
+
+    def __init__(self, dt: float = DEFAULT_DT) -> None:
+        self.dt = dt
         # as many as there are panes, and some more
         self._explaining = lru_cache(maxsize=8)(_Explaining)
 
@@ -36,21 +46,24 @@ class Past:
         state : State
         time : float, s
         """
-        return self._explaining(state.circumstances).snapshot(state, time)
+        return self._explaining(state.circumstances, self.dt).snapshot(state, time)
 
 
 class _Explaining:
     """What states of the same circumstances have in common."""
 
-    def __init__(self, circumstances: Circumstances) -> None:
-        self._region = circumstances.solid.region
+    def __init__(self, circumstances: Circumstances, dt: float) -> None:
+        self._region, self._density = circumstances.solid.region, circumstances.solid.density
+        conditions = circumstances.conditions
+        self._perception = None if conditions is None else Perception(conditions, circumstances.team, dt)
         self._sensor = _sensor_in(circumstances.solid)
-        self._team = circumstances.limits.team(len(circumstances.numbers))
+        self._team = circumstances.team
         self._controller: Controller | None = None
         with suppress(ParameterError):  # what a saved run was made with may be gone
-            self._controller = circumstances.law.made()
+            self._controller = informed(circumstances.law.made(), circumstances.solid.standing)
 
     def snapshot(self, state: State, time: float) -> Snapshot:
+        self._sensor.show(time)
         seen = Observations(
             positions=state.positions,
             velocities=state.velocities,
@@ -58,12 +71,17 @@ class _Explaining:
             obstacle_points=self._sensor.nearest(state.positions, self._team.sensing_range),
             region=self._region,
             time=time,
+            max_speeds=self._team.max_speed,
+            density=self._density,
         )
+        if self._perception is not None:
+            inbox = self._perception.begin() if state.inbox is None else state.inbox
+            seen, _ = self._perception.known(seen, inbox, np.ones(len(state.positions), dtype=bool))
         decision = self._decision(seen, state)
         if state.recorded is not None and not _agree(decision, state.recorded):
             # the controller is not what it was
             decision = state.recorded
-        return Snapshot(seen, decision)
+        return Snapshot(seen, decision, None if self._perception is None else state.positions)
 
     def _decision(self, seen: Observations, state: State) -> Decision:
         nothing = Decision(np.zeros_like(seen.positions))
@@ -91,4 +109,4 @@ def _agree(decision: Decision, recorded: Decision) -> bool:
 
 @lru_cache(maxsize=4)
 def _sensor_in(environment: Environment) -> RangeSensor:
-    return RangeSensor(solid_pieces(environment))
+    return RangeSensor(solid_pieces(environment), movers(environment))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from robocov_app.demo.brush import Brush
 from robocov_app.demo.layout import inside
 
 if TYPE_CHECKING:
@@ -80,7 +81,11 @@ class Pointer:
             self._pressed(event, now)
         elif event.type == pygame.MOUSEWHEEL and self._arena.pane_at(self.at) is not None:
             amount = getattr(event, "precise_y", event.y) or event.y
-            self._arena.zoom(WHEEL ** float(np.clip(amount, -5, 5)), self.at)
+            factor = WHEEL ** float(np.clip(amount, -5, 5))
+            if isinstance(self._desk.tool, Brush):
+                self._desk.widen(factor)
+            else:
+                self._arena.zoom(factor, self.at)
 
     def show(self) -> None:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
@@ -124,9 +129,12 @@ class Pointer:
             return
         if pane is None or event.button not in (1, 2, 3):
             return
-        if event.button != 1:
+        brush = desk.tool if isinstance(desk.tool, Brush) else None
+        if event.button != 1 and not (brush and event.button == 3):
             self._drag = "pan"
             return
+        if brush:
+            brush.lowers = event.button == 3
         self._interrupt()
         pane = min(pane, len(desk.session.lanes) - 1)
         if desk.active != pane:

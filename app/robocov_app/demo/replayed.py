@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS, Individually
+from robocov.controllers import informed, remembers
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.observation import Decision
-from robocov.robots import UNITS
 from robocov_app.demo.curves import Event
 from robocov_app.demo.history import MOST_BYTES, Circumstances, History, Moment, State
 from robocov_app.demo.lane import SENSED_EVERY, Lane, resumed
@@ -20,11 +19,11 @@ from robocov_app.demo.session import Session
 from robocov_app.saved import roster_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from robocov.arrays import Array
     from robocov.controllers.base import Controller
-    from robocov.controllers.gains import Gain
+    from robocov.controllers.gains import Gain, Option
     from robocov.observation import Observations
     from robocov.record import Record
     from robocov.region import Region
@@ -59,7 +58,7 @@ class LostLaw(Law):
         return self.title
 
     @property
-    def known(self) -> dict[str, Gain]:
+    def known(self) -> dict[str, Gain | Option]:
         """Nothing is known of its gains."""
         return {}
 
@@ -113,13 +112,19 @@ def replayed_session(saved: Sequence[Saved]) -> Session:
     _check(saved)
     rosters = [roster_of(record) for record in records]
     first, dt = records[0], control_dt(records[0])
-    limits, environment = Limits.of(first.team), rosters[0].environment
+    limits, environment = Limits.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record) for record in records]
     casts = [
         Circumstances(environment, law, limits, roster.numbers, roster.failed)
         for law, roster in zip(laws, rosters, strict=True)
     ]
-    given = resumed(State(_standing(casts[0]), first.positions[0], first.velocities[0], None), dt, 0.0)
+    history = _history_of(records, casts, dt)
+    begin = history[0].states[0]
+    standing = begin._replace(circumstances=_standing(begin.circumstances))
+    given = resumed(standing._replace(memory=None), dt, 0.0)
+    # robots that join later have no place yet but that in the record
+    places, moving = np.array(first.positions[0]), np.array(first.velocities[0])
+    places[first.working[0]], moving[first.working[0]] = given.positions, given.velocities
     session = Session(
         Scenario(
             environment,
@@ -129,14 +134,14 @@ def replayed_session(saved: Sequence[Saved]) -> Session:
             first.seed or 0,
             limits,
             dt,
-            given.positions,
-            given.velocities if first.velocities[0].any() else None,
+            places,
+            moving if first.velocities[0].any() else None,
+            first.conditions,
         )
     )
     session.scenario = replace(session.scenario, laws=tuple(laws))
-    history = _history_of(records, casts, dt)
-    for lane, each, cast in zip(session.lanes, saved, casts, strict=True):
-        _put(lane, each, cast, history)
+    for lane, each in zip(session.lanes, saved, strict=True):
+        _put(lane, each, history)
     session.recall(session.lanes, history)
     session.events.extend(_events_of(first))
     return session
@@ -185,11 +190,6 @@ def _check(saved: Sequence[Saved]) -> None:
     first = saved[0].record
     for each in saved:
         record, where = each.record, each.folder
-        for name in UNITS:
-            if len(np.unique(getattr(record.team, name))) > 1:
-                raise InputError(
-                    f"{where / 'run.json'}: robots of different {name}: the window has none such"
-                )
         even = np.arange(len(record)) * record.dt
         if not np.allclose(record.time - record.time[0], even, rtol=1e-6, atol=1e-3 * record.dt):
             raise InputError(f"{where / 'record.npz'}: time: moments {record.dt:g} s apart were wanted")
@@ -198,6 +198,7 @@ def _check(saved: Sequence[Saved]) -> None:
             ("moments", len(record), len(first)),
             ("team", record.team.to_dict(), first.team.to_dict()),
             ("robots", roster_of(record).numbers, roster_of(first).numbers),
+            ("conditions", record.conditions, first.conditions),
         ):
             if mine != others:
                 raise InputError(
@@ -231,16 +232,35 @@ def _states_of(record: Record, cast: Circumstances) -> list[State]:
         _fixed(array) for array in (record.positions, record.velocities, record.forces, record.goals)
     )
     nowhere = [bool(np.isnan(rows).all()) for rows in goals]
-    return [
-        State(
-            cast,
-            positions[k],
-            velocities[k],
-            memory,
-            Decision(forces[k], None if nowhere[k] else goals[k]),
-        )
-        for k, memory in enumerate(_memories_of(record, cast.law))
-    ]
+    states = []
+    for k, (memory, there) in enumerate(
+        zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
+    ):
+        rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
+        decision = Decision(forces[k][rows], None if nowhere[k] else goals[k][rows])
+        states.append(State(there, positions[k][rows], velocities[k][rows], memory, decision))
+    return states
+
+
+def _circumstances_of(record: Record, cast: Circumstances) -> Iterator[Circumstances]:
+    """Yield the circumstances of each moment: who worked then, and who had failed.
+
+    What robots had heard no record tells: who goes on from a moment lets them begin with no messages.
+    """
+    if record.conditions is None:
+        yield from [cast] * len(record)
+        return
+    known: dict[bytes, Circumstances] = {}
+    rest = record.conditions.of_robots_that_stay()
+    for places, working, there in zip(record.positions, record.working, record.present, strict=True):
+        key = working.tobytes() + there.tobytes()
+        if key not in known:
+            failed = {
+                cast.numbers[row]: tuple(places[row].tolist()) for row in np.flatnonzero(there & ~working)
+            }
+            numbers = tuple(cast.numbers[row] for row in np.flatnonzero(working))
+            known[key] = replace(cast, numbers=numbers, failed={**cast.failed, **failed}, conditions=rest)
+        yield known[key]
 
 
 def _memories_of(record: Record, law: Law) -> list[Any]:
@@ -253,10 +273,11 @@ def _memories_of(record: Record, law: Law) -> list[Any]:
     if isinstance(law, LostLaw):
         return nothing
     controller = law.made()
-    if type(controller) in CONTROLLERS.values() or isinstance(controller, Individually):
+    if not remembers(controller):
         return nothing
     found: list[Any] = []
     try:
+        controller = informed(controller, record.environment.standing)
         memory = controller.begin(record.environment.region, record.team)
         for k in range(len(record)):
             found.append(deepcopy(memory))
@@ -269,15 +290,17 @@ def _memories_of(record: Record, law: Law) -> list[Any]:
     return found + nothing[len(found) :]
 
 
-def _put(lane: Lane, saved: Saved, cast: Circumstances, history: History) -> None:
+def _put(lane: Lane, saved: Saved, history: History) -> None:
     """Let a lane be at the end of a run."""
     record, last = saved.record, history.last
     state = last.states[lane.number]
-    standing = state._replace(circumstances=_standing(cast))
+    standing = state._replace(circumstances=_standing(state.circumstances))
     lane.simulation = resumed(standing, history.dt, last.step * history.dt)
-    lane.circumstances, lane.starts = cast, record.positions[0]
+    lane.circumstances = state.circumstances
+    lane.starts = record.positions[0][record.working[-1]]
     for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
-        lane.sensed.add(k * record.dt, cast.numbers, record.obstacle_points[k])
+        numbers = history[k].states[lane.number].circumstances.numbers
+        lane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
     if saved.history is not None:
         for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
             lane.curve.add(float(time), float(value))

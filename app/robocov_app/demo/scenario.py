@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.controllers import controller_kind, gains_of, make_controller
+from robocov.controllers.gains import value_text
 from robocov.errors import ParameterError, shown
 from robocov.robots import UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from robocov.arrays import Array
+    from robocov.conditions import Conditions
     from robocov.controllers.base import Controller
-    from robocov.controllers.gains import Gain
+    from robocov.controllers.gains import Gain, Option, Value
     from robocov.environment import Environment
 
 MOST_ROBOTS = 1000
 """So many robots can be asked for in the window."""
+
+MOST_THAT_TALK = 100
+"""So many robots can be asked for where each has messages of its own of every other."""
 
 MOST_PANES = 4
 """So many controllers can be compared side by side."""
@@ -41,7 +46,7 @@ class Law:
     """
 
     name: str
-    gains: Mapping[str, float | None] = field(default_factory=dict)
+    gains: Mapping[str, Value] = field(default_factory=dict)
 
     def made(self) -> Controller:
         """Return the controller.
@@ -61,15 +66,15 @@ class Law:
         return str(controller_kind(self.name).label)
 
     @cached_property
-    def known(self) -> dict[str, Gain]:
+    def known(self) -> dict[str, Gain | Option]:
         """What is known of its gains, by name."""
         return gains_of(controller_kind(self.name))
 
-    def value(self, gain: str) -> float | None:
+    def value(self, gain: str) -> Value:
         """Return the value of a gain."""
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
-    def with_gain(self, gain: str, value: float | None) -> Law:
+    def with_gain(self, gain: str, value: Value) -> Law:
         """Return the law with another value of one gain.
 
         Raises
@@ -85,26 +90,32 @@ class Law:
 def gain_words(before: Law, after: Law) -> str:
     """Return which gains differ, as people write them."""
     changed = [name for name in after.known if before.value(name) != after.value(name)]
-    words = []
-    for name in changed:
-        value = after.value(name)
-        words.append(f"{name} = {'no limit' if value is None else f'{value:.3g}'}")
-    return ", ".join(words)
+    return ", ".join(f"{name} = {_said(after.value(name))}" for name in changed)
 
 
 def branch_words(law: Law) -> str:
     """Return how a branch that was left is called."""
     gains = ", ".join(
-        f"{name} {'no limit' if value is None else f'{value:.3g}'}"
-        for name, value in law.gains.items()
-        if value != law.known[name].default
+        f"{name} {_said(value)}" for name, value in law.gains.items() if value != law.known[name].default
     )
     return f"{law.label}, {gains}" if gains else law.label
 
 
+def _said(value: Value) -> str:
+    return value_text(value, digits=3, none="no limit")
+
+
 @dataclass(frozen=True)
 class Limits:
-    """What each robot of the team is and can do; SI units, infinite for no limit."""
+    """What each robot of the team is and can do; SI units, infinite for no limit.
+
+    Attributes
+    ----------
+    radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range
+        As `Team` has them.
+    different : tuple of (name, ((number, value), ...))
+        Parameters in which robots differ, with the values of those that have one of their own.
+    """
 
     radius: float = 0.1
     mass: float = 1.0
@@ -113,21 +124,40 @@ class Limits:
     viscosity: float = 2.0
     sensing_range: float = 3.0
     communication_range: float = np.inf
+    different: tuple[tuple[str, tuple[tuple[int, float], ...]], ...] = ()
 
-    def team(self, n: int) -> Team:
-        """Return a team of `n` such robots.
+    def team(self, robots: int | Sequence[int]) -> Team:
+        """Return a team of so many robots, or of those with such numbers.
 
         Raises
         ------
         ParameterError
             When a value is out of range.
         """
-        return Team.homogeneous(n, **self.__dict__)
+        numbers = range(1, robots + 1) if isinstance(robots, int) else robots
+        team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
+        own = {name: dict(values) for name, values in self.different}
+        changed = {
+            name: np.array([values.get(number, getattr(self, name)) for number in numbers])
+            for name, values in own.items()
+        }
+        return replace(team, **changed) if changed else team
+
+    def radius_of(self, number: int) -> float:
+        """Return the radius of the robot with a number, m."""
+        return float(self.team((number,)).radius[0])
 
     @classmethod
-    def of(cls, team: Team) -> Limits:
-        """Return what the first robot of a team is and can do."""
-        return cls(**{name: float(getattr(team, name)[0]) for name in UNITS})
+    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> Limits:
+        """Return what the robots of a team are and can do; by default they are numbered from 1."""
+        columns = {name: getattr(team, name).tolist() for name in UNITS}
+        numbers = range(1, len(team) + 1) if numbers is None else numbers
+        different = tuple(
+            (name, tuple(zip(numbers, values, strict=True)))
+            for name, values in columns.items()
+            if len(set(values)) > 1
+        )
+        return cls(**{name: values[0] for name, values in columns.items()}, different=different)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +181,8 @@ class Scenario:
         Starts that come from somewhere else, as from a saved run.
     moving : (n, 2) m/s or None
         Velocities there; at rest by default.
+    conditions : Conditions or None
+        What goes wrong, and when robots fail and join by themselves.
     """
 
     environment: Environment
@@ -162,11 +194,17 @@ class Scenario:
     dt: float = DEFAULT_DT
     given: Array | None = None
     moving: Array | None = None
+    conditions: Conditions | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
             raise ParameterError(
                 f"robots: {shown(self.robots)}, but a whole number from 1 to {MOST_ROBOTS} was wanted"
+            )
+        if self.conditions is not None and self.conditions.talks and self.robots > MOST_THAT_TALK:
+            raise ParameterError(
+                f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted where messages "
+                f"may be lost or late: the window remembers all of them, of all moments"
             )
         if not 1 <= len(self.laws) <= MOST_PANES:
             raise ParameterError(f"controllers: {len(self.laws)}, but 1 to {MOST_PANES} were wanted")
@@ -189,4 +227,5 @@ class Scenario:
         if self.given is not None:
             return self.given
         start = self.environment.start(self.start)
-        return start.sample(self.robots, seed=self.seed, radius=self.limits.radius)
+        radius = float(self.limits.team(self.robots).radius.max())  # room for the largest
+        return start.sample(self.robots, seed=self.seed, radius=radius)

@@ -131,6 +131,37 @@ class Session(Touches):
             )
         return pushed
 
+    def show_density(self, environment: Environment) -> None:
+        """Go on with the same place by another density, as while it is painted; there is no way back."""
+        with self._touching():
+            self._weigh(environment)
+            self._amend()
+
+    def painted(self, before: Environment, environment: Environment, words: str) -> None:
+        """Go on with a density that has been painted, from what it was before."""
+        with self._touching():
+            self._repaint(environment, words)
+            self.undo.add(
+                Edit(
+                    words,
+                    lambda: self._repaint(before, f"{words}: undone"),
+                    lambda: self._repaint(environment, words),
+                    of_map=True,
+                )
+            )
+
+    def _repaint(self, environment: Environment, words: str) -> None:
+        self._weigh(environment)
+        self._changed("density", words)
+
+    def _weigh(self, environment: Environment) -> None:
+        """Let the map as it is now have the density of another one, and be that one if they are alike."""
+        now = self.environment
+        if not environment.same_place(now) or environment.starts != now.starts:
+            environment = now.weighed(environment.density)
+        self._change_all(lambda lane: Wanted(replace(lane.circumstances, environment=environment)))
+        self.scenario = replace(self.scenario, environment=environment)
+
     def _put(self, environment: Environment, words: str) -> int:
         places = [lane.simulation.positions for lane in self.lanes]
         self._change_all(lambda lane: Wanted(replace(lane.circumstances, environment=environment)))

@@ -94,14 +94,20 @@ class Timeline:
     def _begin(self, scenario: Scenario) -> None:
         """Begin anew; when that fails, nothing has changed."""
         positions = scenario.positions()
-        numbers = tuple(range(1, len(positions) + 1))
+        conditions, moving = scenario.conditions, None if scenario.given is None else scenario.moving
+        working = np.ones(len(positions), dtype=bool)
+        if conditions is not None:
+            conditions.check_team(len(positions))
+            working = conditions.working(0.0, len(positions))
+            conditions = conditions.of_robots_that_stay()
+        numbers = tuple((np.flatnonzero(working) + 1).tolist())
         lanes = [
             Lane(
                 pane,
-                Circumstances(scenario.environment, law, scenario.limits, numbers, {}),
-                positions,
+                Circumstances(scenario.environment, law, scenario.limits, numbers, {}, conditions),
+                positions[working],
                 scenario.dt,
-                None if scenario.given is None else scenario.moving,
+                None if moving is None else moving[working],
             )
             for pane, law in enumerate(scenario.laws)
         ]
@@ -110,7 +116,7 @@ class Timeline:
         else:
             self.undo.clear()
         self.scenario, self.lanes = scenario, lanes
-        self.clock.dt = scenario.dt
+        self.clock.dt = self._past.dt = scenario.dt
         self.history = History(scenario.dt)
         self.ghosts: deque[Ghost] = deque(maxlen=MOST_GHOSTS)
         self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
@@ -245,8 +251,12 @@ class Timeline:
             lane.step(self._pushes(lane))
         self._step += 1
         self._remember()
+        self._come_and_go()
         if self._step % 12 == 0:
             self.settled = self._has_settled()
+
+    def _come_and_go(self) -> None:
+        """Let robots fail and join whose time has come."""
 
     def _remember(self) -> None:
         self.history.add(Moment(self._step, {lane.number: lane.state() for lane in self.lanes}))

@@ -27,12 +27,15 @@ class Preview:
         Drawn as it would be.
     words : str
         Beside the last point.
+    marks : bool
+        Whether each point of the line has one.
     """
 
     line: tuple[Point, ...] = ()
     closed: bool = False
     obstacle: Obstacle | None = None
     words: str = ""
+    marks: bool = True
 
 
 class Tool(Protocol):

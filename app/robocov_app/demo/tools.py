@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov_app.demo.brush import Brush
 from robocov_app.demo.drawing import WALL_WIDTH, Circle, Polygon, Wall
 from robocov_app.demo.editing import moved, obstacle_at, with_moved, without_obstacle, words_for
 from robocov_app.demo.tool import Base, Point, Preview, Tool, edited
@@ -19,6 +20,7 @@ __all__ = [
     "WALL_WIDTH",
     "Adder",
     "Base",
+    "Brush",
     "Circle",
     "Eraser",
     "Failer",
@@ -215,5 +217,7 @@ class Ruler(Base):
 
 def toolbox() -> dict[str, Tool]:
     """Return one of each tool by name, in the order in which they are shown."""
-    tools: list[Tool] = [Hand(), Polygon(), Wall(), Circle(), Eraser(), Adder(), Failer(), Ruler()]
+    tools: list[Tool] = [
+        *(Hand(), Polygon(), Wall(), Circle(), Brush(), Eraser(), Adder(), Failer(), Ruler())
+    ]
     return {tool.name: tool for tool in tools}

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 
-from robocov.errors import ParameterError, StartError
+from robocov.conditions import SOON
+from robocov.errors import ParameterError
+from robocov.relocation import nearest_free
 from robocov_app.demo.lane import Wanted
 from robocov_app.demo.scenario import MOST_ROBOTS
 from robocov_app.demo.timeline import Timeline
@@ -19,13 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from robocov.arrays import Array
-    from robocov.environment import Environment
     from robocov_app.demo.history import Circumstances
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.tool import Point
-
-_GAP = 1e-3
-"""Room in metres that is left beside what a robot is put next to."""
 
 
 class Touches(Timeline):
@@ -69,11 +66,13 @@ class Touches(Timeline):
         def placed(lane: Lane) -> Wanted:
             circumstances, row = lane.circumstances, lane.row(number)
             if row is None:
-                place = _fitting(_without_wreck(circumstances, number), lane.simulation.positions, point)
+                others, radii = lane.simulation.positions, lane.simulation.team.radius
+                place = _fitting(_without_wreck(circumstances, number), number, others, radii, point)
                 return Wanted(replace(circumstances, failed={**circumstances.failed, number: place}))
             positions = np.array(lane.simulation.positions)
             velocities = np.array(lane.simulation.velocities)
-            positions[row] = _fitting(circumstances, np.delete(positions, row, axis=0), point)
+            others, radii = np.delete(positions, row, axis=0), np.delete(circumstances.team.radius, row)
+            positions[row] = _fitting(circumstances, number, others, radii, point)
             velocities[row] = 0.0
             return Wanted(circumstances, positions, velocities)
 
@@ -170,7 +169,8 @@ class Touches(Timeline):
             if not failed:
                 return _with_robot(lane, lane.circumstances, number, places[lane.number])
             circumstances = lane.circumstances
-            place = _fitting(circumstances, lane.simulation.positions, places[lane.number])
+            others, radii = lane.simulation.positions, lane.simulation.team.radius
+            place = _fitting(circumstances, number, others, radii, places[lane.number])
             return Wanted(replace(circumstances, failed={**circumstances.failed, number: place}))
 
         self._change_all(joined)
@@ -208,6 +208,22 @@ class Touches(Timeline):
         )
         self._changed("robot", f"robot {number} works again")
 
+    def _come_and_go(self) -> None:
+        """Let robots fail and join whose time has come; the last one that works goes on."""
+        conditions = self.scenario.conditions
+        if conditions is None or not conditions.comes_and_goes:
+            return
+        begins, ends = conditions.lives(self.scenario.robots)
+        now, before = self.end + SOON, self.end - self.scenario.dt + SOON
+        for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
+            if number not in self._present():
+                place = next(join.place for join in conditions.joins if join.robot == number)
+                x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
+                self._join(number, {lane.number: (x, y) for lane in self.lanes})
+        for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
+            if number in self.lanes[0].numbers and len(self.lanes[0].numbers) > 1:
+                self._fail(number)
+
     def _present(self) -> set[int]:
         """Return the numbers of all robots, whether they work or not."""
         return {*self.lanes[0].numbers, *self.lanes[0].circumstances.failed}
@@ -225,44 +241,10 @@ class Touches(Timeline):
             self.hand = None
 
 
-def nearest_free(environment: Environment, radius: float, others: Array, point: Point) -> Point:
-    """Return the place nearest to a point where a robot fits, the others staying where they are.
-
-    Parameters
-    ----------
-    environment : Environment
-    radius : float, m
-        Of all robots.
-    others : (n, 2) m
-    point : (x, y) m
-
-    Raises
-    ------
-    StartError
-        When there is none.
-    """
-    place, free = shapely.Point(point), environment.free
-    apart = np.hypot(*(others - point).T)
-    if (
-        shapely.contains_properly(free, place)
-        and shapely.distance(free.boundary, place) >= radius
-        and (apart >= 2.0 * radius).all()
-    ):
-        return float(point[0]), float(point[1])
-    room = free.buffer(-(radius + _GAP), join_style="round")
-    if len(others):
-        # a buffer's polygon is inscribed, and room is wanted all round
-        reach = (2.0 * radius + _GAP) / np.cos(np.pi / 64)
-        room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), reach, quad_segs=16)))
-    if room.is_empty:
-        raise StartError("there is no room for a robot there")
-    x, y = np.asarray(shapely.shortest_line(room, place).coords)[0].tolist()
-    return x, y
-
-
-def _fitting(circumstances: Circumstances, others: Array, point: Point) -> Point:
+def _fitting(circumstances: Circumstances, number: int, others: Array, radii: Array, point: Point) -> Point:
     """Return the place nearest to a point where a robot fits beside the others and those that failed."""
-    return nearest_free(circumstances.solid, circumstances.limits.radius, others, point)
+    radius = circumstances.limits.radius_of(number)
+    return nearest_free(circumstances.solid, radius, others, point, radii)
 
 
 def _place_of(lane: Lane, number: int) -> Point:
@@ -293,7 +275,8 @@ def _without_robot(lane: Lane, number: int) -> Wanted:
 def _with_robot(lane: Lane, circumstances: Circumstances, number: int, point: Point) -> Wanted:
     """Return a lane's robots and one more, at rest at a point or as near as it fits."""
     numbers, positions = circumstances.numbers, lane.simulation.positions
-    place, row = _fitting(circumstances, positions, point), bisect(numbers, number)
+    place = _fitting(circumstances, number, positions, lane.simulation.team.radius, point)
+    row = bisect(numbers, number)
     return Wanted(
         replace(circumstances, numbers=(*numbers[:row], number, *numbers[row:])),
         np.insert(positions, row, place, axis=0),

@@ -19,6 +19,7 @@ _TOOL_KEYS = {
     "disc": "s",
     "places": "shift+s",
     "measure": "m",
+    "density": "d",
     "picture": "i",
     "pan": "g",
 }

@@ -30,6 +30,7 @@ from robocov_app.editor.handles import (
     draw_start,
     draw_typed,
 )
+from robocov_app.editor.selection import Change
 from robocov_app.editor.sheet import Sheet, View
 from robocov_app.editor.strips import Strips
 from robocov_app.editor.tool import apart
@@ -204,12 +205,15 @@ class Arena:
         pending = desk.pending
         base, now = desk.sketch, pending.sketch if pending is not None else desk.sketch
         moved = getattr(desk.tools["picture"], "moved", None)
+        weighed = getattr(desk.tool, "change", None)
         drag = desk.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
         lifted = self._lifted(base, now) if carried is None else _kept_keys(carried)
         under = now if now.boundary is not base.boundary else base
         if moved is not None:
             under = replace(under, background=moved)
+        if isinstance(weighed, Change):
+            under = replace(under, density=weighed.sketch.density)
         page = self.sheet.page(view, under, lifted)
         left, top, width, height = self.layout.arena
         screen.fill(self.theme.background, pygame.Rect(left, top, width, height))

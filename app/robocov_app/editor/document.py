@@ -17,7 +17,7 @@ from shapely import GeometryCollection, LineString, Polygon
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.errors import MapError
-from robocov.mapfile import dump_document, from_json, to_json
+from robocov.mapfile import density_of, dump_document, from_json, to_json
 from robocov.mapmodels import FARTHEST, LARGEST, check_header
 from robocov.starts import DiscStart, PointsStart
 from robocov.strictjson import located, one_line, parse, require_json
@@ -29,16 +29,24 @@ from robocov_app.editor.reading import PartReader
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from shapely.geometry.base import BaseGeometry
 
+    from robocov.density import Density
     from robocov.environment import Obstacle, Point, Ring
     from robocov.starts import StartSpec
 
 BOUNDARY: Final = -1
 """Stands for the boundary where obstacles have their keys."""
 
-_KEYS = ("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts", "extra")
+_KEYS = (
+    *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
+    *("density", "extra"),
+)
+
+FIRST: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+"""What a raster of a map without a boundary covers, m, unless it says so itself."""
 
 Owner: TypeAlias = int | str
 """What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
@@ -89,6 +97,8 @@ class Sketch:
         Free keys of the file, without what the editor keeps there itself.
     schema : str or None
         The file's ``$schema``.
+    density : Density or None
+        How much each place counts; pictures are read when the map is.
     """
 
     name: str = "Untitled"
@@ -99,6 +109,7 @@ class Sketch:
     background: Background | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
     schema: str | None = None
+    density: Density | None = None
 
     def __hash__(self) -> int:
         return hash((self.name, self.boundary, self.obstacles))
@@ -130,6 +141,7 @@ class Sketch:
             description=self.description,
             extra=annotated(self.extra, notes, names, self.background),
             schema=self.schema,
+            density=self.density,
         )
 
     def item(self, key: int) -> Item:
@@ -231,8 +243,10 @@ def draft_document(sketch: Sketch) -> dict[str, Any]:
     return document
 
 
-def sketch_of(document: Any, where: str = "map") -> Sketch:
+def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
     """Return the sketch in a parsed map document; what breaks the rules of maps is kept as it is.
+
+    A density is read as strictly as in a map; `folder` holds its picture.
 
     Raises
     ------
@@ -252,15 +266,18 @@ def sketch_of(document: Any, where: str = "map") -> Sketch:
     extra = reader.object(members.get("extra", {}), ("extra",))
     notes, background, others = taken_apart(extra, [shape.name for shape in shapes])
     schema = members.get("$schema")
+    boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
+    density = members.get("density")
     return Sketch(
         name=reader.text(members.get("name", ""), ("name",)),
         description=reader.text(members.get("description", ""), ("description",)),
-        boundary=None if boundary is None else reader.ring(boundary, ("boundary",)),
+        boundary=boundary,
         obstacles=tuple(Item(k, shape, notes.get(k, "")) for k, shape in enumerate(shapes)),
         starts=tuple((name, reader.start(value, ("starts", name))) for name, value in starts.items()),
         background=background,
         extra=others,
         schema=None if schema is None else reader.text(schema, ("$schema",)),
+        density=None if density is None else density_of(density, boundary or FIRST, where, folder),
     )
 
 
@@ -269,8 +286,8 @@ def sketch_text(sketch: Sketch) -> str:
     return dump_document(draft_document(sketch))
 
 
-def parse_sketch(text: str | bytes, where: str) -> Sketch:
-    """Return the sketch in the text of a file; messages call it `where`.
+def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
+    """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures.
 
     Raises
     ------
@@ -279,7 +296,7 @@ def parse_sketch(text: str | bytes, where: str) -> Sketch:
     """
     document = parse(text, where)
     try:
-        return sketch_of(document, where)
+        return sketch_of(document, where, folder)
     except MapError as error:
         raise located(error, text, where) from None
 

@@ -52,7 +52,7 @@ def opened(path: Path) -> tuple[Sketch, OnDisk]:
     # the stamp of before: what changes while it is read is noticed at the next look
     stamp = _stamp(path)
     content = read_bytes(path)
-    return parse_sketch(content, str(path)), OnDisk(path, _digest(content), stamp or (-1, 0))
+    return parse_sketch(content, str(path), path.parent), OnDisk(path, _digest(content), stamp or (-1, 0))
 
 
 def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:

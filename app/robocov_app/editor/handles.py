@@ -180,6 +180,11 @@ def draw_preview(canvas: Canvas, preview: Preview, at: tuple[float, float] | Non
         _square(canvas, x, y, theme.background, colour, large=False, round_ones=True)
     if preview.lengths:
         _draw_lengths(canvas, preview.line)
+    for k, rim in enumerate(preview.rings):
+        width = 2.2 if k == preview.chosen else 1.2
+        canvas.outline(pixels(canvas, rim), colour, canvas.width(width))
+    for k, (x, y) in enumerate(pixels(canvas, preview.dots).tolist()):
+        _square(canvas, x, y, theme.background, colour, large=k == preview.chosen, round_ones=True)
     if preview.box is not None:
         _draw_selecting(canvas, preview)
     if preview.words and at is not None:

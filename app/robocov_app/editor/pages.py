@@ -10,6 +10,7 @@ from robocov_app.demo.actions import key_words
 from robocov_app.demo.pages import GAP, MARGIN, WIDE, columns
 from robocov_app.editor.actions import all_actions
 from robocov_app.editor.deeds import whole
+from robocov_app.editor.densities import density_words
 from robocov_app.editor.document import BOUNDARY
 from robocov_app.editor.fields import FIELDS
 from robocov_app.editor.settings import SHOWN, SNAPS
@@ -24,14 +25,22 @@ ROW = 29
 _NAME = 62
 """Pixels at scale 1 that the word before a field takes."""
 
-FACTS = ("size", "free", "parts", "gap", "count")
-_FACT_WORDS = {"size": "Size", "free": "Free", "parts": "Parts", "gap": "Gap", "count": "Holds"}
+FACTS = ("size", "free", "parts", "gap", "count", "density")
+_FACT_WORDS = {
+    "size": "Size",
+    "free": "Free",
+    "parts": "Parts",
+    "gap": "Gap",
+    "count": "Holds",
+    "density": "Density",
+}
 _FACT_TIPS = {
     "size": "Width and height of the boundary",
     "free": "Area where robots can be, of that inside the boundary",
     "parts": "Connected parts of the free space, and those that a robot can sweep",
     "gap": "The narrowest passage, against a robot's diameter",
     "count": "Obstacles and their vertices",
+    "density": "How much each place counts: the tool Density; floor 0.5 and density none are commands",
 }
 
 
@@ -298,6 +307,7 @@ def facts(desk: Desk) -> dict[str, str]:
     """Return what the map page says of the map."""
     sketch, readout = desk.sketch, desk.readout
     said = dict.fromkeys(FACTS, "…")
+    said["density"] = density_words(sketch.density)
     ring = sketch.boundary
     if ring:
         xs, ys = [x for x, _ in ring], [y for _, y in ring]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import unknown_name
 from robocov.mistakes import Mistake, place, refusal
+from robocov.obstacle_path import REPEATS, ObstaclePath
 from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov.strictjson import shown_json
 
@@ -19,9 +20,10 @@ if TYPE_CHECKING:
     from robocov.starts import StartSpec
 
 _KEYS = {
-    "polygon": ("kind", "name", "vertices", "holes"),
-    "circle": ("kind", "name", "center", "radius"),
-    "wall": ("kind", "name", "points", "width"),
+    "polygon": ("kind", "name", "vertices", "holes", "path"),
+    "circle": ("kind", "name", "center", "radius", "path"),
+    "wall": ("kind", "name", "points", "width", "path"),
+    "path": ("points", "speed", "repeat"),
     "disc": ("kind", "center", "radius"),
     "points": ("kind", "positions"),
     "uniform": ("kind",),
@@ -100,16 +102,28 @@ class PartReader:
         kind = self._kind(value, path, ("polygon", "circle", "wall"))
         members = self.members(value, path, _KEYS[kind])
         name = self.text(members["name"], (*path, "name")) if members.get("name") is not None else None
+        way = self.way(members["path"], (*path, "path")) if members.get("path") is not None else None
         if kind == "polygon":
             holes = self.items(members.get("holes", []), (*path, "holes"), "rings")
             rings = tuple(self.ring(hole, (*path, "holes", k)) for k, hole in enumerate(holes))
-            return PolygonObstacle(self._ring_at(members, path, "vertices"), rings, name)
+            return PolygonObstacle(self._ring_at(members, path, "vertices"), rings, name, way)
         if kind == "circle":
             center = self.point(self._at(members, path, "center"), (*path, "center"))
-            return CircleObstacle(center, self._number_at(members, path, "radius"), name)
+            return CircleObstacle(center, self._number_at(members, path, "radius"), name, way)
         return WallObstacle(
-            self._ring_at(members, path, "points"), self._number_at(members, path, "width"), name
+            self._ring_at(members, path, "points"), self._number_at(members, path, "width"), name, way
         )
+
+    def way(self, value: Any, path: Path) -> ObstaclePath:
+        """Return the path of an obstacle that moves."""
+        members = self.members(value, path, _KEYS["path"])
+        repeat = members.get("repeat", "loop")
+        if repeat not in REPEATS:
+            self.refuse(
+                (*path, "repeat"), f"{shown_json(repeat)}, but one of {', '.join(REPEATS)} was wanted"
+            )
+        points, speed = self._ring_at(members, path, "points"), self._number_at(members, path, "speed")
+        return ObstaclePath(points, speed, repeat)
 
     def start(self, value: Any, path: Path) -> StartSpec:
         """Return a start."""

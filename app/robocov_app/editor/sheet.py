@@ -14,6 +14,7 @@ from robocov_app.editor.picture import Underlaid
 from robocov_app.view.camera import round_length
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.clipping import FAR
+from robocov_app.view.density import draw_shading
 from robocov_app.view.fonts import shortened
 from robocov_app.view.theme import LIGHT, mix, robot_hues
 
@@ -114,7 +115,7 @@ class Sheet:
         look = (
             *(view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid),
             *(view.shown & {"grid", "names", "picture"}, view.folder, sketch.background),
-            sketch.boundary,
+            *(sketch.boundary, sketch.density),
         )
         items = {item.key: item for item in sketch.obstacles if item.key not in lifted}
         page = self._page
@@ -206,6 +207,9 @@ class Sheet:
             self.underlaid.draw(page, picture, view.folder, camera, view.clip)
         if "grid" in view.shown:
             self._grid(page, view, box, fine=picture is None or not picture.shown)
+        density = sketch.density
+        if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
+            draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
         self._draw_beyond(canvas, sketch)
         corners = np.array([box.bottomleft, box.topright], dtype=float)
         (low_x, low_y), (high_x, high_y) = camera.to_world(corners).tolist()

@@ -9,6 +9,7 @@ import pygame
 
 from robocov_app.editor.findings import legend_entries
 from robocov_app.editor.sheet import beyond
+from robocov_app.view.density import density_entry
 from robocov_app.view.fonts import shortened
 from robocov_app.view.furniture import (
     EDGE,
@@ -19,6 +20,7 @@ from robocov_app.view.furniture import (
     legend_rows,
     legend_strip,
 )
+from robocov_app.view.phi import range_words, value_range
 
 if TYPE_CHECKING:
     from robocov_app.demo.layout import Box
@@ -76,7 +78,13 @@ class Strips:
             self._unfree = sketch.boundary, geometry is not None and geometry.area > 1e-6
         standing = "robots" in shown and team is not None and bool(team.places)
         readout = self._desk.readout if "impassable" in shown else None
-        return legend_entries(readout, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
+        found = legend_entries(readout, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
+        density = sketch.density
+        if density is not None and not density.uniform and sketch.boundary:
+            x, y = zip(*sketch.boundary, strict=True)
+            span = value_range(density, (min(x), min(y), max(x), max(y)))
+            found.append(density_entry(range_words(span)))
+        return found
 
     def draw(self, screen: pygame.Surface, canvas: Canvas, arena: Box) -> None:
         """Draw both strips."""

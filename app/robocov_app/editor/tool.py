@@ -12,7 +12,7 @@ from robocov.errors import MapError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robocov.environment import Obstacle, Point
+    from robocov.environment import Obstacle, Point, Ring
     from robocov.starts import StartSpec
     from robocov_app.editor.desk import Desk
     from robocov_app.editor.snapping import Guide
@@ -66,6 +66,12 @@ class Preview:
         The box takes all that it touches, not only what lies in it.
     words : str
         Beside the cursor.
+    rings : tuple of rings, m
+        Drawn as outlines.
+    dots : tuple of points, m
+        Drawn as marks.
+    chosen : int or None
+        Which of these stands out.
     """
 
     line: tuple[Point, ...] = ()
@@ -76,6 +82,9 @@ class Preview:
     box: tuple[Point, Point] | None = None
     touched: bool = False
     words: str = ""
+    rings: tuple[Ring, ...] = ()
+    dots: tuple[Point, ...] = ()
+    chosen: int | None = None
 
 
 class Tool:

@@ -8,6 +8,7 @@ from robocov_app.editor.drawing import Boundary, Measure, Places, Polygon, Wall
 from robocov_app.editor.selecting import Pan, Select
 from robocov_app.editor.stretching import Circle, Disc, Rectangle
 from robocov_app.editor.underlay import Underlay
+from robocov_app.editor.weighing import Weighing
 
 if TYPE_CHECKING:
     from robocov_app.editor.tool import Tool
@@ -26,6 +27,7 @@ def toolbox() -> dict[str, Tool]:
         Measure(),
         Disc(),
         Places(),
+        Weighing(),
         Underlay(),
     ]
     return {tool.name: tool for tool in tools}

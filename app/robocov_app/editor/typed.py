@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, unknown_name
 from robocov_app.demo.typed import parted
-from robocov_app.editor import booleans, edits, vertices
+from robocov_app.editor import booleans, densities, edits, vertices
 from robocov_app.editor.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.deeds import bevel, round_corners, simplify, whole
 from robocov_app.editor.edits import bounds_of
@@ -141,6 +141,27 @@ def _offset(desk: Desk, text: str) -> None:
     desk.change(booleans.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
 
 
+def _set_floor(desk: Desk, text: str) -> None:
+    desk.change(densities.floor_set(desk.sketch, _weight("floor", text)))
+
+
+def _set_weight(desk: Desk, text: str) -> None:
+    desk.tools["density"].enter(desk, text)
+
+
+def _set_density(desk: Desk, text: str) -> None:
+    if text.strip() != "none":
+        raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
+    desk.change(densities.density_removed(desk.sketch))
+
+
+def _weight(word: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise MapError(f"{word}: {text!r}, but a number was wanted") from None
+
+
 def _array(desk: Desk, text: str) -> None:
     parts = text.replace("x", " ").split()
     if len(parts) != 4:
@@ -167,6 +188,9 @@ COMMANDS: dict[str, Callable[[Desk, str], None]] = {
     "bevel": lambda desk, text: bevel(desk, length_of(text)),
     "round": lambda desk, text: round_corners(desk, length_of(text)),
     "simplify": lambda desk, text: simplify(desk, length_of(text)),
+    "floor": _set_floor,
+    "weight": _set_weight,
+    "density": _set_density,
     "offset": _offset,
     "array": _array,
     "name": _name,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, counted, unknown_name
 from robocov.strictjson import one_line
 from robocov_app.exporters import geojson, movingai, picture, ros, svg, wkt
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
@@ -80,4 +81,11 @@ def export_map(
         raise ParameterError(
             f"--{strange[0]}: no option of the format {chosen.name}, whose options are: {known}"
         )
-    return chosen.write(environment, path, options)
+    report = chosen.write(environment, path, options)
+    dropped = list(report.dropped)
+    if environment.density is not None:
+        dropped.append(f"the density ({environment.density.kind})")
+    if environment.moves:
+        count = sum(shape.path is not None for shape in environment.obstacles)
+        dropped.append(f"the {counted(count, 'path')} of obstacles, which stand where they are at time zero")
+    return replace(report, dropped=tuple(dropped))

@@ -75,7 +75,11 @@ class Process:
             self._answer()
 
         try:
-            cost = CoverageCost(build.environment, build.lattice, progress=tell, cache=ArrayCache.of_user())
+            cost = self._weighed(build)
+            if cost is None:
+                cost = CoverageCost(
+                    build.environment, build.lattice, progress=tell, cache=ArrayCache.of_user()
+                )
         except _NewerError:
             return
         except RobocovError as error:
@@ -83,7 +87,15 @@ class Process:
             self._say(Failed(build.generation, str(error)))
             return
         self._generation, self._cost = build.generation, cost
-        self._say(Ready(build.generation, cost.sites, cost.corners, time.perf_counter() - began))
+        seconds = time.perf_counter() - began
+        self._say(Ready(build.generation, cost.sites, cost.corners, seconds, cost.weights))
+
+    def _weighed(self, build: Build) -> CoverageCost | None:
+        """Return the cost of a map that differs from the one before in its density alone; None for others."""
+        cost, environment = self._cost, build.environment
+        if cost is None or cost.lattice != build.lattice or not cost.environment.same_place(environment):
+            return None
+        return cost.weighed(environment)
 
     def _answer(self) -> None:
         """Answer the newest question, if there is one and a map for it."""

@@ -73,12 +73,15 @@ class Ready:
         Where ways can bend.
     seconds : float
         What it took.
+    weights : (m,) or None
+        Of the sites; see `CoverageResult`.
     """
 
     generation: int
     sites: Sites
     corners: Array
     seconds: float
+    weights: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +174,7 @@ def answer_of(values: Values, ready: Ready) -> Answer:
         item.name: getattr(values, item.name) for item in fields(CoverageResult) if hasattr(values, item.name)
     }
     kept |= {name: kept[name].astype(np.intp) for name in _INDICES}
-    result = CoverageResult(points=ready.sites.points, corners=ready.corners, **kept)
+    result = CoverageResult(points=ready.sites.points, corners=ready.corners, weights=ready.weights, **kept)
     return Answer(values.generation, values.time, result, values.seconds, values.topic, values.path)
 
 

@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.robots import UNITS
+from robocov.controllers.gains import value_text
 from robocov_app.plot_curves import curve_styles
 from robocov_app.plot_gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
 from robocov_app.report.groups import Group, by_controller, dependences, medians, settings
 from robocov_app.report.result_plots import PANEL, RELATIVE, SCALE, Plot
 from robocov_app.report.svg import inline_svg
+from robocov_app.sweep.circumstances import UNITS, WORDS
 
 if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
     from robocov_app.report.gathering import Entry, Result
 
 
@@ -29,8 +31,10 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     scales = medians(result)
     for k, (name, controllers) in enumerate(dependences(result).items()):
         some = [group for group in groups if group.controller in controllers]
-        rows = [_dependence(group, partial(_gain, name), _scale(None if one else scales)) for group in some]
-        yield from _gain_plot(_named(name, result.units), rows, groups, f"{key}-{k}", label)
+        words = _words(result, name)
+        value = partial(_gain, name, words)
+        rows = [_dependence(group, value, _scale(None if one else scales)) for group in some]
+        yield from _gain_plot(_named(name, result.units), rows, groups, f"{key}-{k}", label, words)
     yield from _team_plots(result, groups, f"{key}-team")
     yield from _grid_plots(result, groups, None if one else scales, f"{key}-grid")
 
@@ -49,7 +53,9 @@ def _team_plots(result: Result, groups: Sequence[Group], key: str) -> Iterator[P
         return 1.0 if one else by_map.get(entry.map, 0.0)
 
     parameters = (
-        {"robots": ""} | {name: UNITS[name] for name, _ in result.fine[0].team} if result.fine else {}
+        {"robots": ""} | {name: UNITS[name] for name, _ in result.fine[0].team if name not in WORDS}
+        if result.fine
+        else {}
     )
     for k, (name, unit) in enumerate(parameters.items()):
         if len({_team_value(name, entry) for entry in result.fine}) < 2:
@@ -59,8 +65,16 @@ def _team_plots(result: Result, groups: Sequence[Group], key: str) -> Iterator[P
         yield from _gain_plot(words, rows, groups, f"{key}-{k}", label)
 
 
-def _gain(name: str, entry: Entry) -> float | None:
-    return dict(entry.gains)[name]
+def _words(result: Result, name: str) -> tuple[str, ...]:
+    """Return the values of a gain that is a word; none of one that is a number."""
+    values = dict.fromkeys(dict(entry.gains).get(name) for entry in result.fine)
+    return tuple(value for value in values if isinstance(value, str))
+
+
+def _gain(name: str, words: tuple[str, ...], entry: Entry) -> float | None:
+    """Return the value of a gain, of a word its number."""
+    value = dict(entry.gains)[name]
+    return words.index(value) if isinstance(value, str) else value
 
 
 def _team_value(name: str, entry: Entry) -> float | None:
@@ -88,20 +102,25 @@ def _dependence(
 
 
 def _gain_plot(
-    name: str, rows: list[Dependence], groups: Sequence[Group], key: str, label: str
+    name: str,
+    rows: list[Dependence],
+    groups: Sequence[Group],
+    key: str,
+    label: str,
+    choices: tuple[str, ...] = (),
 ) -> Iterator[Plot]:
     rows = [row for row in rows if len(row.values)]
     if not rows:
         return
     known = curve_styles(group.controller for group in groups)
     looks = [known[row.controller] for row in rows]
-    figure = plot_gains(rows, name, size=PANEL, scale=SCALE, styles=looks, label=label)
+    figure = plot_gains(rows, name, size=PANEL, scale=SCALE, styles=looks, label=label, words=choices)
     words = []
     for row in rows:
         levels = np.unique(row.gains)
         if len(levels) <= MOST_LEVELS:
             parts = [
-                f"{_level(level)}: {np.median(row.values[_same(row.gains, level)]):.3f}"
+                f"{_level(level, choices)}: {np.median(row.values[_same(row.gains, level)]):.3f}"
                 for level in levels.tolist()
             ]
             words.append(f"{row.label}, medians at {', '.join(parts)}")
@@ -121,7 +140,9 @@ def _grid_plots(
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for first, second in combinations(own, 2):
-            pair = [_dependence(group, partial(_gain, name), _scale(scales)) for name in (first, second)]
+            choices = _words(result, first), _words(result, second)
+            values_of = (partial(_gain, *each) for each in zip((first, second), choices, strict=True))
+            pair = [_dependence(group, value, _scale(scales)) for value in values_of]
             columns, rows = (np.unique(each.gains) for each in pair)
             if not (1 < len(columns) <= MOST_LEVELS and 1 < len(rows) <= MOST_LEVELS):
                 continue
@@ -135,27 +156,33 @@ def _grid_plots(
                 continue  # no grid: a sample of a range
             count += 1
             names = first, second
-            yield _grid_plot(result, group, names, (columns, rows), values, f"{key}-{count}", scales is None)
+            levels = tuple(
+                [_level_value(x, known) for x in each.tolist()]
+                for each, known in zip((columns, rows), choices, strict=True)
+            )
+            yield _grid_plot(
+                result, group, names, (levels[0], levels[1]), values, f"{key}-{count}", scales is None
+            )
 
 
 def _grid_plot(
     result: Result,
     group: Group,
     names: tuple[str, str],
-    levels: tuple[Array, Array],
+    levels: tuple[list[Value], list[Value]],
     values: Array,
     key: str,
     metres: bool,
 ) -> Plot:
-    columns, rows = ([None if np.isnan(x) else float(x) for x in each] for each in levels)
+    columns, rows = levels
     both = _named(names[0], result.units), _named(names[1], result.units)
     figure = plot_gain_grid(columns, rows, values, both, size=PANEL, scale=SCALE)
     i, j = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {names[0]} and {names[1]}"
     what = "final distance in m" if metres else RELATIVE
     sentence = (
-        f"{title}: medians of the {what}, from {np.nanmin(values):.3g} at {both[0]} {_level(levels[0][j])} "
-        f"and {both[1]} {_level(levels[1][i])} to {np.nanmax(values):.3g}."
+        f"{title}: medians of the {what}, from {np.nanmin(values):.3g} at {both[0]} {_text(columns[j])} "
+        f"and {both[1]} {_text(rows[i])} to {np.nanmax(values):.3g}."
     )
     return Plot(title, inline_svg(figure, key, sentence))
 
@@ -165,8 +192,19 @@ def _named(name: str, units: Mapping[str, str]) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def _level(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.4g}"
+def _level_value(level: float, words: tuple[str, ...]) -> Value:
+    """Return the value of a gain at a level: nan is null, and a word's is its number."""
+    if np.isnan(level):
+        return None
+    return words[int(level)] if words else level
+
+
+def _level(level: float, words: tuple[str, ...] = ()) -> str:
+    return _text(_level_value(level, words))
+
+
+def _text(value: Value) -> str:
+    return value_text(value, digits=4)
 
 
 def _same(values: Array, level: float) -> BoolArray:

@@ -14,7 +14,17 @@ from robocov.errors import ParameterError, counted
 from robocov_app.report.choosing import MOST_RUNS, chosen
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.embedding import BUDGET, ReplayRun, has_path
-from robocov_app.report.facts import facts, gaps, lede, pairs_words, run_facts, run_title, title_of, troubles
+from robocov_app.report.facts import (
+    facts,
+    gaps,
+    lede,
+    pairs_words,
+    run_facts,
+    run_title,
+    title_of,
+    troubles,
+    weighed_text,
+)
 from robocov_app.report.groups import comparisons, setting_label, settings, variants
 from robocov_app.report.pictures import map_picture, run_picture
 from robocov_app.report.replay import MOST_PANES, asset, replay_css, replay_js, replay_part, script
@@ -192,6 +202,8 @@ def _costs_words(result: Result, costs: Sequence[Any]) -> str:
     """Return what the curves are."""
     count = len(result.fine)
     words = "The mean distance to the nearest robot: how far it really has to travel, around obstacles."
+    if weighed_text(result):
+        words += " On maps with a density φ each place counts in the mean, and in all costs, by its φ."
     if count > 1 and any(len(group.entries) > 1 for group in variants(result)):
         words += " Lines are medians over runs, bands reach from the first quartile to the third."
     if len(costs) > 1:

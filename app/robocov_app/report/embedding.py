@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from robocov_app.report.density_picture import density_picture
 from robocov_app.saved import roster_of
 
 if TYPE_CHECKING:
@@ -96,6 +97,8 @@ def has_path(record: Record) -> bool:
 def embedded_map(environment: Environment) -> dict[str, Any]:
     """Return a map: ``region`` ring, ``blocked`` list of polygons (lists of rings), flat rings of x, y.
 
+    Where not every place counts the same there is also the address of a picture of the ``density``.
+
     Coordinates are whole numbers of ``unit`` metres, a millimetre or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -110,6 +113,7 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
         "unit": unit,
         "bounds": _whole(np.array([[low_x, low_y], [high_x, high_y]]), unit),
         "region": _whole(environment.region.vertices, unit),
+        **({"density": picture} if (picture := density_picture(environment)) else {}),
         "blocked": [
             [_whole(np.asarray(ring.coords)[:-1], unit) for ring in (part.exterior, *part.interiors)]
             for part in parts
@@ -147,6 +151,7 @@ def embedded_run(
         "mark": style.mark,
         "map": place,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
+        **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
         "numbers": list(roster_of(record).numbers),
         "path": has_path(record),
         "step": 1.0 / rate if has_path(record) else max(end - begin, 1e-9),

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import counted
-from robocov.robots import UNITS
 from robocov_app.report.groups import compared_groups, gain_text, setting_label, variants
+from robocov_app.sweep.circumstances import UNITS, circumstance_text
+from robocov_app.view.phi import density_words
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Entry, Result
@@ -53,7 +54,8 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> str:
     for entry in sorted(fine, key=lambda each: each.final):
         above = f" (+{100 * (entry.final / lowest - 1):.0f} %)" if entry.final > lowest > 0 else ""
         parts.append(f"{labels[entry]} {entry.final:.3f} m{above}")
-    return f"Final mean distance to the nearest robot: {', '.join(parts)}."
+    weighed = ", weighed by φ" if weighed_text(result) else ""
+    return f"Final mean distance to the nearest robot{weighed}: {', '.join(parts)}."
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
@@ -66,6 +68,7 @@ def facts(result: Result) -> list[tuple[str, str]]:
     rows = [
         ("Runs", _runs_text(result)),
         ("Maps", ", ".join(result.maps)),
+        ("Weighed by", weighed_text(result)),
         ("Robots", ", ".join(map(str, sizes))),
         ("Team", _team_text(result)),
         ("Starts", ", ".join("given positions" if start is None else start for start in starts)),
@@ -76,6 +79,15 @@ def facts(result: Result) -> list[tuple[str, str]]:
         ("Versions", _versions_text(known.get("versions"))),
     ]
     return [(term, text) for term, text in rows if text]
+
+
+def weighed_text(result: Result) -> str:
+    """Return by which densities the places of which maps count, empty where all places count the same."""
+    words = {name: density_words(environment) for name, environment in result.maps.items()}
+    some = {name: each for name, each in words.items() if each}
+    if len(result.maps) == 1:
+        return "".join(some.values())
+    return "; ".join(f"{name}: {each}" for name, each in some.items())
 
 
 def gaps(result: Result) -> list[str]:
@@ -142,6 +154,8 @@ def run_facts(result: Result, entry: Entry) -> str:
     """Return the figures of a run as a sentence."""
     figures = entry.figures
     words = [f"Gains: {gain_text(entry.gains, result.units)}"] if entry.gains else []
+    if _known(entry, "mean_time_s"):
+        words.append(f"mean time {figures['mean_time_s']:.3f} s")
     at = figures.get("settled_at_s")
     words.append("not settled" if at is None else f"settled at {at:.1f} s")
     contacts = figures.get("contacts")
@@ -216,8 +230,8 @@ def _team_text(result: Result) -> str:
         parts = [_parameter(str(key), value) for key, value in team.items()]
     for name, _ in result.entries[0].team:
         values = list(dict.fromkeys(dict(entry.team)[name] for entry in result.entries))
-        several = ", ".join("no limit" if value is None else f"{value:g}" for value in values)
-        parts.append(f"{name.replace('_', ' ')} {several} {UNITS[name]}")
+        several = ", ".join(circumstance_text(name, value) for value in values)
+        parts.append(f"{name.replace('_', ' ')} {several}")
     return ", ".join(part for part in parts if part)
 
 
@@ -228,6 +242,8 @@ def _parameter(key: str, value: Any) -> str:
         value = value[0] if value and same else value
     for name, unit in UNITS.items():
         if key == name or key.startswith(f"{name}_"):
+            if isinstance(value, str):
+                return f"{name.replace('_', ' ')} {circumstance_text(name, value)}"
             if value is None:
                 return f"{name.replace('_', ' ')} without limit"
             if isinstance(value, int | float):

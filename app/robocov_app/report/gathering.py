@@ -18,10 +18,11 @@ from robocov.metrics import mean_over_run
 from robocov.record import Record
 from robocov.results import read_history, read_results
 from robocov_app.saved import load_saved, roster_of
-from robocov_app.sweep.study import TEAM
-from robocov_app.sweep.table import gain_column, team_column
+from robocov_app.sweep.circumstances import UNITS, circumstance_column
+from robocov_app.sweep.table import gain_column
 
 if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
     from robocov_app.saved import Saved
@@ -30,7 +31,7 @@ Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
-    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
+    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots", "mean_time_s"),
 )
 """What is known of a run in numbers, by the names of the columns of a sweep's table."""
 
@@ -63,7 +64,7 @@ class Entry:
     team: tuple[tuple[str, float | None], ...]
     start: str | None
     seed: int | None
-    gains: tuple[tuple[str, float | None], ...]
+    gains: tuple[tuple[str, Value], ...]
     figures: Mapping[str, float | None] = field(compare=False)
     error: str | None
     folder: Path
@@ -250,7 +251,7 @@ def _of_sweep(folder: Path) -> Result:
         raise
     except Exception as error:
         raise InputError(f"{path}: the study cannot be read: {type(error).__name__}: {error}") from error
-    swept = [name for name in TEAM if len({team.get(name) for team in teams}) > 1]
+    swept = [name for name in UNITS if len({team.get(name) for team in teams}) > 1]
     rows = results.to_table().to_pylist()
     if not rows:
         raise InputError(f"{folder}: not one of the {wanted} runs of the sweep is done")
@@ -263,10 +264,10 @@ def _of_sweep(folder: Path) -> Result:
                 controller=controller,
                 label=printable(_label(controller)),
                 robots=int(row["robots"]),
-                team=tuple((name, row.get(team_column(name))) for name in swept),
+                team=tuple((name, row.get(circumstance_column(name))) for name in swept),
                 start=printable(str(row["start"])),
                 seed=row["seed"],
-                gains=tuple((name, row.get(gain_column(name))) for name in gains.get(controller, ())),
+                gains=_gains({name: row.get(gain_column(name)) for name in gains.get(controller, ())}),
                 figures={name: row.get(name) for name in FIGURES} if row["error"] is None else {},
                 error=None if row["error"] is None else printable(str(row["error"])),
                 folder=folder / "runs" / Path(str(row["run"])).name,
@@ -315,8 +316,12 @@ def _label(controller: str) -> str:
     return str(getattr(CONTROLLERS.get(controller), "label", controller.rpartition(":")[2]))
 
 
-def _gains(gains: Mapping[str, float | None]) -> tuple[tuple[str, float | None], ...]:
-    return tuple((printable(str(name)), value) for name, value in gains.items())
+def _gains(gains: Mapping[str, Value]) -> tuple[tuple[str, Value], ...]:
+    return tuple((printable(str(name)), _printable(value)) for name, value in gains.items())
+
+
+def _printable(value: Value) -> Value:
+    return printable(value) if isinstance(value, str) else value
 
 
 def _known_gains(entries: list[Entry], told: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, str]]:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.robots import UNITS
+from robocov.controllers.gains import value_text
 from robocov_app.statistics import Paired, paired
+from robocov_app.sweep.circumstances import circumstance_text
 
 if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
     from robocov_app.report.gathering import Entry, Result
 
 MOST_GROUPS = 8
@@ -44,7 +46,7 @@ class Group:
 
     label: str
     controller: str
-    gains: tuple[tuple[str, float | None], ...] | None
+    gains: tuple[tuple[str, Value], ...] | None
     entries: tuple[Entry, ...]
 
     @cached_property
@@ -154,8 +156,7 @@ def setting_label(result: Result, setting: tuple[object, ...]) -> str:
         parts.append(f"{robots} robots")
     assert isinstance(team, tuple)
     for parameter, value in team:
-        shown = "no limit" if value is None else f"{value:g} {UNITS[parameter]}"
-        parts.append(f"{parameter.replace('_', ' ')} {shown}")
+        parts.append(f"{parameter.replace('_', ' ')} {circumstance_text(parameter, value)}")
     return ", ".join(parts)
 
 
@@ -207,7 +208,7 @@ def compared(first: Group, second: Group) -> Comparison | None:
 
 def dependences(result: Result) -> dict[str, list[str]]:
     """Return the gains that take several values, by name, with the controllers that they vary in."""
-    levels: dict[tuple[str, str], set[float | None]] = {}
+    levels: dict[tuple[str, str], set[Value]] = {}
     for entry in result.fine:
         for name, value in entry.gains:
             levels.setdefault((name, entry.controller), set()).add(value)
@@ -218,7 +219,7 @@ def dependences(result: Result) -> dict[str, list[str]]:
     return found
 
 
-def gain_text(gains: Sequence[tuple[str, float | None]], units: Mapping[str, str]) -> str:
+def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> str:
     """Return gains as a line of text.
 
     >>> gain_text([("k_rep", 0.3), ("attraction_limit", None)], {"k_rep": "N m³"})
@@ -226,8 +227,8 @@ def gain_text(gains: Sequence[tuple[str, float | None]], units: Mapping[str, str
     """
     parts = []
     for name, value in gains:
-        unit = units.get(name, "")
-        parts.append(f"{name} none" if value is None else f"{name} {value:.6g} {unit}".rstrip())
+        unit = "" if value is None else units.get(name, "")
+        parts.append(f"{name} {value_text(value)} {unit}".rstrip())
     return ", ".join(parts)
 
 

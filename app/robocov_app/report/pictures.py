@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.voronoi import partition
+from robocov.weighted_cells import outlines_of
+from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path
 from robocov_app.saved import roster_of
+from robocov_app.view.phi import density_words
 from robocov_app.view.spacing import fitted_radii, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, robot_hues
 
@@ -91,12 +93,13 @@ def run_picture(
     last = record.positions[-1]
     parts: list[str] = []
     if n <= MOST_ROBOTS:
-        cells = partition(last, record.environment.region)
-        hues = robot_hues(n, cells.adjacency if n > ONE_HUE_EACH else None).tolist()
-        for cell, hue in zip(cells.polygons, hues, strict=True):
+        cells, working = record.cells(), np.flatnonzero(record.working[-1])
+        hues = robot_hues(n, working[cells.adjacency] if n > ONE_HUE_EACH else None).tolist()
+        for cell, owner in zip(*outlines_of(cells), strict=True):
+            hue = hues[working[int(owner)]]
             if len(cell) > 2:
                 parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')
-    parts.append(_map_shapes(record.environment, frame))
+    parts.append(_map_shapes(record.environment.at(float(record.time[-1])), frame))
     tracks = np.moveaxis(frame.at(record.positions), 1, 0)
     if has_path(record) and n <= MOST_ROBOTS:
         lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in tracks if len(track) > 1]
@@ -121,10 +124,12 @@ def map_sentence(environment: Environment) -> str:
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
     count = len(environment.obstacles)
+    weighed = density_words(environment)
     obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
     return (
         f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m {obstacles}, "
-        f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked."
+        f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked"
+        f"{', ' if weighed else ''}{weighed}."
     )
 
 
@@ -140,7 +145,10 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
         first, final = history.mean_distance[[0, -1]]
         word = "falls" if final < first else "goes"
-        text += f" The mean distance to the nearest robot {word} from {first:.3f} m to {final:.3f} m."
+        weighed = ", weighed by φ," if density_words(record.environment) else ""
+        text += (
+            f" The mean distance to the nearest robot{weighed} {word} from {first:.3f} m to {final:.3f} m."
+        )
     return text
 
 
@@ -161,7 +169,19 @@ def _map_shapes(environment: Environment, frame: Frame) -> str:
         for ring in (part.exterior, *part.interiors)
     ]
     shapes = f'<path class="blocked" d="{_path(rings, closed=True)}"/>' if rings else ""
-    return f'{shapes}<path class="region" d="{region}"/>'
+    return f'{_density_image(environment, frame)}{shapes}<path class="region" d="{region}"/>'
+
+
+def _density_image(environment: Environment, frame: Frame) -> str:
+    """Return the shading of the density as an image within the picture; empty without one."""
+    address = density_picture(environment)
+    wide, high = frame.width - 2 * _MARGIN, frame.height - 2 * _MARGIN
+    return (
+        f'<image x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}" '
+        f'preserveAspectRatio="none" href="{address}"/>'
+        if address
+        else ""
+    )
 
 
 def _path(lines: Iterable[Array], *, closed: bool = False) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from robocov.controllers.gains import value_text
 from robocov.errors import counted
 from robocov_app.report.groups import (
     Comparison,
@@ -23,6 +24,7 @@ from robocov_app.report.groups import (
 from robocov_app.statistics import Interval
 
 if TYPE_CHECKING:
+    from robocov.controllers.gains import Value
     from robocov_app.plot_curves import CurveStyle
     from robocov_app.report.gathering import Entry, Result
 
@@ -112,23 +114,25 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
     groups = shown_groups(result)
     every = settings(result)
     tables = []
+    timed = any(_known(entry, TIME) for entry in result.fine)
+    whole = (*_HEAD, *(("Mean time, s",) if timed else ()))
     if len(every) > 1:
         scales = medians(result)
         rows = []
         for group in groups:
-            row = _summary_row(group, styles)
+            row = _summary_row(group, styles, timed)
             # metres of different maps have no common median
             rows.append((*row[:2], Cell(_quartiles(relative(group, scales).tolist(), 3)), *row[4:]))
-        head = (*_HEAD[:2], "Mean distance / median", *_HEAD[4:])
+        head = (*whole[:2], "Mean distance / median", *whole[4:])
         note = (
             "Mean distance / median: divided by the median over all runs on the same map with the same team."
         )
         tables.append(Table("All maps and teams together", head, rows, notes=(note,)))
     for setting in every if len(every) <= MOST_SETTINGS else ():
         parts = [group.at(setting) for group in groups]
-        rows = [_summary_row(part, styles) for part in parts if part.entries]
+        rows = [_summary_row(part, styles, timed) for part in parts if part.entries]
         caption = setting_label(result, setting) if len(every) > 1 else "Final figures"
-        tables.append(Table(caption, _HEAD, rows))
+        tables.append(Table(caption, whole, rows))
     if tables and any(len(group.entries) > 1 for group in groups):
         note = (
             "Of several runs: the median, and quartiles in brackets; contacts: runs in which a robot touched "
@@ -137,6 +141,9 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
         tables[-1] = replace(tables[-1], notes=(note,))
     return tables
 
+
+TIME = "mean_time_s"
+"""Known where robots are not equally fast."""
 
 _HEAD = (
     *("Controller", "Runs", "Mean distance, m", "Over the run, m", "Settled", "Settled at, s"),
@@ -206,7 +213,7 @@ def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | Non
     return Table("Runs that failed", head, rows, frozenset({1, 2, 3, 4}), notes)
 
 
-def _summary_row(group: Group, styles: dict[str, CurveStyle]) -> tuple[Cell, ...]:
+def _summary_row(group: Group, styles: dict[str, CurveStyle], timed: bool) -> tuple[Cell, ...]:
     entries = group.entries
     settled = [e for e in entries if _known(e, "settled_at_s")]
     return (
@@ -220,6 +227,7 @@ def _summary_row(group: Group, styles: dict[str, CurveStyle]) -> tuple[Cell, ...
         Cell(_least(entries, "min_clearance_m")),
         Cell(_spread(entries, "path_length_m", 2)),
         Cell(_stuck(entries)),
+        *([Cell(_spread(entries, TIME, 3))] if timed else []),
     )
 
 
@@ -295,13 +303,16 @@ def _decimals(value: Any, decimals: int, nothing: str = NOTHING) -> str:
 
 def _ranges_text(group: Group, result: Result) -> str:
     """Return between which values the gains of a controller vary."""
-    values: dict[str, list[float | None]] = {}
+    values: dict[str, list[Value]] = {}
     for entry in group.entries:
         for name, value in entry.gains:
             values.setdefault(name, []).append(value)
     parts = []
     for name, every in values.items():
-        finite = [value for value in every if value is not None]
+        if any(isinstance(value, str) for value in every):
+            parts.append(f"{name} {' or '.join(dict.fromkeys(map(value_text, every)))}")
+            continue
+        finite = [value for value in every if isinstance(value, int | float)]
         unit = result.units.get(name, "")
         if not finite:
             parts.append(f"{name} none")

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 
 from robocov.controllers import gain_values, gains_of
-from robocov.controllers.gains import with_gains
+from robocov.controllers.gains import Option, Value, with_gains
 from robocov.errors import ParameterError, RobocovError, shown, unknown_name
 from robocov.strictjson import place
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.controllers.gains import Gain
+
+T = TypeVar("T")
 
 Scale: TypeAlias = Literal["linear", "log"]
 Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
@@ -105,7 +107,7 @@ class Sampling:
         return np.asarray(whole[: self.samples])
 
 
-Choice: TypeAlias = Mapping[str, float | None]
+Choice: TypeAlias = Mapping[str, Value]
 """A value for every gain of a controller."""
 
 Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
@@ -168,7 +170,7 @@ class Gains:
 def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None, path: Place) -> Gains:
     """Return every combination of the lists with every sample of the ranges, the samples innermost."""
     known = gains_of(kind)
-    lists: dict[str, list[float | None]] = {}
+    lists: dict[str, list[Value]] = {}
     ranges: dict[str, Range] = {}
     for name, given in axes.items():
         at = (*path, name)
@@ -199,7 +201,7 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
     return Gains(tuple(choices), ranges)
 
 
-def _choice(kind: type[Any], values: Mapping[str, float | None], path: Place) -> Choice:
+def _choice(kind: type[Any], values: Mapping[str, Value], path: Place) -> Choice:
     """Return a value for every gain, as the controller takes them."""
     try:
         return gain_values(with_gains(kind, values))
@@ -209,7 +211,7 @@ def _choice(kind: type[Any], values: Mapping[str, float | None], path: Place) ->
         raise ParameterError(f"{place(path)}: {type(error).__name__}: {error}") from error
 
 
-def _value(known: Mapping[str, Gain], name: str, value: object, path: Place) -> float | None:
+def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: Place) -> Value:
     """Return a value of a gain; both ``inf`` and ``"null"`` stand for no limit where there may be none."""
     gain = _known(known, name, path)
     if gain.optional and value in (NO_LIMIT, math.inf):
@@ -217,7 +219,7 @@ def _value(known: Mapping[str, Gain], name: str, value: object, path: Place) -> 
     return _at(path, lambda: gain.validated(value, ""))
 
 
-def _known(known: Mapping[str, Gain], name: str, path: Place) -> Gain:
+def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain | Option:
     if name not in known:
         above = place(path[: len(path) - 1 - isinstance(path[-1], int)])
         if not known:
@@ -226,8 +228,11 @@ def _known(known: Mapping[str, Gain], name: str, path: Place) -> Gain:
     return known[name]
 
 
-def _checked_range(known: Mapping[str, Gain], name: str, given: Range, path: Place) -> Range:
+def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: Place) -> Range:
     gain = _known(known, name, path)
+    if isinstance(gain, Option):
+        wanted = f"one of {', '.join(gain.words)}, or a list of them,"
+        raise ParameterError(f"{place(path)}: a range, but {wanted} was wanted")
     for end in ("low", "high"):
         if getattr(given, end) is None:
             raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
@@ -246,7 +251,7 @@ def _checked_range(known: Mapping[str, Gain], name: str, given: Range, path: Pla
     return Range(low, high, given.scale)
 
 
-def _at(path: Place, check: Callable[[], float | None]) -> float | None:
+def _at(path: Place, check: Callable[[], T]) -> T:
     """Return what `check` returns; its complaint is told of `path`."""
     try:
         return check()

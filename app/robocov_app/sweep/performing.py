@@ -20,10 +20,13 @@ from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
-from robocov.record import ARRAYS, Recorder
+from robocov.record import ARRAYS
+from robocov.recorder import Recorder
+from robocov.run_metrics import figures_of
 from robocov.simulation import Simulation
 from robocov_app.output import csv_text, finite
-from robocov_app.run import COST_COLUMNS, cost_rows
+from robocov_app.run import cost_columns, cost_rows
+from robocov_app.sweep.circumstances import conditions_of
 from robocov_app.sweep.study import team_of
 
 if TYPE_CHECKING:
@@ -45,6 +48,9 @@ FIGURES = (
     *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
 )
 """What the table holds of a run, in this order."""
+
+TIMED = "mean_time_s"
+"""What it holds as well where robots are not equally fast."""
 
 
 @dataclass(frozen=True)
@@ -94,10 +100,18 @@ def simulated(task: Task, environment: Environment) -> Record:
     controller = make_controller(task.controller, task.gains, source=source)
     team = team_of(task.robots, task.team)
     start = environment.start(task.start)
-    positions = start.sample(task.robots, seed=task.seed, radius=float(team.radius[0]))
-    simulation = Simulation(environment, controller, positions, team, task.dt)
+    positions = start.sample(task.robots, seed=task.seed, radius=float(team.radius.max()))
+    conditions = conditions_of(task.team, task.seed, task.robots)
+    simulation = Simulation(environment, controller, positions, team, task.dt, conditions=conditions)
     recorder = Recorder(
-        environment, team, controller, task.dt, name=task.controller, start=task.start, seed=task.seed
+        environment,
+        team,
+        controller,
+        task.dt,
+        name=task.controller,
+        start=task.start,
+        seed=task.seed,
+        conditions=conditions,
     )
     for step, snapshot in enumerate(simulation.snapshots(task.duration), start=1):
         recorder.add(snapshot)
@@ -150,7 +164,12 @@ def _performed(task: Task) -> Outcome:
     summary = finite(summarise(record, history))
     path = summary["path_length_m"]
     figures = {**summary, "path_length_m": sum(path) / len(path)}
-    return Outcome(_files(task, record, history, summary), {name: figures[name] for name in FIGURES})
+    known = {name: figures[name] for name in FIGURES}
+    if TIMED in figures:
+        known[TIMED] = figures[TIMED]
+    if task.metrics:
+        known |= finite(figures_of(record, history))
+    return Outcome(_files(task, record, history, summary), known)
 
 
 def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]) -> dict[str, bytes]:
@@ -165,7 +184,7 @@ def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[st
     return {
         "run.json": _json(content),
         "record.npz": arrays.getvalue(),
-        "cost.csv": csv_text(COST_COLUMNS, cost_rows(history)).encode(),
+        "cost.csv": csv_text(cost_columns(history), cost_rows(history)).encode(),
     }
 
 

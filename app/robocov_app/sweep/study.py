@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -15,7 +16,9 @@ from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov.strictjson import place
+from robocov.teamfile import team_of_groups
 from robocov_app.options import MOST_ROWS
+from robocov_app.sweep.circumstances import GROUPS, condition_axes, conditions_of
 from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
 
 if TYPE_CHECKING:
@@ -36,6 +39,9 @@ _LONGEST_NAME = 100
 
 _HUGE = 1e300
 """What a float can hold, with some to spare."""
+
+TeamValue: TypeAlias = float | str | None
+"""A value of what is varied of team and conditions."""
 
 Swept: TypeAlias = float | Sequence[float | None] | None
 """One value, or several, each of which is tried."""
@@ -94,12 +100,20 @@ class Study:
     radius, max_speed, max_acceleration, viscosity, sensing_range, communication_range
         Of the team, m, m/s, m/s², N s/m, m, m: a value, or several of which each is tried. None (or
         inf) is a range without limit.
+    group : sequence of dict
+        Robots that differ, as in a team file: each group with its ``count`` and its own values, the rest as
+        above. None: all are equal.
+    conditions : dict of name to value or list of values
+        What goes wrong, as `Conditions` has it, and ``fail`` and ``join`` as texts like ``3@20 5@40``: of
+        lists each is tried.
     lattice : int
         The coverage cost is evaluated on a lattice of so many sites along a side.
     cost_hz : float, Hz
         How often it is evaluated; 0: at the first moment and the last.
     record_hz : float, Hz
         How many moments of each run are kept; 0: the first and the last.
+    metrics : bool
+        Whether the table holds the metrics of the end of each run as well; see `robocov.run_metrics`.
     sampling : Sampling or None
         How ranges of gains are sampled.
     folder : Path
@@ -107,7 +121,7 @@ class Study:
     sources : dict of controller to Source
         The files of controllers that are none of the project's; read when the study is made.
     teams : tuple of dict
-        Every combination of the parameters of a team.
+        Every combination of the parameters of a team, and of the conditions that are given.
 
     Raises
     ------
@@ -129,17 +143,25 @@ class Study:
     viscosity: Swept = 2.0
     sensing_range: Swept = 3.0
     communication_range: Swept = None
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    group: Sequence[Mapping[str, Any]] = ()
     lattice: int = 64
     cost_hz: float = 2.0
     record_hz: float = 5.0
+    metrics: bool = False
     sampling: Sampling | None = None
     folder: Path = Path()
     sources: Mapping[str, Source] = field(init=False)
-    teams: tuple[Mapping[str, float | None], ...] = field(init=False)
+    teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.group:
+            size = len(team_of_groups(list(self.group), ("team", "group")))
+            if self.robots not in (Study.robots, (size,)):
+                raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
+            object.__setattr__(self, "robots", (size,))
         self._check_names()
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
@@ -149,6 +171,8 @@ class Study:
             object.__setattr__(self, name, _number(name, getattr(self, name), most))
         object.__setattr__(self, "dt", _number("dt", self.dt, 1.0))
         check_dt(self.dt)
+        if not isinstance(self.metrics, bool):
+            raise ParameterError(f"metrics: {shown(self.metrics)}, but true or false was wanted")
         for name in ("maps", "controllers", "robots", "seeds"):
             if not getattr(self, name):
                 raise ParameterError(f"{name}: none, but at least one was wanted")
@@ -174,8 +198,13 @@ class Study:
 
     @property
     def swept(self) -> tuple[str, ...]:
-        """The parameters of a team of which there is more than one value."""
-        return tuple(name for name in TEAM if len({team[name] for team in self.teams}) > 1)
+        """The parameters of a team, and the conditions, of which there is more than one value."""
+        return tuple(name for name in self.teams[0] if len({team[name] for team in self.teams}) > 1)
+
+    @property
+    def mixed_speeds(self) -> bool:
+        """Whether some robots of a team are faster than others."""
+        return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
         """Return what is tried of a controller of the study."""
@@ -224,6 +253,7 @@ class Study:
             "lattice": self.lattice,
             "cost_hz": self.cost_hz,
             "record_hz": self.record_hz,
+            "metrics": self.metrics,
         }
 
     def _check_names(self) -> None:
@@ -251,8 +281,8 @@ class Study:
                 except InputError as error:
                     raise type(error)(f"starts[{k}]: {error}") from None
 
-    def _every_team(self) -> tuple[Mapping[str, float | None], ...]:
-        axes = []
+    def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
+        axes: list[Sequence[TeamValue]] = []
         for name in TEAM:
             given = getattr(self, name)
             several = isinstance(given, Sequence) and not isinstance(given, str)
@@ -265,7 +295,15 @@ class Study:
                 raise ParameterError(f"team.{name}: none, but at least one value was wanted")
             once(values, path)
             axes.append(values)
-        return tuple(dict(zip(TEAM, row, strict=True)) for row in product(*axes))
+        conditions = condition_axes(self.conditions, self.robots)
+        if self.group:
+            conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
+        names = (*TEAM, *conditions)
+        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *conditions.values()))
+        for team in teams:
+            for robots in self.robots:
+                conditions_of(team, 0, robots)
+        return teams
 
     def _read_sources(self) -> dict[str, Source]:
         sources = {}
@@ -318,6 +356,9 @@ def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float 
     return float(value)
 
 
-def team_of(robots: int, team: Mapping[str, float | None]) -> Team:
-    """Return so many equal robots with the parameters of a study."""
-    return Team.homogeneous(robots, **{name: math.inf if x is None else x for name, x in team.items()})
+def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
+    """Return so many robots with the parameters of a study, equal ones but for its groups."""
+    values = {name: math.inf if team[name] is None else float(team[name] or 0.0) for name in TEAM}
+    if GROUPS in team:
+        return team_of_groups(json.loads(str(team[GROUPS])), ("team", "group"), values)
+    return Team.homogeneous(robots, **values)

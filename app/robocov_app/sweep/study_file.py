@@ -60,12 +60,15 @@ _Wholes: TypeAlias = Annotated[
 _Value: TypeAlias = Annotated[
     Annotated[float, Tag("number")] | Annotated[Literal["null"], Tag("word")], Discriminator(_kind)
 ]
+_GainValue: TypeAlias = Annotated[
+    Annotated[float, Tag("number")] | Annotated[str, Tag("word")], Discriminator(_kind)
+]
 _Values: TypeAlias = Annotated[
     Annotated[_Value, Tag("one")] | Annotated[list[_Value], Tag("list")], Discriminator(_shape)
 ]
 _Gain: TypeAlias = Annotated[
-    Annotated[_Value, Tag("one")]
-    | Annotated[list[_Value], Tag("list")]
+    Annotated[_GainValue, Tag("one")]
+    | Annotated[list[_GainValue], Tag("list")]
     | Annotated[RangeModel, Tag("table")],
     Discriminator(_shape),
 ]
@@ -80,6 +83,26 @@ class TeamModel(_Model):
     viscosity: _Values | None = None
     sensing_range: _Values | None = None
     communication_range: _Values | None = None
+    group: list[dict[str, Any]] | None = None
+
+
+_Condition: TypeAlias = Annotated[
+    Annotated[_GainValue, Tag("one")] | Annotated[list[_GainValue], Tag("list")], Discriminator(_shape)
+]
+
+
+class ConditionsModel(_Model):
+    """What goes wrong during the runs: a value, or a list of which each is tried."""
+
+    loss: _Condition | None = None
+    delay: _Condition | None = None
+    message_rate: _Condition | None = None
+    forget_after: _Condition | None = None
+    position_noise: _Condition | None = None
+    sensing_noise: _Condition | None = None
+    failure_rate: _Condition | None = None
+    fail: _Condition | None = None
+    join: _Condition | None = None
 
 
 class StudyModel(_Model):
@@ -95,7 +118,9 @@ class StudyModel(_Model):
     lattice: int | None = None
     cost_hz: float | None = None
     record_hz: float | None = None
+    metrics: bool | None = None
     team: TeamModel = TeamModel()
+    conditions: ConditionsModel = ConditionsModel()
     gains: dict[str, dict[str, _Gain]] = {}
     sampling: SamplingModel | None = None
 
@@ -103,6 +128,7 @@ class StudyModel(_Model):
 _TEXTS = "a text, or a list of texts,"
 _WHOLES = "a whole number, or a list of whole numbers,"
 _VALUE = f'a number, or "{NO_LIMIT}" for no limit,'
+_GAIN_VALUE = f'a number, "{NO_LIMIT}" for no limit, or a word,'
 _VALUES = "a number, or a list of numbers,"
 _WANTED: dict[tuple[str, ...], tuple[str, ...]] = {
     # what is wanted at a key, and in its items; * is any key
@@ -112,11 +138,15 @@ _WANTED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("starts",): (_TEXTS, "a text"),
     ("seeds",): ("how many seeds, or a list of seeds,", "a whole number"),
     ("lattice",): ("a whole number",),
+    ("metrics",): ("true or false",),
     ("team",): ("a table [team]",),
+    ("team", "group"): ("tables [[team.group]]", "a table"),
     ("team", "*"): (_VALUES, _VALUE),
+    ("conditions",): ("a table [conditions]",),
+    ("conditions", "*"): ("a number or a text, or a list of them,", "a number or a text"),
     ("gains",): ("tables [gains.NAME]",),
     ("gains", "*"): ("a table of gains",),
-    ("gains", "*", "*"): ("a number, a list of numbers, or a range {low, high},", _VALUE),
+    ("gains", "*", "*"): ("a number or a word, a list of them, or a range {low, high},", _GAIN_VALUE),
     ("gains", "*", "*", "scale"): ('"linear" or "log"',),
     ("sampling",): ("a table [sampling]",),
     ("sampling", "method"): ('"sobol", "latin-hypercube" or "halton"',),
@@ -173,9 +203,10 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         raise InputError(f"{where}: {_message(details[0], document)}{more}") from None
     given: dict[str, Any] = {}
     for name, value in model:
-        if value is not None and name not in ("team", "gains", "sampling"):
+        if value is not None and name not in ("team", "conditions", "gains", "sampling"):
             given[name] = value if isinstance(value, list) or name in _ALONE else [value]
     given |= {name: value for name, value in model.team if value is not None}
+    given["conditions"] = {name: value for name, value in model.conditions if value is not None}
     try:
         given["maps"] = _maps(given["maps"], folder)
         if isinstance(model.seeds, int):
@@ -188,7 +219,7 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         raise InputError(f"{where}: {error}") from error
 
 
-_ALONE = ("duration", "dt", "lattice", "cost_hz", "record_hz")
+_ALONE = ("duration", "dt", "lattice", "cost_hz", "record_hz", "metrics")
 """Keys whose values are never lists."""
 
 
@@ -266,7 +297,7 @@ def _keys(parent: tuple[str | int, ...]) -> list[str]:
     """Return the keys that a table of the file may have."""
     tables: dict[int, dict[object, type[_Model]]] = {
         0: {(): StudyModel},
-        1: {("team",): TeamModel, ("sampling",): SamplingModel},
+        1: {("team",): TeamModel, ("conditions",): ConditionsModel, ("sampling",): SamplingModel},
     }
     model = tables.get(len(parent), {}).get(parent, RangeModel)
     return list(model.model_fields)

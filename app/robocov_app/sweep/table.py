@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.atomic import written
 from robocov.controllers import gains_of
+from robocov.controllers.gains import Option
 from robocov.errors import OutputError
-from robocov.robots import UNITS
-from robocov_app.sweep.performing import FIGURES
-from robocov_app.sweep.study import TEAM
+from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
+from robocov_app.sweep.performing import FIGURES, TIMED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 ROW_GROUP = 4096
 """Rows of a row group, and the most that are in memory."""
-
-_KEY_UNITS = {"m": "m", "m/s": "m_s", "m/s²": "m_s2", "N s/m": "n_s_m"}
-"""Units in the names of columns."""
 
 
 class Column(NamedTuple):
@@ -59,7 +56,7 @@ _BEFORE = (
 )
 _DURATION = Column("duration_s", "double", "s", "simulated time")
 _FIGURES = (
-    Column("mean_distance_m", "double", "m", "mean distance to the nearest robot, (22) by area, at the end"),
+    Column("mean_distance_m", "double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
     Column("mean_distance_over_run_m", "double", "m", "mean of it over the time of the run"),
     Column("cost_m3", "double", "m³", "coverage cost (22) at the end"),
     Column("uncovered_area_m2", "double", "m²", "area cut off from every robot"),
@@ -75,6 +72,18 @@ _AFTER = (
     Column("run", "string", "", "the run's folder in runs/"),
     Column("error", "string", "", "why the run failed, null if it did not"),
 )
+_TIME = Column(TIMED, "double", "s", "mean time until the first robot is at a place, each at its top speed")
+_METRICS = (
+    Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
+    Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, walls or not"),
+    Column("visible_area_m2", "double", "m²", "free area in a robot's line of sight"),
+    Column("work_J", "double", "J", "integral of |F v| of the forces asked for, all robots together"),
+    Column("effort_N2_s", "double", "N² s", "integral of |F|² of these, all robots together"),
+    Column("components", "double", "", "parts into which the team falls that hear each other"),
+    Column("algebraic_connectivity", "double", "", "of the graph of who hears whom"),
+    Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null where there is one"),
+    Column("near_final_s", "double", "s", "from when on the mean distance was within 5 % of that of the end"),
+)
 assert tuple(column.name for column in _FIGURES) == FIGURES
 
 
@@ -84,28 +93,29 @@ def columns_of(study: Study) -> tuple[Column, ...]:
     for controller in study.controllers:
         known = gains_of(study.kind(controller))
         for name in study.gains_of(controller).choices[0]:
-            gains.setdefault(name, Column(gain_column(name), "double", known[name].unit, known[name].meaning))
+            kind = "string" if isinstance(known[name], Option) else "double"
+            column = Column(gain_column(name), kind, known[name].unit, known[name].meaning)
+            if gains.setdefault(name, column).kind != kind:
+                # a number here and a word there: both can be written as words
+                gains[name] = gains[name]._replace(kind="string")
     team = (
-        Column(team_column(name), "double", UNITS[name], f"{name.replace('_', ' ')} of the robots")
+        Column(
+            circumstance_column(name),
+            "string" if name in WORDS else "double",
+            UNITS[name],
+            f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}",
+        )
         for name in study.swept
     )
-    return (*_BEFORE, *gains.values(), *team, _DURATION, *_FIGURES, *_AFTER)
+    figures = (*_FIGURES, *((_TIME,) if study.mixed_speeds else ()), *(_METRICS if study.metrics else ()))
+    return (*_BEFORE, *gains.values(), *team, _DURATION, *figures, *_AFTER)
 
 
 def gain_column(name: str) -> str:
     """Return the name of the column of a gain: its own, unless another column has it."""
-    taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, *_AFTER)}
-    taken |= {team_column(parameter) for parameter in TEAM}
+    taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, _TIME, *_METRICS, *_AFTER)}
+    taken |= {circumstance_column(name) for name in UNITS}
     return f"gain_{name}" if name in taken else name
-
-
-def team_column(name: str) -> str:
-    """Return the name of the column of a parameter of a team.
-
-    >>> team_column("max_speed")
-    'max_speed_m_s'
-    """
-    return f"{name}_{_KEY_UNITS[UNITS[name]]}"
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
@@ -117,7 +127,7 @@ def row_of(task: Task, entry: Entry) -> dict[str, Any]:
         "start": task.start,
         "seed": task.seed,
         **{gain_column(name): value for name, value in task.gains.items()},
-        **{team_column(name): value for name, value in task.team.items()},
+        **{circumstance_column(name): value for name, value in task.team.items()},
         "duration_s": task.duration,
         **entry.figures,
         "run": task.name,
@@ -177,7 +187,7 @@ class Table:
         """Append a row; what it does not hold is null."""
         if self._broken is not None:
             raise self._broken
-        values = {name: row.get(name) for name in self._names}
+        values = {column.name: _cell(row.get(column.name), column.kind) for column in self._columns}
         try:
             self._csv.write(_csv_line(values.values()))
             self._rows.append(values)
@@ -236,6 +246,10 @@ def _csv_line(values: Any) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(values)
     return text.getvalue()
+
+
+def _cell(value: object, kind: str) -> object:
+    return str(value) if kind == "string" and value is not None else value
 
 
 def _schema(columns: Sequence[Column]) -> pa.Schema:

@@ -13,7 +13,8 @@ from robocov.mapfile import to_json
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from robocov_app.sweep.study import Study
+    from robocov.controllers.gains import Value
+    from robocov_app.sweep.study import Study, TeamValue
 
 _FORMAT = "robocov-task 1"
 """Another one whenever the same inputs give other results: what is done already is then done anew."""
@@ -42,12 +43,15 @@ class Task:
         All of them.
     robots : int
     team : dict of name to value
-        As `Team.homogeneous` takes them, None for a range without limit.
+        As `Team.homogeneous` takes them, None for a range without limit; and the conditions that the study
+        gives.
     start : str
     seed : int
     duration, dt : float, s
     lattice : int
     cost_hz, record_hz : float, Hz
+    metrics : bool
+        Whether the table is to hold the metrics of the end.
     digest : str
         Of all of this but `path`: tasks of one digest have one result.
     """
@@ -57,9 +61,9 @@ class Task:
     controller: str
     path: str | None
     source: str | None
-    gains: Mapping[str, float | None]
+    gains: Mapping[str, Value]
     robots: int
-    team: Mapping[str, float | None]
+    team: Mapping[str, TeamValue]
     start: str
     seed: int
     duration: float
@@ -67,6 +71,7 @@ class Task:
     lattice: int
     cost_hz: float
     record_hz: float
+    metrics: bool = False
     digest: str = ""
 
     @property
@@ -84,6 +89,8 @@ def tasks_of(study: Study) -> Iterator[Task]:
     """
     once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
     once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
+    if study.metrics:
+        once["metrics"] = True
     laws: list[dict[str, Any]] = []
     for name in study.controllers:
         source = study.sources.get(name)

@@ -12,6 +12,7 @@ from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.clipping import FAR, bounded, clipped_polygon, clipped_segment
+from robocov_app.view.discovered import discovered_map, draw_discovered
 from robocov_app.view.layers import Layer, LegendEntry, drawn_radii
 from robocov_app.view.scene import Scene
 from robocov_app.view.theme import Colour, mix
@@ -130,7 +131,7 @@ class RayScan(Layer):
 class SensedObstacles(Layer):
     """What the robots know of the obstacles, beside the truth: points that were sensed; the rest pales.
 
-    Of the robot that is asked about, where there is one, else of all.
+    Of the robot that is asked about, where there is one, else of all; its discovered map if it makes one.
     """
 
     name = "sensed"
@@ -159,6 +160,9 @@ class SensedObstacles(Layer):
             self._last = points[-1].tolist()
         self._drawn = len(points)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        known = discovered_map(scene)
+        if known is not None:
+            draw_discovered(canvas, known)
 
     def _page_for(
         self, canvas: Canvas, scene: Scene, points: Array, asked: int | None

@@ -100,7 +100,8 @@ class Cells(Layer):
         ends = np.cumsum(sizes)
         if not self._lines_only(canvas, scene):
             tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
-            canvas.polygons(corners, ends.tolist(), [tints[hue] for hue in canvas.hues.tolist()])
+            hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
+            canvas.polygons(corners, ends.tolist(), [tints[hue] for hue in hues.tolist()])
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         edges = np.hstack([corners, corners[following]])
@@ -273,7 +274,7 @@ class Starts(Layer):
 
 
 class Centroids(Layer):
-    """A plus at the centroid of each cell, where RAPF and Lloyd's algorithm head for.
+    """A plus at the centroid of each cell, where RAPF and Lloyd's algorithm usually head for.
 
     Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them. Nor where a
     robot has arrived: only the ends of the plus would stick out from under its disc.

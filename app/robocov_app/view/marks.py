@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.observation import Snapshot
+from robocov.voronoi import VoronoiPartition
 from robocov_app.view import sprites
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.layers import READABLE, SMALLEST, Layer, LegendEntry, drawn_radii
@@ -25,7 +29,8 @@ class Failed(Layer):
         failed = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
         working = canvas.camera.to_pixels(scene.snapshot.positions) if scene.snapshot else np.empty((0, 2))
         centers = np.concatenate([failed, working])
-        true = np.full(len(centers), float(scene.team.radius[0]) * canvas.camera.zoom)
+        own = [scene.failed_radius(number) for number in scene.failed]
+        true = np.array([*own, *(scene.team.radius if scene.snapshot else ())]) * canvas.camera.zoom
         fitted = fitted_radii(centers, true, SMALLEST * canvas.scale, 0.85 * READABLE * canvas.scale)
         radii = (np.round(2 * np.minimum(fitted[: len(failed)], 400.0)) / 2).tolist()
         around = np.concatenate([radii, drawn_radii(canvas, scene)])
@@ -76,7 +81,11 @@ def _fill(canvas: Canvas) -> Colour:
 
 
 class Selection(Layer):
-    """A ring around the robot that is asked about."""
+    """A ring around the robot that is asked about, and where it believes itself and the others to be.
+
+    Only where that is not where they are: messages are late, get lost, or tell what is not so. Its own cell
+    is then drawn as it takes it to be; those of others overlap it, or leave gaps.
+    """
 
     name = "selection"
     title = "Selection"
@@ -84,7 +93,37 @@ class Selection(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None or scene.selected is None:
             return
+        if scene.snapshot.seen.heard is not None:
+            self._draw_belief(canvas, scene.snapshot, scene.selected)
         radius = drawn_radii(canvas, scene)[scene.selected] + 4.0 * canvas.scale
         center = canvas.camera.to_pixels(scene.snapshot.positions[scene.selected]).tolist()
         width, colour = 2.2 * canvas.scale, canvas.theme.ink
         canvas.stamp(lambda shift: sprites.ring(radius, colour, width, shift), center)
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            colour = mix(canvas.theme.robots[0], canvas.theme.ink, 0.2)
+            canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), (x, y))
+
+        if scene.snapshot is None or scene.selected is None or scene.snapshot.seen.heard is None:
+            return []
+        return [LegendEntry(f"as robot {scene.number(scene.selected)} believes", glyph)]
+
+    @staticmethod
+    def _draw_belief(canvas: Canvas, snapshot: Snapshot, robot: int) -> None:
+        """Draw the cell and the places of others as a robot believes them to be."""
+        seen, cells, theme = snapshot.seen, snapshot.decision.cells, canvas.theme
+        if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
+            corners = canvas.camera.to_pixels(cells.polygons[robot])
+            canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
+        others = seen.neighbours.of(robot).tolist()
+        believed = canvas.camera.to_pixels(seen.neighbour_positions(robot)).tolist()
+        there = canvas.camera.to_pixels(snapshot.positions).tolist()
+        for other, place in zip(
+            [robot, *others],
+            [canvas.camera.to_pixels(seen.positions[robot]).tolist(), *believed],
+            strict=True,
+        ):
+            colour = mix(theme.robots[canvas.hues[other]], theme.ink, 0.2)
+            canvas.dashes(there[other], place, colour, dash=3.0)
+            canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), place)

@@ -13,6 +13,7 @@ from robocov.errors import ParameterError, unknown_name
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.coverage import ColourBar, Distances, GeodesicCells, bar_room
+from robocov_app.view.density import DensityShading
 from robocov_app.view.forces import ForceTerm, Goals, Links, ObstaclePoints, Ranges, Velocities
 from robocov_app.view.furniture import (
     LEGEND_ROW,
@@ -61,6 +62,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         GeodesicCells(),
         Cells(),
         Grid(),
+        DensityShading(),
         Obstacles(),
         Boundary(),
         SensedObstacles(),
@@ -168,7 +170,7 @@ class Painter:
         self._camera: Camera | None = None
         self._follows = True
         self._hues = robot_hues(0)
-        self._pages: dict[tuple[str, ...], tuple[object, pygame.Surface]] = {}
+        self._pages: dict[tuple[str, ...], tuple[object, pygame.Surface, Environment]] = {}
         self._own: pygame.Surface | None = None
         self._room: tuple[object, int, float] = (None, 0, 0.0)
 
@@ -302,14 +304,17 @@ class Painter:
     def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer]) -> pygame.Surface:
         """Return the page of neighbouring static layers, drawn anew only when something changed."""
         names = tuple(layer.name for layer in layers)
-        key = (canvas.camera, self.theme.name, self.scale, self.size, id(scene.environment))
+        # distances, in colours too, hide the density
+        coloured = scene.field is not None and "distances" in canvas.shown
+        key = (canvas.camera, self.theme.name, self.scale, self.size, id(scene.environment), coloured)
         kept = self._pages.get(names)
-        if kept is None or kept[0] != key:
+        # the map is kept as well: another one may be given its place in the memory
+        if kept is None or kept[0] != key or kept[2] is not scene.environment:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(self._clip())
             own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues, canvas.shown)
             for layer in layers:
                 layer.draw(own, scene)
-            self._pages = {names: (key, page)}
+            self._pages = {names: (key, page, scene.environment)}
             return page
         return kept[1]

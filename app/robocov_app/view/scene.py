@@ -14,6 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
+from robocov.weighted_cells import WeightedCells, outlines_of, weighted_partition
 
 if TYPE_CHECKING:
     from robocov_app.view.field import Field
@@ -61,6 +62,11 @@ class Scene:
         The obstacle points that were sensed so far.
     path : (w, 2) m or None
         Shortest path from a place to its nearest robot.
+    cell_owners : (c,) or None
+        Whose each of the `cells` is. Where robots are not equally fast, one may have several outlines, and
+        those of fast ones come first: a slow one's are holes in them. None: each robot has one.
+    failed_radii : dict of number to m
+        Of robots that failed; without, that of the first robot.
     """
 
     environment: Environment
@@ -82,6 +88,12 @@ class Scene:
     scans: Sequence[tuple[Array, Array]] = ()
     sensed: Sensed | None = None
     path: Array | None = None
+    cell_owners: IntArray | None = None
+    failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
+
+    def failed_radius(self, number: int) -> float:
+        """Return the radius of a robot that failed, m."""
+        return self.failed_radii.get(number, float(self.team.radius[0]))
 
     def number(self, robot: int) -> int:
         """Return what people call the robot of a row."""
@@ -109,16 +121,22 @@ class Scene:
     ) -> Scene:
         """Return the scene of `snapshot` with the Voronoi cells of all its robots.
 
-        The cells that the law used are taken where they are these: not where communication is limited, since
-        they overlap there, nor where a user's law says something else.
+        The cells that the law used are taken where they are these: not where communication is limited, or
+        messages are late or get lost, since they overlap there, nor where a user's law says something else.
         """
         cells = snapshot.decision.cells
         if (
-            not isinstance(cells, VoronoiPartition)
+            not isinstance(cells, (VoronoiPartition, WeightedCells))
             or not np.isinf(team.communication_range).all()
+            or snapshot.seen.heard is not None
             or not np.array_equal(cells.generators, snapshot.positions)
         ):
-            cells = partition(snapshot.positions, environment.region)
+            where, density = snapshot.positions, environment.density
+            if isinstance(cells, WeightedCells):
+                cells = weighted_partition(where, team.max_speed, environment.region, density=density)
+            else:
+                cells = partition(where, environment.region, density=density)
+        outlines, owners = outlines_of(cells)
         return cls(
             environment,
             team,
@@ -126,11 +144,12 @@ class Scene:
             starts,
             trail,
             trail_time,
-            cells.polygons,
+            outlines,
             cells.centroid,
             cells.adjacency,
             label,
             cost,
             field,
             field_limit,
+            cell_owners=owners,
         )

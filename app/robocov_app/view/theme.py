@@ -91,6 +91,10 @@ class Theme:
         From near to far, evenly spaced, ever darker or ever brighter; see `heat_table`.
     unreached : Colour
         Where no robot can come.
+    density : Colour
+        Of the shading where the density is highest, and
+    density_strength : float
+        how much of it there is then.
     tint, paper_tint : float
         How much of a robot's colour its cell takes on; less in plots in the paper's colours.
     """
@@ -116,6 +120,8 @@ class Theme:
     robots: tuple[Colour, ...]
     heat: tuple[Colour, ...]
     unreached: Colour
+    density: Colour
+    density_strength: float
     tint: float
     paper_tint: float
     text: float = 12.0
@@ -185,6 +191,8 @@ LIGHT = Theme(
     robots=tuple(rgb(code) for code in _MUTED),
     heat=tuple(rgb(code) for code in ("FBFCFE", "DCE6F2", "B4CBE4", "86A9D3", "5D84BF", "3F60A2", "2A3F78")),
     unreached=rgb("E3DED4"),
+    density=rgb("B4550A"),
+    density_strength=0.5,
     tint=0.25,
     paper_tint=0.13,
 )
@@ -224,6 +232,8 @@ DARK = Theme(
     ),
     heat=tuple(rgb(code) for code in ("141B26", "1B2F4B", "23486F", "31668F", "4B88A6", "78ADB8", "B8D3C8")),
     unreached=rgb("332E28"),
+    density=rgb("FFB45A"),
+    density_strength=0.45,
     tint=0.26,
     paper_tint=0.19,
 )

@@ -15,12 +15,20 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robocov.controllers.base import Controller
+from robocov.controllers.atlas import Atlas, AtlasShared
+from robocov.controllers.barrier import Barrier
+from robocov.controllers.base import Controller, Information, information_of, informed
+from robocov.controllers.dispersion import Dispersion
 from robocov.controllers.gains import gain_values, gains_of, with_gains
+from robocov.controllers.geodesic_lloyd import GeodesicLloyd
+from robocov.controllers.howard import Howard
 from robocov.controllers.individual import IndividualController, Individually, OwnView
 from robocov.controllers.lloyd import Lloyd
+from robocov.controllers.poduri import Poduri
+from robocov.controllers.range_limited import RangeLimited
 from robocov.controllers.rapf import Rapf
 from robocov.controllers.rpf import Rpf
+from robocov.controllers.tangentbug import TangentBug
 from robocov.errors import ParameterError, shown, unknown_name
 
 if TYPE_CHECKING:
@@ -29,25 +37,53 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTROLLERS",
     "FLAGSHIP",
+    "Atlas",
+    "AtlasShared",
+    "Barrier",
     "Controller",
+    "Dispersion",
+    "GeodesicLloyd",
+    "Howard",
     "IndividualController",
     "Individually",
+    "Information",
     "Lloyd",
     "OwnView",
+    "Poduri",
+    "RangeLimited",
     "Rapf",
     "Rpf",
+    "TangentBug",
     "controller_kind",
     "controller_kinds",
     "gain_values",
     "gains_of",
+    "information_of",
+    "informed",
     "make_controller",
+    "remembers",
 ]
 
-CONTROLLERS: dict[str, type[Any]] = {kind.name: kind for kind in (Rapf, Rpf, Lloyd)}
+CONTROLLERS: dict[str, type[Any]] = {
+    kind.name: kind
+    for kind in (
+        *(Rapf, Rpf, Lloyd),
+        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
+        *(Atlas, AtlasShared),
+    )
+}
 """The built-in controllers by name."""
 
 FLAGSHIP = "rapf"
 """The controller that the project recommends."""
+
+_FORGETFUL: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited, Individually)
+"""Controllers that remember nothing but what makes the next decision quicker."""
+
+
+def remembers(controller: object) -> bool:
+    """Return whether what a controller remembers may change what it decides."""
+    return type(controller) not in _FORGETFUL
 
 
 def controller_kinds() -> dict[str, type[Any]]:

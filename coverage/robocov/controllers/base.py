@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, cast, get_args, runtime_checkable
+
+from robocov.errors import ParameterError, shown
 
 if TYPE_CHECKING:
+    from robocov.environment import Environment
     from robocov.observation import Decision, Observations
     from robocov.region import Region
     from robocov.robots import Team
+
+Information: TypeAlias = Literal["own", "shared map", "whole map"]
+"""What a law goes by: what the robot itself senses and hears, maps that neighbours tell each other as
+well, or the whole map from the beginning."""
 
 
 @runtime_checkable
@@ -18,6 +25,13 @@ class Controller(Protocol):
     Whatever the robots remember goes through `Decision.memory`; a run can therefore be copied,
     rewound and branched. A class that states `name`, `label` and `summary` as class variables
     satisfies the protocol.
+
+    Optional are
+
+    - the class variable ``information``, one of `Information`, "own" where it is not stated,
+    - the attribute ``scanning``, a `robocov.scans.Scanning`, of laws that want ray scans, and
+    - the method ``informed(environment) -> Controller``, which only laws with the whole map have: it
+      returns the law that knows that map, with the same gains. `Simulation` asks for it.
     """
 
     @property
@@ -42,3 +56,42 @@ class Controller(Protocol):
     def decide(self, seen: Observations, memory: Any) -> Decision:
         """Return the forces for all robots, from what each of them knows."""
         ...
+
+
+def information_of(controller: Any) -> Information:
+    """Return what a controller, or a class of controllers, goes by.
+
+    Raises
+    ------
+    ParameterError
+        When it states something that is no `Information`.
+    """
+    # a law for one robot stands in an adapter
+    stated = getattr(getattr(controller, "law", controller), "information", "own")
+    if stated not in get_args(Information):
+        name = getattr(controller, "name", "?")
+        words = ", ".join(get_args(Information))
+        raise ParameterError(
+            f"controller {name!r}: information: {shown(stated)}, but one of {words} was wanted"
+        )
+    return cast(Information, stated)
+
+
+def informed(controller: Controller, environment: Environment) -> Controller:
+    """Return the controller as it decides on one map: one that goes by the whole map gets to know it.
+
+    Raises
+    ------
+    ParameterError
+        When a law is told the map that does not say so.
+    """
+    tell = getattr(controller, "informed", None)
+    information = information_of(controller)
+    if tell is None:
+        return controller
+    if information != "whole map":
+        raise ParameterError(
+            f"controller {controller.name!r}: it has a method informed(environment), but its information "
+            f"is {information!r}; 'whole map' was wanted"
+        )
+    return cast(Controller, tell(environment))

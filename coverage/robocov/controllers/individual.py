@@ -30,7 +30,7 @@ class OwnView:
     position : (2,) m
     velocity : (2,) m/s
     neighbours : (k, 2) m
-        Positions of the robots that it hears.
+        Positions of the robots that it hears, as the last message of each has it.
     obstacle_point : (2,) m or None
         The closest obstacle or boundary point in sensing range.
     region : Region
@@ -92,7 +92,9 @@ class Individually:
 
     def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
         """Ask the law for each robot's force."""
-        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory)
+        cells = partition(
+            seen.positions, seen.region, seen.neighbours, warm=memory, heard=seen.heard, density=seen.density
+        )
         forces = np.empty_like(seen.positions)
         for i in range(len(forces)):
             point = seen.obstacle_points[i]
@@ -100,7 +102,7 @@ class Individually:
                 number=i,
                 position=seen.positions[i].copy(),
                 velocity=seen.velocities[i].copy(),
-                neighbours=seen.positions[seen.neighbours.of(i)],
+                neighbours=seen.neighbour_positions(i),
                 obstacle_point=None if np.isnan(point[0]) else point.copy(),
                 region=seen.region,
                 time=seen.time,

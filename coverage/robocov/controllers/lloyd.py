@@ -7,12 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.cells import cells_seen, choice_of_cells
+from robocov.controllers.gains import choice, gain, validate_gains
 from robocov.observation import Decision, Observations
 from robocov.region import Region
 from robocov.robots import Team
+from robocov.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.triangulation import Triangulation
-from robocov.voronoi import partition
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +38,9 @@ class Lloyd:
 
     Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the
     last metres so that its deceleration stays within the limits. The drive tracks that velocity
-    and makes up for viscosity. Obstacles are not known to the law: the robot slides along them.
+    and makes up for viscosity. Another `target` than the centroid is the optimum of the cell for
+    another locational cost (4). Obstacles are not known to the law: the robot slides along them.
+    With `cells` by time, where robots are not equally fast, the goal may lie outside of the cell.
     """
 
     name: ClassVar[str] = "lloyd"
@@ -48,6 +51,9 @@ class Lloyd:
     response_time: float = gain(
         0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
     )
+    cells: str = choice_of_cells()
+    target: str = choice("centroid", TARGETS, MEANING)
+    height: float = gain(1.0, "m", HEIGHT, low=1e-6)
 
     def __post_init__(self) -> None:
         validate_gains(self)
@@ -59,8 +65,9 @@ class Lloyd:
     def decide(self, seen: Observations, memory: LloydMemory) -> Decision:
         """Return the forces that drive each robot to its centroid."""
         team = memory.team
-        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory.triangulation)
-        offset = cells.centroid - seen.positions
+        cells = cells_seen(seen, self.cells, memory.triangulation)
+        goals = targets(cells, seen.density, self.target, self.height)
+        offset = goals - seen.positions
         distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
         speed_per_metre = np.minimum(self.k_prop, team.max_speed / np.maximum(distance, 1e-300))
         wanted = offset * speed_per_metre[:, None]
@@ -68,7 +75,7 @@ class Lloyd:
         forces = drive + seen.velocities * team.viscosity[:, None]
         return Decision(
             forces=forces,
-            goals=cells.centroid,
+            goals=goals,
             terms={"attraction": forces},
             cells=cells,
             memory=LloydMemory(team, cells.triangulation),

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.cells import cells_seen, choice_of_cells
+from robocov.controllers.gains import choice, gain, validate_gains
 from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
 from robocov.observation import Decision, Observations
 from robocov.potential import attractive_force
 from robocov.region import Region
 from robocov.robots import Team
+from robocov.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.triangulation import Triangulation
-from robocov.voronoi import partition
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,9 @@ class Rapf:
 
     As RPF, but every robot is also drawn to the centroid of its Voronoi cell of the known convex
     region. The cells ignore the unknown obstacles; the repulsion keeps robots off them.
-    The goal may lie in or behind an obstacle: then the robot rests where the forces balance.
+    Another `target` than the centroid is the optimum of the cell for another locational cost (4).
+    The goal may lie in or behind an obstacle: then the robot rests where the forces balance. With `cells` by
+    time, where robots are not equally fast, it may lie outside of the robot's own cell as well.
 
     With `attraction_limit` at viscosity x maximum speed (2 N by default) the attraction never
     exceeds what drives a robot at full speed, and no wall is touched; None is the paper's (27).
@@ -39,6 +42,9 @@ class Rapf:
     attraction_limit: float | None = gain(
         2.0, "N", "cap of the attraction; null is the paper's formula", low=1e-6, optional=True
     )
+    cells: str = choice_of_cells()
+    target: str = choice("centroid", TARGETS, MEANING)
+    height: float = gain(1.0, "m", HEIGHT, low=1e-6)
 
     def __post_init__(self) -> None:
         validate_gains(self)
@@ -48,13 +54,14 @@ class Rapf:
 
     def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
         """Return the forces (25) + (27)."""
-        cells = partition(seen.positions, seen.region, seen.neighbours, warm=memory)
-        attraction = attractive_force(cells.centroid - seen.positions, self.k_att, self.attraction_limit)
+        cells = cells_seen(seen, self.cells, memory)
+        goals = targets(cells, seen.density, self.target, self.height)
+        attraction = attractive_force(goals - seen.positions, self.k_att, self.attraction_limit)
         robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
         obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
         return Decision(
             forces=attraction + robots + obstacle,
-            goals=cells.centroid,
+            goals=goals,
             terms={"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle},
             cells=cells,
             memory=cells.triangulation,

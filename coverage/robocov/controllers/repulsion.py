@@ -15,10 +15,9 @@ _TOGETHER = 1e-12
 def repulsion_from_robots(seen: Observations, k_rep: float, rho_0: float) -> Array:
     """Return the sum of (24) over the neighbours within `rho_0`, (n, 2) N."""
     n = len(seen.positions)
-    robot, neighbour, distance = seen.neighbours.closer_than(seen.positions, rho_0)
+    robot, neighbour, offset, distance = seen.neighbours_within(rho_0)
     if len(robot) == 0:
         return np.zeros((n, 2))
-    offset = seen.positions[robot] - seen.positions[neighbour]
     if distance.min() < _TOGETHER:
         together = distance < _TOGETHER
         offset[together] = _TOGETHER * separation(robot[together], neighbour[together])

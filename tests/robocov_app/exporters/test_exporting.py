@@ -13,6 +13,7 @@ from shapely import Polygon
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
+from robocov.mapfile import load_map
 from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
 from robocov_app.importers import ReadOptions, Shaping, import_map
 
@@ -110,3 +111,10 @@ def test_out_and_in_again_changes_less_than_a_row_of_cells(
     export_map(back, again, options=options)
     twice, _, _ = import_map(again, options=read, shaping=Shaping(keep="all", specks=0.0))
     assert abs(twice.free_area - back.free_area) < row
+
+
+def test_paths_of_obstacles_are_told_to_be_dropped(tmp_path: Path) -> None:
+    report = export_map(load_map("forklifts"), tmp_path / "forklifts.geojson")
+    assert "the 2 paths of obstacles, which stand where they are at time zero" in report.dropped
+    standing = export_map(load_map("rooms"), tmp_path / "rooms.geojson")
+    assert not any("path" in line for line in standing.dropped)

@@ -28,14 +28,14 @@ function prepared(canvas) {
   return context;
 }
 
-/** The part of a convex polygon [x, y, ...] that is nearer to robot i than to any other: equation (1). */
-function cellOf(region, places, i) {
+/** The part of a convex polygon [x, y, ...] that is nearer to robot i than to any other that counts: equation (1). */
+function cellOf(region, places, i, counts = () => true) {
   const [x, y] = [places[2 * i], places[2 * i + 1]];
   const others = [];
   for (let j = 0; j < places.length / 2; j += 1) {
     const [dx, dy] = [places[2 * j] - x, places[2 * j + 1] - y];
     const square = dx * dx + dy * dy;
-    if (j !== i && square > 1e-18) others.push([square, dx, dy]);
+    if (j !== i && square > 1e-18 && counts(j)) others.push([square, dx, dy]);
   }
   others.sort((a, b) => a[0] - b[0]);
   let cell = Array.from(region);
@@ -110,6 +110,10 @@ function drawArena(canvas, run, time, look, show) {
   context.fillStyle = look.background;
   context.fill(region);
   if (show.cells && run.robots <= MOST_CELLS) drawCells(context, run, places, frame, look);
+  const { density, left, high, width, height } = run.plan;
+  if (density?.complete) {
+    context.drawImage(density, frame.x(left), frame.y(high), width * frame.zoom, height * frame.zoom);
+  }
   context.lineWidth = 1;
   context.fillStyle = look.obstacle;
   context.strokeStyle = look["obstacle-edge"];
@@ -128,10 +132,41 @@ function drawArena(canvas, run, time, look, show) {
   drawRobots(context, run, places, radii, frame, look);
 }
 
+/** Cells by travel time: those of fast robots first, for those of slow ones are holes in them. */
+function drawTimedCells(context, run, places, frame, hues, look) {
+  const { speeds } = run;
+  for (const i of [...speeds.keys()].sort((a, b) => speeds[b] - speeds[a])) {
+    const equal = traced(frame, [cellOf(run.plan.region, places, i, (j) => speeds[j] === speeds[i])]);
+    const circles = [];
+    for (let j = 0; j < run.robots; j += 1) {
+      if (speeds[j] <= speeds[i]) continue;
+      // of Apollonius, around the slower one
+      const part = (speeds[i] / speeds[j]) ** 2 / (1 - (speeds[i] / speeds[j]) ** 2);
+      const [dx, dy] = [places[2 * j] - places[2 * i], places[2 * j + 1] - places[2 * i + 1]];
+      const [x, y] = [places[2 * i] - part * dx, places[2 * i + 1] - part * dy];
+      const circle = new Path2D();
+      circle.arc(frame.x(x), frame.y(y), part * (speeds[j] / speeds[i]) * Math.hypot(dx, dy) * frame.zoom, 0, 7);
+      circles.push(circle);
+    }
+    context.save();
+    for (const path of [equal, ...circles]) context.clip(path);
+    context.fillStyle = look[`cell-${i % hues}`];
+    context.fill(equal);
+    context.stroke(equal);
+    context.lineWidth = 2; // of which only the inner half is seen
+    for (const path of circles) context.stroke(path);
+    context.restore();
+  }
+}
+
 function drawCells(context, run, places, frame, look) {
   const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLOURS;
   context.lineWidth = 1;
   context.strokeStyle = look["cell-edge"];
+  if (run.speeds) {
+    drawTimedCells(context, run, places, frame, hues, look);
+    return;
+  }
   for (let i = 0; i < run.robots; i += 1) {
     const path = traced(frame, [cellOf(run.plan.region, places, i)]);
     context.fillStyle = look[`cell-${i % hues}`];

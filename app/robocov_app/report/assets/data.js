@@ -44,7 +44,8 @@ class Series {
 }
 
 class Plan {
-  constructor(data) {
+  /** `again` is called when there is more to be drawn than at first. */
+  constructor(data, again) {
     const metres = (ring) => Float64Array.from(ring, (value) => value * data.unit);
     this.name = data.name;
     [this.left, this.low, this.right, this.high] = metres(data.bounds);
@@ -52,6 +53,11 @@ class Plan {
     this.height = this.high - this.low;
     this.region = metres(data.region);
     this.blocked = data.blocked.map((rings) => rings.map(metres));
+    if (data.density) {
+      this.density = new Image();
+      this.density.onload = again;
+      this.density.src = data.density;
+    }
   }
 }
 
@@ -62,6 +68,7 @@ class Run {
     this.goals = data.goals && new Series(data.goals, 2 * this.robots, data.step, data.count, data.end);
     this.range = data.cost;
     this.cost = data.cost && new Series(data.cost.values, 1, data.cost.step, data.cost.count, data.end);
+    this.speeds = data.speeds ?? null; // where cells are by time
     this.radii = Array.from({ length: this.robots }, (_, k) => (Array.isArray(data.radius) ? data.radius[k] : data.radius));
   }
 

@@ -62,7 +62,7 @@ function columnsFor(count, aspect, width, height) {
 class Replay {
   constructor(root, data) {
     this.root = root;
-    this.plans = data.maps.map((map) => new Plan(map));
+    this.plans = data.maps.map((map) => new Plan(map, () => this.draw()));
     this.runs = data.runs.map((run) => new Run(run, this.plans[run.map]));
     this.shown = data.panes.slice(0, MOST_PANES);
     this.playing = false;
