@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from robocov.errors import MapError, RobocovError
+from robocov.mapmodels import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.grips import Grip, grips, handled
 from robocov_app.editor.selection import Selection
@@ -344,8 +345,7 @@ class Desk:
         MapError
             When it is out of range.
         """
-        if not 0.001 <= spacing <= 100.0:
-            raise MapError(f"grid: {spacing:g} m, but 0.001 to 100 m was wanted")
+        _require_length("grid", spacing, 100.0)
         self.grid = spacing
         self.version += 1
         self.say(f"the grid is {spacing:g} m")
@@ -365,8 +365,7 @@ class Desk:
         MapError
             When it is out of range.
         """
-        if not 0.001 <= radius <= 10.0:
-            raise MapError(f"radius: {radius:g} m, but 0.001 to 10 m was wanted")
+        _require_length("radius", radius, 10.0)
         self.radius = radius
         self.version += 1
         self.ask_readings()
@@ -392,10 +391,14 @@ class Desk:
         MapError
             When it is out of range.
         """
-        if not 0.001 <= width <= 100.0:
-            raise MapError(f"wall width: {width:g} m, but 0.001 to 100 m was wanted")
+        _require_length("wall width", width, 100.0)
         self.wall_width = width
         self.version += 1
+
+
+def _require_length(what: str, length: float, most: float) -> None:
+    if not SMALLEST <= length <= most:
+        raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
 
 
 def plain(message: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ SAME = 1e-6
 """Metres below which two points are one."""
 
 
-class Line(Tool):
+class Line(Tool, ABC):
     """Draws point by point; the tools below say of what."""
 
     least = 2
@@ -53,10 +54,6 @@ class Line(Tool):
         """All points but the last, which angles count from."""
         return tuple(self.points[:-1])
 
-    def made(self, desk: Desk, points: Sequence[Point]) -> Change:
-        """Return what the points make."""
-        raise NotImplementedError
-
     def press(self, desk: Desk, aim: Aim) -> None:
         """Add a point, or end at the first or the last one."""
         point = held(aim, self.origin)
@@ -77,15 +74,9 @@ class Line(Tool):
         """Show the next edge."""
         self.at = held(aim, self.origin)
 
+    @abstractmethod
     def finish(self, desk: Desk) -> bool:
-        """Put it down."""
-        if not self.points:
-            return False
-        points, self.points = self.points, []
-        if len(points) < self.least:
-            raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
-        desk.change(self.made(desk, points))
-        return True
+        """End with the points that there are; return whether there are any."""
 
     def back(self, desk: Desk) -> bool:
         """Take the last point back."""
@@ -114,7 +105,25 @@ class Line(Tool):
         return Preview(points, self.closes and len(points) > 2, True, words=words)
 
 
-class Polygon(Line):
+class Shape(Line, ABC):
+    """Draws something that stays in the map."""
+
+    @abstractmethod
+    def made(self, desk: Desk, points: Sequence[Point]) -> Change:
+        """Return what the points make."""
+
+    def finish(self, desk: Desk) -> bool:
+        """Put it down."""
+        if not self.points:
+            return False
+        points, self.points = self.points, []
+        if len(points) < self.least:
+            raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
+        desk.change(self.made(desk, points))
+        return True
+
+
+class Polygon(Shape):
     """Draws an obstacle with corners."""
 
     name = "polygon"
@@ -128,7 +137,7 @@ class Polygon(Line):
         return edits.polygon_drawn(desk.sketch, points)
 
 
-class Wall(Line):
+class Wall(Shape):
     """Draws a poly-line that is some width thick."""
 
     name = "wall"
@@ -199,7 +208,7 @@ class Measure(Line):
         return Preview(points, False, True, words=words)
 
 
-class Places(Line):
+class Places(Shape):
     """Draws a start of given places, one for each robot."""
 
     name = "places"
@@ -222,7 +231,7 @@ class Places(Line):
         )
 
 
-class Boundary(Line):
+class Boundary(Shape):
     """Draws the outer boundary: a rectangle by dragging, anything else corner by corner."""
 
     name = "boundary"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,7 +34,7 @@ class Row(NamedTuple):
     about: Vertex | Problem | int
 
 
-class PanelList:
+class PanelList(ABC):
     """A list that scrolls.
 
     Parameters
@@ -49,21 +50,21 @@ class PanelList:
         self._rows: list[Row] = []
         self._key: object = None
 
+    @abstractmethod
     def rows(self, wide: float) -> list[Row]:
         """Return the lines for a width in pixels at scale 1."""
-        raise NotImplementedError
 
+    @abstractmethod
     def key(self) -> object:
         """Return all that the lines depend on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def chosen(self, row: Row) -> bool:
         """Return whether a line is about what is chosen."""
-        raise NotImplementedError
 
+    @abstractmethod
     def take(self, row: Row) -> None:
         """Take a click on a line."""
-        raise NotImplementedError
 
     def empty_words(self) -> str:
         """Return what to say where there are no lines."""
@@ -119,11 +120,11 @@ class PanelList:
             pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.3), knob, border_radius=round(2 * scale))
         screen.set_clip(None)
 
+    @abstractmethod
     def draw_row(
         self, screen: pygame.Surface, row: Row, rect: pygame.Rect, theme: Theme, scale: float
     ) -> None:
         """Draw a line."""
-        raise NotImplementedError
 
 
 class VertexList(PanelList):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.tool import Aim
 
 
-class Stretch(Tool):
+class Stretch(Tool, ABC):
     """Draws from one point to another: by dragging, or by two clicks."""
 
     def __init__(self) -> None:
@@ -38,13 +39,13 @@ class Stretch(Tool):
         """The first point."""
         return () if self.begun is None else (self.begun,)
 
+    @abstractmethod
     def made(self, desk: Desk, a: Point, b: Point) -> Change:
         """Return what the two points make."""
-        raise NotImplementedError
 
+    @abstractmethod
     def end_for(self, text: str) -> Point:
         """Return where the second point is for what was typed."""
-        raise NotImplementedError
 
     def press(self, desk: Desk, aim: Aim) -> None:
         """Begin, or end with the second click."""
