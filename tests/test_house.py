@@ -135,6 +135,7 @@ TESTED_THROUGH = {
     "learning_driving": "test_learning_driving",
     "coverage_v0": "test_learning_parallel",
     "own_process": "test_cost_worker",
+    "talk": "test_cost_worker",
     **dict.fromkeys("replay saved".split(), "test_cli_replay"),
     "demo": "test_demo_opening",
     "bench_window": "test_bench",

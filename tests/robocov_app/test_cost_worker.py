@@ -14,7 +14,7 @@ from drawn_run import ROOMS
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle
-from robocov_app.live import cost_worker
+from robocov_app.live import talk
 from robocov_app.live.cost_worker import CostWorker
 from robocov_app.live.messages import Answer, Building, Failed, Ready, receive, send
 from robocov_app.view.field import Field, FieldLattice
@@ -120,13 +120,13 @@ def test_a_map_that_is_overtaken_is_not_finished():
 def test_no_call_waits(monkeypatch):
     """A frame loop goes on while maps are built, answered and replaced, and while nobody reads."""
     gate = threading.Event()
-    real = cost_worker.send
+    real = talk.send
 
     def slow(stream, message):
         gate.wait(PATIENCE)
         real(stream, message)
 
-    monkeypatch.setattr(cost_worker, "send", slow)
+    monkeypatch.setattr(talk, "send", slow)
     worker = CostWorker()
     began = time.monotonic()
     for k in range(300):

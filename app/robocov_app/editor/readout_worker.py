@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 from types import TracebackType
-from typing import BinaryIO
 
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.document import Item, Sketch
 from robocov_app.editor.readout import Readout
 from robocov_app.editor.readout_messages import Answer, Question
-from robocov_app.live.messages import receive, send
-from robocov_app.live.own_process import started
+from robocov_app.live.talk import Talk
 
 
 class ReadoutWorker:
@@ -88,64 +84,36 @@ class ReadoutWorker:
         self.close()
 
 
-class _Talk:
-    """One process, with a thread that writes to it and one that reads."""
+class _Talk(Talk):
+    """A talk about the newest sketch; of each only what is new is told."""
 
     def __init__(self) -> None:
-        self._process = started("robocov_app.editor.readout_process")
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._changed = threading.Condition()
         self._wanted: tuple[int, Sketch, float] | None = None
-        self._closed = False
         self._answer: Answer | None = None
-        self.ended = False
-        streams = (self._write, self._process.stdin), (self._read, self._process.stdout)
-        self._threads = [
-            threading.Thread(target=call, args=(stream,), daemon=True) for call, stream in streams
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._known: dict[int, Item] = {}
+        super().__init__("robocov_app.editor.readout_process")
 
     def ask(self, number: int, sketch: Sketch, radius: float) -> None:
-        with self._changed:
+        with self.changed:
             self._wanted = number, sketch, radius
-            self._changed.notify()
+            self.changed.notify()
 
     def heard(self) -> Answer | None:
         """Return the newest answer, once."""
-        with self._changed:
+        with self.changed:
             answer, self._answer = self._answer, None
             return answer
 
-    def close(self) -> None:
-        """Let the process end, and wait for that: it takes a moment, whatever it is doing."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        self._process.kill()
-        self._process.wait()
-        for thread in self._threads:
-            thread.join()
+    def taken(self) -> tuple[int, Sketch, float] | None:
+        wanted, self._wanted = self._wanted, None
+        return wanted
 
-    def _write(self, stream: BinaryIO) -> None:
-        known: dict[int, Item] = {}
-        # when the process has ended, reading says so
-        with contextlib.suppress(OSError), stream:
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._closed or self._wanted)
-                    if self._closed or self._wanted is None:
-                        return
-                    (number, sketch, radius), self._wanted = self._wanted, None
-                send(stream, Question.about(number, sketch, radius, known))
-                known = {item.key: item for item in sketch.obstacles}
+    def messages(self, taken: tuple[int, Sketch, float]) -> list[Question]:
+        number, sketch, radius = taken
+        question = Question.about(number, sketch, radius, self._known)
+        self._known = {item.key: item for item in sketch.obstacles}
+        return [question]
 
-    def _read(self, stream: BinaryIO) -> None:
-        try:
-            with stream:
-                while (answer := receive(stream)) is not None:
-                    with self._changed:
-                        self._answer = answer
-        finally:
-            self.ended = True
+    def hear(self, message: Answer) -> None:
+        with self.changed:
+            self._answer = message

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
-import sys
-import threading
 from dataclasses import replace
-from typing import IO, TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -21,10 +18,8 @@ from robocov_app.live.messages import (
     Ready,
     Values,
     answer_of,
-    receive,
-    send,
 )
-from robocov_app.live.own_process import started
+from robocov_app.live.talk import Talk
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -37,9 +32,6 @@ _PER_LINK = 5e-8
 _PER_SITE = 2e-7
 _ALWAYS = 0.01
 """Seconds for a pair of a site and a corner, a pair of corners, a site, and in any case; see `estimate`."""
-
-_PIPE = 1 << 20
-"""Bytes; more is not allowed to everybody."""
 
 _LEARNING = 0.5
 """How much of the last surprise the next estimate takes on."""
@@ -157,36 +149,24 @@ class CostWorker:
         return float(_ALWAYS + _PER_SITE * sites + _PER_VIEW * sites * corners + _PER_LINK * corners**2)
 
 
-class _Talk:
-    """One process, with a thread that writes to it and one that reads."""
+class _Talk(Talk):
+    """A talk about the cost of the newest map, and about the newest question."""
 
     def __init__(self) -> None:
-        self._process = started("robocov_app.live.cost_process")
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        _widen(self._process.stdout)
-        self._wanted = threading.Condition()
         self._build: Build | None = None
         self._question: Question | None = None
-        self._closed = False
         self._heard: queue.SimpleQueue[Building | Ready | Values | Failed] = queue.SimpleQueue()
-        self.ended = False
-        streams = (self._write, self._process.stdin), (self._read, self._process.stdout)
-        self._threads = [
-            threading.Thread(target=call, args=(stream,), daemon=True) for call, stream in streams
-        ]
-        for thread in self._threads:
-            thread.start()
+        super().__init__("robocov_app.live.cost_process")
 
     def build(self, build: Build) -> None:
-        with self._wanted:
+        with self.changed:
             self._build = build
-            self._wanted.notify()
+            self.changed.notify()
 
     def ask(self, question: Question) -> None:
-        with self._wanted:
+        with self.changed:
             self._question = question
-            self._wanted.notify()
+            self.changed.notify()
 
     def heard(self) -> list[Building | Ready | Values | Failed]:
         """Return what was said."""
@@ -195,41 +175,13 @@ class _Talk:
             messages.append(self._heard.get())
         return messages
 
-    def close(self) -> None:
-        """Let the process end, and wait for that: it takes a moment, whatever it is doing."""
-        with self._wanted:
-            self._closed = True
-            self._wanted.notify()
-        self._process.kill()
-        self._process.wait()
-        for thread in self._threads:
-            thread.join()
+    def taken(self) -> list[Build | Question] | None:
+        wanted = [each for each in (self._build, self._question) if each is not None]
+        self._build = self._question = None
+        return wanted or None
 
-    def _write(self, stream: BinaryIO) -> None:
-        # when the process has ended, reading says so
-        with contextlib.suppress(OSError), stream:
-            while True:
-                with self._wanted:
-                    self._wanted.wait_for(lambda: self._closed or self._build or self._question)
-                    if self._closed:
-                        return
-                    messages = [self._build, self._question]
-                    self._build = self._question = None
-                for message in messages:
-                    if message is not None:
-                        send(stream, message)
+    def messages(self, taken: list[Build | Question]) -> list[Build | Question]:
+        return taken
 
-    def _read(self, stream: BinaryIO) -> None:
-        with stream:
-            while (message := receive(stream)) is not None:
-                self._heard.put(message)
-        self.ended = True
-
-
-def _widen(pipe: IO[bytes]) -> None:
-    """Let a pipe hold a whole answer where the system can: its reader then wakes less often."""
-    if sys.platform == "linux":
-        import fcntl
-
-        with contextlib.suppress(OSError):
-            fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _PIPE)
+    def hear(self, message: Building | Ready | Values | Failed) -> None:
+        self._heard.put(message)
