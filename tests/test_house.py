@@ -63,6 +63,7 @@ def test_files_do_one_thing() -> None:
 
 TESTED_THROUGH = {
     "arrays": "everywhere",
+    "mouse": "test_demo_window",
     "atomic": "test_record",
     "corner_views": "test_cost",
     "robot_views": "test_cost",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import pygame
 
 from robocov_app.demo.brush import Brush
 from robocov_app.demo.layout import inside
+from robocov_app.demo.mouse import DOUBLE, Mouse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,13 +17,8 @@ if TYPE_CHECKING:
     from robocov_app.demo.arena import Arena
     from robocov_app.demo.chart import Chart
     from robocov_app.demo.desk import Desk
+    from robocov_app.demo.layout import Box
     from robocov_app.demo.panel import Panel
-
-WHEEL = 1.15
-"""How far one notch of the wheel magnifies."""
-
-DOUBLE = 0.35
-"""Seconds between the two clicks of a double click, at most."""
 
 _TAKES_ROBOTS = ("hand", "eraser", "failure")
 """Tools that take hold of a robot."""
@@ -32,7 +27,7 @@ _SLIP = 5.0
 """Pixels that a click may move."""
 
 
-class Pointer:
+class Pointer(Mouse):
     """Turns events of the mouse into what panel, arena, chart and tools do.
 
     Parameters
@@ -45,47 +40,24 @@ class Pointer:
     def __init__(
         self, desk: Desk, arena: Arena, chart: Chart, panel: Panel, interrupt: Callable[[], object]
     ) -> None:
-        self._desk, self._arena, self._chart, self._panel = desk, arena, chart, panel
+        super().__init__(panel)
+        self._desk, self._arena, self._chart = desk, arena, chart
         self._interrupt = interrupt
-        self.at = (0, 0)
-        self._drag = ""
-        self._shape = -1
-        self._button = 0
         self._held = 0
-        self._pressed_at = (0, 0)
-        self._last_click = -1.0, (0, 0)
 
-    @property
-    def dragging(self) -> bool:
-        """Whether a button is held down on something."""
-        return bool(self._drag)
+    def _panel_box(self) -> Box:
+        return self._arena.layout.panel
 
-    def take(self, event: pygame.event.Event, now: float) -> None:
-        """Take an event of the mouse at a time in seconds."""
-        layout, moved = self._arena.layout, event.type == pygame.MOUSEMOTION
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
-        # an open menu may hang over the arena; a slider may be dragged beyond the panel
-        over_panel = inside(layout.panel, self.at) or self._panel.unfolded
-        # of moves the panel takes note by itself, once a frame
-        if not self._drag and (over_panel or event.type == pygame.MOUSEBUTTONUP) and not moved:
-            self._panel.take(event)
-        if moved:
-            self._moved(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self._released(event)
-        elif over_panel and not self._drag:
-            self._desk.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.stop_typing()
-            self._pressed(event, now)
-        elif event.type == pygame.MOUSEWHEEL and self._arena.pane_at(self.at) is not None:
-            amount = getattr(event, "precise_y", event.y) or event.y
-            factor = WHEEL ** float(np.clip(amount, -5, 5))
-            if isinstance(self._desk.tool, Brush):
-                self._desk.widen(factor)
-            else:
-                self._arena.zoom(factor, self.at)
+    def _over_panel(self) -> None:
+        self._desk.cursor = None
+
+    def _turned(self, factor: float) -> None:
+        if self._arena.pane_at(self.at) is None:
+            return
+        if isinstance(self._desk.tool, Brush):
+            self._desk.widen(factor)
+        else:
+            self._arena.zoom(factor, self.at)
 
     def show(self) -> None:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
@@ -105,10 +77,7 @@ class Pointer:
             shape = pygame.SYSTEM_CURSOR_CROSSHAIR
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
             shape = pygame.SYSTEM_CURSOR_SIZEWE
-        if shape != self._shape:
-            self._shape = shape
-            with suppress(pygame.error):  # not every display has cursors
-                pygame.mouse.set_cursor(shape)
+        self._show_cursor(shape)
 
     def leave(self) -> None:
         """The cursor is not in the window any more."""

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
 from robocov_app.demo.layout import inside
-from robocov_app.demo.pointer import DOUBLE, WHEEL
+from robocov_app.demo.mouse import DOUBLE, Mouse
 from robocov_app.editor.tool import Aim
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from robocov_app.demo.layout import Box
     from robocov_app.editor.arena import Arena
     from robocov_app.editor.desk import Desk
     from robocov_app.editor.panel import Panel
@@ -34,7 +34,7 @@ _SHAPES = {
 }
 
 
-class Pointer:
+class Pointer(Mouse):
     """Turns events of the mouse into what panel, sheet and tools do.
 
     Parameters
@@ -47,21 +47,11 @@ class Pointer:
     def __init__(
         self, desk: Desk, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
     ) -> None:
-        self._desk, self._arena, self._panel, self._menu = desk, arena, panel, menu
-        self.at = (0, 0)
+        super().__init__(panel)
+        self._desk, self._arena, self._menu = desk, arena, menu
         self.held = False
         """Whether the sheet is panned by the left button, for as long as a key is held."""
-        self._drag = ""
-        self._button = 0
-        self._shape = -1
-        self._pressed_at = (0, 0)
         self._moved_off = False
-        self._last_click = -1.0, (0, 0)
-
-    @property
-    def dragging(self) -> bool:
-        """Whether a button is held down on something."""
-        return bool(self._drag)
 
     def aim(self, pixel: tuple[int, int]) -> Aim:
         """Return where a pixel means, with what is held down on the keyboard."""
@@ -77,27 +67,15 @@ class Pointer:
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
         return Aim(point, raw, reach, shift, alt, ctrl)
 
-    def take(self, event: pygame.event.Event, now: float) -> None:
-        """Take an event of the mouse at a time in seconds."""
-        layout, moved = self._arena.layout, event.type == pygame.MOUSEMOTION
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
-        # an open menu may hang over the sheet; a slider may be dragged beyond the panel
-        over_panel = inside(layout.panel, self.at) or self._panel.unfolded
-        if not self._drag and (over_panel or event.type == pygame.MOUSEBUTTONUP) and not moved:
-            self._panel.take(event)
-        if moved:
-            self._moved(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self._released(event)
-        elif over_panel and not self._drag:
-            self._desk.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.stop_typing()
-            self._pressed(event, now)
-        elif event.type == pygame.MOUSEWHEEL and self._arena.over(self.at):
-            amount = getattr(event, "precise_y", event.y) or event.y
-            self._arena.zoom(WHEEL ** float(np.clip(amount, -5, 5)), self.at)
+    def _panel_box(self) -> Box:
+        return self._arena.layout.panel
+
+    def _over_panel(self) -> None:
+        self._desk.cursor = None
+
+    def _turned(self, factor: float) -> None:
+        if self._arena.over(self.at):
+            self._arena.zoom(factor, self.at)
 
     def leave(self) -> None:
         """The mouse is not in the window any more."""
@@ -176,11 +154,7 @@ class Pointer:
         if arena.over(self.at):
             panned = self._drag == "pan" or self.held
             shape = "move" if panned else "hand" if arena.hovered else desk.tool.shape_of_cursor(desk)
-        wanted = _SHAPES[shape]
-        if wanted != self._shape:
-            self._shape = wanted
-            with suppress(pygame.error):  # not every display has cursors
-                pygame.mouse.set_cursor(wanted)
+        self._show_cursor(_SHAPES[shape])
 
 
 def _far(a: tuple[int, int], b: tuple[int, int]) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -127,20 +129,23 @@ def test_lengths_stand_beside_the_cursor_and_what_is_typed_below_it(tmp_path: Pa
         assert any(guide.kind == "angle" for guide in hands.desk.tool.guides)
 
 
+def await_that(hands: Hands, seen: Callable[[], bool]) -> None:
+    """Let the window run until a thread beside it has done something."""
+    end = time.monotonic() + 30.0
+    while not seen():
+        hands.window.frame(0.02)
+        time.sleep(0.001)
+        assert time.monotonic() < end, "nothing happens"
+
+
 def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> None:
     with opened_editor(tmp_path, of_map("rooms")) as hands:
         hands.key("a")
-        for _ in range(100):
-            hands.window.frame(0.02)
-            if hands.window.arena.team is not None:
-                break
+        await_that(hands, lambda: hands.window.arena.team is not None)
         team = hands.window.arena.team
-        assert team is not None and len(team.places) == 6
+        assert len(team.places) == 6
         hands.key("shift+=")
-        for _ in range(200):
-            hands.window.frame(0.02)
-            if hands.window.arena.team.robots == 7:
-                break
+        await_that(hands, lambda: hands.window.arena.team.robots == 7)
         assert len(hands.window.arena.team.places) == 7
 
 
