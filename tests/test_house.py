@@ -76,7 +76,6 @@ TESTED_THROUGH = {
     "strictjson": "test_map_errors",
     "observation": "test_controllers",
     "decisions": "test_simulation",
-    "momentary_cost": "test_moving_bodies",
     "recorder": "test_record",
     "region": "test_environment",
     **dict.fromkeys(
@@ -96,7 +95,7 @@ TESTED_THROUGH = {
     "report": "test_houseexpo",
     **dict.fromkeys("measure plot render start step".split(), "test_bench"),
     "coverage": "test_coverage_layers",
-    **dict.fromkeys("messages cost_process".split(), "test_cost_worker"),
+    **dict.fromkeys("messages cost_process evaluation".split(), "test_cost_worker"),
     **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
     **dict.fromkeys(

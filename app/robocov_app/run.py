@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
-from robocov.errors import ParameterError
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.momentary_cost import MomentaryCost
 from robocov.record import Record
@@ -45,9 +44,6 @@ FILM_HOLD = 1.0
 
 STOPPED_SAMPLES = 200
 """Samples of the coverage cost of a run that was stopped."""
-
-_OF_STANDING_MAPS = frozenset(("distances", "geodesic_cells"))
-"""Layers that take long to know of a map."""
 
 COST_RATE = 10.0
 """Samples of the coverage cost per simulated second."""
@@ -277,24 +273,19 @@ def save_run_moving(
     save_moving(folder, "run.mp4", frames, total, options, stop)
 
 
-def check_layers(options: RunOptions, environment: Environment | None = None) -> None:
+def check_layers(options: RunOptions) -> None:
     """Make sure, before anything is simulated, that films can show what is wanted.
 
     Raises
     ------
     ParameterError
-        When there is no such layer, or it cannot be drawn of the map.
+        When there is no such layer.
     """
     if options.show or options.hide:
         from robocov_app.view.picture import checked_layers
 
-        also = checked_layers("--show", options.show)
+        checked_layers("--show", options.show)
         checked_layers("--hide", options.hide)
-        if environment is not None and environment.moves and also & _OF_STANDING_MAPS:
-            raise ParameterError(
-                f"--show: {' '.join(options.show)}, but obstacles of map {environment.name!r} move: "
-                f"distances are known of maps where all stand"
-            )
 
 
 def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> Shown:
@@ -315,15 +306,18 @@ def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunO
     if cost is None:
         cost = built_cost(environment, FILM_LATTICE, quiet=options.json)
     cost = cost_for_pictures(environment, cost, FILM_LATTICE)
-    farthest = max(float(reached.max(initial=0.0)) for reached in _reached(runs, cost))
+    farthest = max((float(reached.max(initial=0.0)) for reached in _reached(runs, cost)), default=0.0)
     return Shown(also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
 
 
 def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
     """Yield the distances at the end of each run that are finite."""
+    momentary = MomentaryCost(cost)
     for run in runs:
-        distances = cost(run.record.positions[-1][run.record.working[-1]]).distances
-        yield distances[np.isfinite(distances)]
+        record = run.record
+        result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
+        if result is not None:
+            yield result.distances[np.isfinite(result.distances)]
 
 
 def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown) -> Iterator[Frame]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,8 @@ import shapely
 from robocov.cost import CoverageCost
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from robocov.arrays import Array, BoolArray
     from robocov.cost import CoverageResult
 
@@ -27,10 +30,12 @@ class MomentaryCost:
     ----------
     cost : CoverageCost
         Of the map as it was given, at time zero.
+    progress : callable
+        As `CoverageCost` takes it, for the maps of later moments.
     """
 
-    def __init__(self, cost: CoverageCost) -> None:
-        self._cost = cost
+    def __init__(self, cost: CoverageCost, progress: Callable[[float], None] | None = None) -> None:
+        self._cost, self._progress = cost, progress
         self._known: dict[bytes, CoverageCost] = {}
 
     def at(self, time: float) -> CoverageCost:
@@ -43,7 +48,7 @@ class MomentaryCost:
         if key not in self._known:
             if len(self._known) >= _REMEMBERED:
                 del self._known[next(iter(self._known))]
-            self._known[key] = CoverageCost(now, self._cost.lattice)
+            self._known[key] = CoverageCost(now, self._cost.lattice, progress=self._progress)
         return self._known[key]
 
     def counted(self, time: float, positions: Array, working: BoolArray | None = None) -> BoolArray:
@@ -77,6 +82,23 @@ class MomentaryCost:
         if not counted.any():
             return None
         return self.at(time)(positions[counted], None if speeds is None else speeds[counted])
+
+    def of_all(
+        self, time: float, positions: Array, working: BoolArray | None = None
+    ) -> CoverageResult | None:
+        """Return the coverage cost at a time with a row for every robot; None where no robot counts.
+
+        A robot that does not count is nearest to nothing. The parameters are those of `counted`.
+        """
+        counted = self.counted(time, positions, working)
+        if counted.all():
+            return self.at(time)(positions) if len(positions) else None
+        rows = np.flatnonzero(counted)
+        if not len(rows):
+            return None
+        result = self.at(time)(positions[rows])
+        owner = np.where(result.owner >= 0, rows[result.owner], -1)
+        return replace(result, positions=np.array(positions), owner=owner)
 
     def figures(
         self, time: float, positions: Array, working: BoolArray | None = None

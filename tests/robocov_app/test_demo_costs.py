@@ -12,6 +12,7 @@ from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment
+from robocov.obstacle_path import ObstaclePath
 from robocov_app.demo import costs as module
 from robocov_app.demo.costs import DirectCosts, WorkerCosts
 from robocov_app.live.messages import Answer, Building, Failed, Ready
@@ -19,6 +20,11 @@ from robocov_app.view.field import Field
 
 PLACES = np.array([[1.0, 1.0], [5.0, 3.0]])
 OTHERS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
+CROSSED = replace(
+    HALL,
+    obstacles=(*HALL.obstacles, CircleObstacle((1.0, 2.0), 0.4, path=ObstaclePath(((1, 2), (5, 2)), 0.5))),
+)
+"""A hall through which something goes."""
 INSIDE = np.array([[4.2, 1.2]])
 """Of the pillar."""
 FULL = Environment("full", ((0, 0), (1, 0), (1, 1), (0, 1)), (CircleObstacle((0.5, 0.5), 0.3),))
@@ -59,7 +65,7 @@ class StubWorker:
     def ready(self) -> None:
         self.events.append(Ready(self.generation, self.cost.sites, self.cost.corners, 0.1))
 
-    def ask(self, when, positions, topic=0, point=None) -> None:
+    def ask(self, when, positions, topic=0, point=None, speeds=None) -> None:
         self.asked.append((when, positions, topic, point))
 
     def answer(self, generation=None) -> None:
@@ -162,6 +168,48 @@ def test_what_was_of_another_run_is_forgotten():
     costs.forget()
     assert costs.known == {}
     assert costs.poll() == []
+
+
+def test_obstacles_that_move_stand_where_they_are_at_the_time():
+    costs = DirectCosts(32)
+    costs.environment(CROSSED)
+    assert costs.state == ""
+    values = []
+    for when in (0.0, 2.5, 5.0):
+        costs.ask(0, when, PLACES)
+        ((_, known),) = costs.poll()
+        assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(PLACES).mean_distance
+        assert known.field.largest == known.result.distances.max()
+        values.append(known.result.mean_distance)
+    assert len(set(values)) == 3
+
+
+def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
+    costs = DirectCosts(32)
+    costs.environment(CROSSED)
+    over = np.array([[1.0, 2.0], [5.0, 3.0]])
+    costs.ask(0, 0.0, over, np.array([5.5, 3.5]))
+    ((_, known),) = costs.poll()
+    np.testing.assert_array_equal(known.result.positions, over)
+    assert set(known.result.owner.tolist()) == {1}
+    assert known.result.mean_distance == CoverageCost(CROSSED.at(0.0), 32)(over[1:]).mean_distance
+    np.testing.assert_array_equal(known.path[-1], over[1])
+    # nobody is left
+    costs.ask(0, 0.0, over[:1])
+    assert costs.poll() == []
+
+
+def test_the_time_until_the_first_robot_comes():
+    speeds = np.array([0.2, 1.0])
+    costs = DirectCosts(32)
+    costs.environment(HALL)
+    costs.ask(0, 1.0, PLACES)
+    costs.ask(1, 1.0, PLACES, speeds=speeds)
+    without, timed = (known for _, known in costs.poll())
+    assert without.travel_time is None
+    assert timed.travel_time == CoverageCost(HALL, 32)(PLACES, speeds).mean_time
+    # the distance is that of the nearest one all the same
+    assert timed.result.mean_distance == without.result.mean_distance
 
 
 # in turn
@@ -319,6 +367,21 @@ def test_another_process_says_the_same(worker_costs):
     worker_costs.environment(replace(HALL, obstacles=()))
     worker_costs.ask(0, 3.0, INSIDE)
     assert answered(worker_costs)[0].time == 3.0
+
+
+def test_another_process_knows_where_obstacles_are(worker_costs):
+    worker_costs.environment(CROSSED)
+    speeds = np.array([0.5, 1.0])
+    for when in (0.0, 2.5):
+        worker_costs.ask(0, when, PLACES, speeds=speeds)
+        known = answered(worker_costs)[0]
+        cost = CoverageCost(CROSSED.at(when), 32)
+        assert known.time == when
+        assert known.result.mean_distance == cost(PLACES).mean_distance
+        assert known.travel_time == cost(PLACES, speeds).mean_time
+        # of the sites as they are then
+        np.testing.assert_array_equal(known.result.points, cost.points)
+        assert known.field.largest == known.result.distances.max()
 
 
 def test_a_map_without_a_cost_is_said():

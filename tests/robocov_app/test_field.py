@@ -6,7 +6,8 @@ import shapely
 from drawn_run import HALL, ROOMS
 
 from robocov.cost import CoverageCost
-from robocov.environment import Environment, WallObstacle
+from robocov.environment import CircleObstacle, Environment, WallObstacle
+from robocov.obstacle_path import ObstaclePath
 from robocov_app.view.field import Field, FieldLattice, Fields
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
@@ -88,6 +89,21 @@ def test_every_change_of_owner_in_the_open_has_a_border(seed):
     changes = (owner[:, 1:] != owner[:, :-1]) & open_[:, 1:] & open_[:, :-1]
     assert changes.sum() > 50
     assert (marked[:, 1:] | marked[:, :-1])[changes].mean() > 0.99
+
+
+def test_where_obstacles_move_a_field_is_of_its_time():
+    path = ObstaclePath(((2.0, 1.0), (2.0, 5.0)), 1.0)
+    crossed = Environment("crossed", SEALED.boundary, (CircleObstacle((2.0, 1.0), 0.8, path=path),))
+    fields = Fields(CoverageCost(crossed, 64), 5.0)
+    robots = np.array([[1.0, 3.0], [2.0, 5.0]])
+    x, y = np.array([1.95, 2.05]), np.array([1.05, 0.95])
+    assert fields.at(robots).result.owner.max() == 1
+    # at four seconds it stands on the second robot, where the other cannot be either
+    later = fields.at(robots, 4.0)
+    assert set(later.result.owner.tolist()) == {0}
+    exact = np.hypot(*(np.array([1.95, 1.05]) - robots[0]))
+    assert later.distances(x, y)[0, 0] == pytest.approx(exact, abs=1e-9)
+    assert fields.at(robots[1:], 4.0) is None
 
 
 def test_no_distance_leaks_through_a_wall():

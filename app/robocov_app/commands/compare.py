@@ -69,7 +69,7 @@ def command(options: Arguments) -> int:
     team_of(options)
     conditions_of(options)
     starts_of(environment, options)
-    check_layers(options, environment)
+    check_layers(options)
     target = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = built_cost(environment, options.lattice, quiet=options.json)
     runs: dict[str, Run] = {}

@@ -56,7 +56,7 @@ def command(options: Arguments) -> int:
     team_of(options)
     conditions_of(options)
     starts_of(environment, options)
-    check_layers(options, environment)
+    check_layers(options)
     cost = built_cost(environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:

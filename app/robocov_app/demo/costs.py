@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Protocol
 
@@ -11,24 +11,25 @@ import numpy as np
 
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
-from robocov_app.live.cost_process import path_of
+from robocov.momentary_cost import MomentaryCost
 from robocov_app.live.cost_worker import CostWorker
+from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Answer, Building, Failed, Question, Ready
 from robocov_app.view.field import Field, FieldLattice
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from robocov.arrays import Array
     from robocov.cost import CoverageResult
     from robocov.environment import Environment
+    from robocov.lattice import Sites
 
 LATTICE = 128
 """Sites along a side."""
 
 _PANES = 1 << 20
 """More than there will ever be."""
-
-_MOVES = "no live cost: obstacles move"
-"""A map must be known for a moment before its cost is quick to say; saved runs tell it once a second."""
 
 _PATIENCE = 0.5
 """Seconds after which an answer is not waited for any more."""
@@ -45,17 +46,22 @@ class Known:
     result : CoverageResult
     path : (w, 2) m or None
         From the cursor to its nearest robot.
+    lattice : callable
+        Returns the sites as a field wants them.
+    travel_time : float, s, or None
+        Mean time until the first robot is at a place; None where it was not asked for.
     """
 
     time: float
     result: CoverageResult
     path: Array | None
-    sites: FieldLattice
+    lattice: Callable[[], FieldLattice]
+    travel_time: float | None = None
 
     @cached_property
     def field(self) -> Field:
         """The distances as layers want them; made only where one is shown."""
-        return Field(self.sites, self.result)
+        return Field(self.lattice(), self.result)
 
 
 class Costs(Protocol):
@@ -73,8 +79,18 @@ class Costs(Protocol):
     def forget(self) -> None:
         """Leave out what has been asked and is not yet answered: it was of another run."""
 
-    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
-        """Ask for the cost of (n, 2) m positions, and for a path from a point."""
+    def ask(
+        self,
+        pane: int,
+        time: float,
+        positions: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+    ) -> None:
+        """Ask for the cost of (n, 2) m positions, and for a path from a point.
+
+        With `speeds`, (n,) m/s, for the mean time until the first robot is at a place too.
+        """
 
     def poll(self) -> list[tuple[int, Known]]:
         """Return what has been answered since the last call, by pane."""
@@ -96,47 +112,61 @@ class DirectCosts:
         self.state = ""
         self._lattice = lattice
         self._cost: CoverageCost | None = None
+        self._momentary: MomentaryCost | None = None
+        self._lattices: tuple[CoverageCost, Callable[[], FieldLattice]] | None = None
         self._asked: dict[int, Question] = {}
 
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
         before = self._cost
-        self.known, self.state, self._cost, self._asked = {}, "", None, {}
-        if environment.moves:
-            self.state = _MOVES
-            return
+        self.known, self.state, self._asked = {}, "", {}
+        self._cost = self._momentary = None
         if before is not None and before.environment.same_place(environment):
             self._cost = before.weighed(environment)
-            return
-        try:
-            self._cost = CoverageCost(environment, self._lattice)
-        except RobocovError as error:
-            self.state = f"no cost: {error}"
-            return
-        self._sites = FieldLattice(self._cost.sites)
+        else:
+            try:
+                self._cost = CoverageCost(environment, self._lattice)
+            except RobocovError as error:
+                self.state = f"no cost: {error}"
+                return
+        self._momentary = MomentaryCost(self._cost)
 
     def forget(self) -> None:
         """Leave out what has been asked."""
         self._asked, self.known = {}, {}
 
-    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
+    def ask(
+        self,
+        pane: int,
+        time: float,
+        positions: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+    ) -> None:
         """Ask; the answer is there at the next `poll`."""
-        self._asked[pane] = Question(time, np.array(positions), pane, point)
+        self._asked[pane] = Question(time, np.array(positions), pane, point, speeds)
 
     def poll(self) -> list[tuple[int, Known]]:
         """Return the answers."""
         asked, self._asked = self._asked, {}
         answers = []
         for pane, question in asked.items():
-            if self._cost is None:
+            if self._momentary is None:
                 continue
             try:
-                result = self._cost(question.positions)
+                found = evaluated(self._momentary, question)
             except RobocovError:
                 continue
-            self.known[pane] = Known(question.time, result, path_of(self._cost, question), self._sites)
+            self.known[pane] = Known(
+                question.time, found.result, found.path, self._lattice_of(found.cost), found.travel_time
+            )
             answers.append((pane, self.known[pane]))
         return answers
+
+    def _lattice_of(self, cost: CoverageCost) -> Callable[[], FieldLattice]:
+        if self._lattices is None or self._lattices[0] is not cost:
+            self._lattices = cost, lattice_of(cost.sites)
+        return self._lattices[1]
 
     def close(self) -> None:
         """Nothing is to be ended."""
@@ -160,14 +190,11 @@ class WorkerCosts:
         self._out = -1.0
         self._ready = False
         self._run = 0
-        self._sites: FieldLattice | None = None
+        self._sites: Callable[[], FieldLattice] | None = None
 
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
         self.known, self._waiting, self._ready, self._out = {}, {}, False, -1.0
-        if environment.moves:
-            self._generation, self.state = -1, _MOVES
-            return
         self._generation = self._worker.environment(environment, self._lattice)
         self.state = "cost: preparing the map"
 
@@ -175,12 +202,19 @@ class WorkerCosts:
         """Leave out what has been asked; answers that are on their way are passed over."""
         self._waiting, self.known, self._run = {}, {}, self._run + 1
 
-    def ask(self, pane: int, time: float, positions: Array, point: Array | None = None) -> None:
+    def ask(
+        self,
+        pane: int,
+        time: float,
+        positions: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+    ) -> None:
         """Ask; what was asked about the pane before and is not yet on its way is forgotten.
 
         It keeps its place among the panes that wait, so that each has its turn.
         """
-        self._waiting[pane] = Question(time, np.array(positions), pane, point)
+        self._waiting[pane] = Question(time, np.array(positions), pane, point, speeds)
         self._send()
 
     def poll(self) -> list[tuple[int, Known]]:
@@ -196,12 +230,14 @@ class WorkerCosts:
                 self.state = f"cost: preparing the map, {event.fraction:.0%}{left}"
             elif isinstance(event, Ready):
                 self._ready, self.state = True, ""
-                self._sites = FieldLattice(event.sites)
+                self._sites = lattice_of(event.sites)
             elif isinstance(event, Answer) and self._sites is not None:
                 self._out = -1.0
                 run, pane = divmod(event.topic, _PANES)
                 if run == self._run:
-                    self.known[pane] = Known(event.time, event.result, event.path, self._sites)
+                    self.known[pane] = Known(
+                        event.time, event.result, event.path, self._sites, event.travel_time
+                    )
                     answers.append((pane, self.known[pane]))
             elif isinstance(event, Failed):
                 self._out = -1.0
@@ -221,5 +257,10 @@ class WorkerCosts:
         pane = next(iter(self._waiting))
         question = self._waiting.pop(pane)
         topic = self._run * _PANES + pane
-        self._worker.ask(question.time, question.positions, topic, question.point)
+        self._worker.ask(question.time, question.positions, topic, question.point, question.speeds)
         self._out = now
+
+
+def lattice_of(sites: Sites) -> Callable[[], FieldLattice]:
+    """Return what makes the sites what a field wants, once, when it is asked for first."""
+    return cache(lambda: FieldLattice(sites))

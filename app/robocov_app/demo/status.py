@@ -63,7 +63,7 @@ def cursor_words(desk: Desk) -> str:
     result = known.result
     square = (result.points[:, 0] - x) ** 2 + (result.points[:, 1] - y) ** 2
     site = int(square.argmin())
-    if square[site] > (1.5 * known.sites.spacing) ** 2:
+    if square[site] > (1.5 * known.lattice().spacing) ** 2:
         return f"{words}: not free"
     owner = int(result.owner[site])
     numbers = desk.session.circumstances(desk.lane).numbers

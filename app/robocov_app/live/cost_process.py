@@ -9,16 +9,15 @@ from __future__ import annotations
 import os
 import threading
 import time
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
+from robocov.momentary_cost import MomentaryCost
+from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
 from robocov_app.live.own_process import own_streams
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
 
 _PAUSE = 0.05
 """Seconds between two words on how far a map is."""
@@ -38,13 +37,15 @@ class Process:
         self._question: Question | None = None
         self._generation = -1
         self._cost: CoverageCost | None = None
+        self._momentary: MomentaryCost | None = None
+        self._told: CoverageCost | None = None
 
     def run(self) -> None:
         """Go on for ever; reading ends the process."""
         threading.Thread(target=self._read, daemon=True).start()
         while True:
             with self._wanted:
-                self._wanted.wait_for(lambda: self._build or (self._question and self._cost))
+                self._wanted.wait_for(lambda: self._build or (self._question and self._momentary))
                 build, self._build = self._build, None
             if build is not None:
                 self._prepare(build)
@@ -83,12 +84,22 @@ class Process:
         except _NewerError:
             return
         except RobocovError as error:
-            self._cost = None
+            self._cost = self._momentary = None
             self._say(Failed(build.generation, str(error)))
             return
         self._generation, self._cost = build.generation, cost
-        seconds = time.perf_counter() - began
-        self._say(Ready(build.generation, cost.sites, cost.corners, seconds, cost.weights))
+        # a map of a moment is given up when there is another map
+        self._momentary = MomentaryCost(cost, progress=self._check)
+        self._tell(cost, time.perf_counter() - began)
+
+    def _check(self, done: float) -> None:
+        if self._build is not None:
+            raise _NewerError
+
+    def _tell(self, cost: CoverageCost, seconds: float) -> None:
+        """Say what the answers are made with that come now."""
+        self._told = cost
+        self._say(Ready(self._generation, cost.sites, cost.corners, seconds, cost.weights))
 
     def _weighed(self, build: Build) -> CoverageCost | None:
         """Return the cost of a map that differs from the one before in its density alone; None for others."""
@@ -100,36 +111,29 @@ class Process:
     def _answer(self) -> None:
         """Answer the newest question, if there is one and a map for it."""
         with self._wanted:
-            question, cost = self._question, self._cost
-            if question is None or cost is None:
+            question, momentary = self._question, self._momentary
+            if question is None or momentary is None:
                 return
             self._question = None
         began = time.perf_counter()
         try:
-            result = cost(question.positions)
-            path = path_of(cost, question)
+            evaluation = evaluated(momentary, question)
+        except _NewerError:
+            return
         except RobocovError as error:
             # on a map that is about to be replaced, robots may well be where there were obstacles
             self._say(Failed(self._generation, str(error)))
             return
         seconds = time.perf_counter() - began
-        self._say(values_of(self._generation, question, result, seconds, path))
+        if evaluation.cost is not self._told:
+            self._tell(evaluation.cost, seconds)
+        self._say(values_of(self._generation, question, evaluation, seconds))
 
     def _say(self, message: object) -> None:
         try:
             send(self._target, message)
         except OSError:
             os._exit(0)
-
-
-def path_of(cost: CoverageCost, question: Question) -> Array | None:
-    """Return the path that a question asks for, None where its point is not free."""
-    if question.point is None:
-        return None
-    try:
-        return cost.path(question.positions, question.point)
-    except RobocovError:
-        return None
 
 
 def main() -> None:

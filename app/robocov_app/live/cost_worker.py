@@ -76,13 +76,22 @@ class CostWorker:
         self._talking().build(self._last)
         return self._generation
 
-    def ask(self, time: float, positions: Array, topic: int = 0, point: Array | None = None) -> None:
+    def ask(
+        self,
+        time: float,
+        positions: Array,
+        topic: int = 0,
+        point: Array | None = None,
+        speeds: Array | None = None,
+    ) -> None:
         """Ask for the cost of (n, 2) m positions; the answer bears the same time and topic.
 
-        With a `point`, (2,) m, also for the shortest path from there to its nearest robot.
+        With a `point`, (2,) m, also for the shortest path from there to its nearest robot; with `speeds`,
+        (n,) m/s, for the mean time until the first robot is at a place. Obstacles that move stand where
+        they are at that time.
         """
         if self._last is not None:
-            self._talking().ask(Question(time, np.array(positions, dtype=float), topic, point))
+            self._talking().ask(Question(time, np.array(positions, dtype=float), topic, point, speeds))
 
     def poll(self) -> list[Event]:
         """Return what has happened since the last call."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robocov.cost import CoverageResult
     from robocov.environment import Environment
     from robocov.lattice import Sites
+    from robocov_app.live.evaluation import Evaluation
 
 _LENGTH = struct.Struct("<Q")
 
@@ -33,14 +34,15 @@ class Build:
 class Question:
     """Please evaluate the cost of (n, 2) m positions, of whatever map is ready.
 
-    With a `point`, (2,) m, the shortest path from there to its nearest robot too. What is said of the
-    `topic` comes back with the answer.
+    With a `point`, (2,) m, the shortest path from there to its nearest robot too; with `speeds`, (n,) m/s,
+    the mean time until the first robot is at a place. What is said of the `topic` comes back with the answer.
     """
 
     time: float
     positions: Array
     topic: int = 0
     point: Array | None = None
+    speeds: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ class Building:
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A map is ready.
+    """A map is ready; where obstacles move, once more before each answer, as it is at that time.
 
     Attributes
     ----------
@@ -101,6 +103,7 @@ class Values:
     seconds: float
     topic: int = 0
     path: Array | None = None
+    travel_time: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +124,8 @@ class Answer:
     path : (w, 2) m or None
         Way-points from the question's point to its nearest robot, both ends included; empty where none
         can come, None where nothing was asked, or the point is not free.
+    travel_time : float, s, or None
+        Mean time until the first robot is at a place; None where the question has no speeds.
     """
 
     generation: int
@@ -129,6 +134,7 @@ class Answer:
     seconds: float
     topic: int = 0
     path: Array | None = None
+    travel_time: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,10 +155,9 @@ class Failed:
 Event: TypeAlias = Building | Ready | Answer | Failed
 
 
-def values_of(
-    generation: int, question: Question, result: CoverageResult, seconds: float, path: Array | None
-) -> Values:
-    """Return what is to be sent of a result."""
+def values_of(generation: int, question: Question, evaluation: Evaluation, seconds: float) -> Values:
+    """Return what is to be sent of the answer to a question."""
+    result = evaluation.result
     kept = {item.name: getattr(result, item.name) for item in fields(Values) if hasattr(result, item.name)}
     # half as long on the way
     kept |= {name: kept[name].astype(np.int32) for name in _INDICES}
@@ -161,7 +166,8 @@ def values_of(
         time=question.time,
         seconds=seconds,
         topic=question.topic,
-        path=path,
+        path=evaluation.path,
+        travel_time=evaluation.travel_time,
         **kept,
     )
 
@@ -175,7 +181,15 @@ def answer_of(values: Values, ready: Ready) -> Answer:
     }
     kept |= {name: kept[name].astype(np.intp) for name in _INDICES}
     result = CoverageResult(points=ready.sites.points, corners=ready.corners, weights=ready.weights, **kept)
-    return Answer(values.generation, values.time, result, values.seconds, values.topic, values.path)
+    return Answer(
+        values.generation,
+        values.time,
+        result,
+        values.seconds,
+        values.topic,
+        values.path,
+        values.travel_time,
+    )
 
 
 def send(stream: IO[bytes], message: object) -> None:

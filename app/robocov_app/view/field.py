@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from robocov.momentary_cost import MomentaryCost
+
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray, IntArray
     from robocov.cost import CoverageCost, CoverageResult
@@ -269,7 +271,7 @@ class Field:
 
 
 class Fields:
-    """The fields of one map, whatever the positions, and one scale of colours for all of them.
+    """The fields of one map, whatever the positions and the time, and one scale of colours for all of them.
 
     Parameters
     ----------
@@ -280,18 +282,26 @@ class Fields:
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
-        self._cost = cost
-        self._lattice = FieldLattice(cost.sites)
+        self._momentary = MomentaryCost(cost)
+        self._lattices = cost, FieldLattice(cost.sites)
 
-    def at(self, positions: Array) -> Field:
-        """Return the field of robots at (n, 2) m.
+    def at(self, positions: Array, time: float = 0.0) -> Field | None:
+        """Return the field of robots at (n, 2) m, with the obstacles where they are at a time, s.
+
+        Robots below an obstacle that moves are left out; None where all are.
 
         Raises
         ------
         InputError
-            When a robot is outside the free space.
+            When a robot is in an obstacle that stands, or outside the map.
         """
-        return Field(self._lattice, self._cost(positions))
+        result = self._momentary.of_all(time, positions)
+        if result is None:
+            return None
+        cost = self._momentary.at(time)
+        if cost is not self._lattices[0]:
+            self._lattices = cost, FieldLattice(cost.sites)
+        return Field(self._lattices[1], result)
 
 
 def _middles(places: Array) -> Array:

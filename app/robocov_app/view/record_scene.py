@@ -59,7 +59,7 @@ def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | N
         trail_time=record.time[: row + 1],
         label=record.label,
         cost=cost,
-        field=None if fields is None else fields.at(snapshot.positions),
+        field=None if fields is None else fields.at(snapshot.positions, snapshot.time),
         field_limit=1.0 if fields is None else fields.limit,
     )
     return replace(scene, **more) if more else scene
