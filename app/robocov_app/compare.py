@@ -16,6 +16,7 @@ from robocov_app.run import (
     save_figures,
     save_moving,
     shown_in_films,
+    time_curves,
 )
 
 if TYPE_CHECKING:
@@ -127,9 +128,16 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
         folder,
         {
             "trajectories": lambda: plot_comparison(
-                records, theme=theme, colours=options.colours, size=size, mean_distances=finals
+                records,
+                theme=theme,
+                colours=options.colours,
+                size=size,
+                mean_distances=finals,
+                mean_times=[run.final_time for run in runs.values()],
             ),
-            "cost": lambda: plot_coverage(curves, moments(), theme, size, cost_title(records[0])),
+            "cost": lambda: plot_coverage(
+                curves, moments(), theme, size, cost_title(records[0]), time_curves(list(runs.values()))
+            ),
         },
         quiet=options.json,
     )
@@ -154,7 +162,7 @@ def save_panes_moving(
 ) -> None:
     """Write ``frames/`` and ``comparison.mp4`` of runs side by side, with what is to be shown."""
     from robocov_app.panes import comparison_frames, pane_layout
-    from robocov_app.recording import frame_rows
+    from robocov_app.recording import frame_rows, told_costs
 
     records = [run.record for run in runs]
     layout = pane_layout(records, options.theme, options.colours, options.picture_size(), shown)
@@ -165,7 +173,7 @@ def save_panes_moving(
         "comparison.mp4",
         lambda: comparison_frames(
             records,
-            [(run.history.time, run.history.mean_distance) for run in runs],
+            [told_costs(run.history) for run in runs],
             layout,
             theme=options.theme,
             colours=options.colours,

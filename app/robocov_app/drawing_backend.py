@@ -79,11 +79,12 @@ def plot_record(
     colours: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
+    mean_time: float | None = None,
 ) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.plots.plot_trajectories`."""
     from robocov_app.plots import plot_trajectories
 
-    figure = plot_trajectories(record, _checked(axes), theme, colours, size, mean_distance)
+    figure = plot_trajectories(record, _checked(axes), theme, colours, size, mean_distance, mean_time)
     return _map_axes(figure, axes)
 
 

@@ -17,9 +17,9 @@ from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import Colour, theme_named
 
 if TYPE_CHECKING:
-    from robocov.arrays import Array
     from robocov.environment import Environment
     from robocov.record import Record
+    from robocov_app.recording import Costs
     from robocov_app.view.field import Fields
     from robocov_app.view.layers import LegendEntry
 
@@ -119,7 +119,7 @@ def pane_layout(
 
 def comparison_frames(
     records: Sequence[Record],
-    costs: Sequence[tuple[Array, Array]],
+    costs: Sequence[Costs],
     layout: PaneLayout,
     *,
     theme: str,
@@ -134,7 +134,7 @@ def comparison_frames(
     Parameters
     ----------
     records, costs : sequences
-        Each run's times and mean distances go with its record, see `iter_frames`.
+        What frames tell of each run's cost goes with its record, see `iter_frames`.
     layout : PaneLayout
     theme, colours, fps, speed, hold
         See `iter_frames`.

@@ -11,9 +11,9 @@ from robocov.changing_world import only
 from robocov.errors import ParameterError
 from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
-from robocov_app.plot_curves import DISTANCE, WEIGHED, draw_curves, end_label
+from robocov_app.plot_curves import DISTANCE, TIME, WEIGHED, draw_curves, end_label
 from robocov_app.plots import plot_cost
-from robocov_app.view.phi import density_words, mean_words
+from robocov_app.view.phi import cost_words, density_words, mean_words
 from robocov_app.view.shading import levels, palette, round_limit, strength, ticks
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
@@ -64,15 +64,20 @@ class Moment:
 
     @classmethod
     def last_of(
-        cls, record: Record, field: Field, mean_distance: float, counted: IntArray | None = None
+        cls,
+        record: Record,
+        field: Field,
+        mean_distance: float,
+        counted: IntArray | None = None,
+        mean_time: float | None = None,
     ) -> Moment:
-        """Return the last moment of a run, with the mean distance that its curve ends with.
+        """Return the last moment of a run, with the mean distance, m, and time, s, that its curves end with.
 
         `counted` are the rows of the robots that count, all by default.
         """
-        facts = f"after {record.time[-1]:.1f} s"
-        if np.isfinite(mean_distance):
-            facts = f"{mean_words(record.environment)} {mean_distance:.3f} m {facts}"
+        cost = cost_words(mean_words(record.environment), mean_distance, mean_time)
+        cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
+        facts = f"{cost} after {record.time[-1]:.1f} s".lstrip()
         environment = record.environment.at(float(record.time[-1]))
         if counted is None:
             return cls(environment, record.team, field, record.label, facts)
@@ -95,6 +100,7 @@ def plot_coverage(
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost",
+    times: Sequence[Curve] = (),
 ) -> Figure:
     """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colours.
 
@@ -109,6 +115,8 @@ def plot_coverage(
         Of the page; by default what suits the shapes of the maps. One that is too small for both,
         below 720 x 400, has the curves alone.
     title : str
+    times : sequence of Curve
+        Mean times, s, where robots are not equally fast; they stand below the curves.
 
     Returns
     -------
@@ -139,9 +147,8 @@ def plot_coverage(
         free = page.size[0] if rooms.bar > 40 * s else bar_left
         page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=free - 2 * page.margin)
         if rooms.curves is not None:
-            axes = page.axes(_curves_box(page, curves, rooms.curves))
             weighed = any(density_words(moment.environment) for moment in moments)
-            draw_curves(axes, curves, theme, label=WEIGHED if weighed else DISTANCE)
+            _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
         panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
         for moment, (box, slot) in zip(moments, panels, strict=True):
             axes = page.axes(box)
@@ -250,11 +257,25 @@ def _laid_out(
     return page, _Rooms(curves, maps_room, cut + 24 * s)
 
 
-def _curves_box(page: Page, curves: Sequence[Curve], room: Box) -> Box:
+def _draw_all_curves(
+    page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str
+) -> None:
+    """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
+    left, top, width, height = room
+    across = times and width > 2.4 * height
+    part = (0.5 if across else 1.0, 0.5 if times and not across else 1.0)
+    drawn = [(curves, label, "m"), (times, TIME, "s")]
+    for k, (some, said, unit) in enumerate(drawn[: 2 if times else 1]):
+        place = left + k * width / 2 if across else left, top if across else top + k * height / 2
+        box = _curves_box(page, some, (*place, part[0] * width, part[1] * height), unit)
+        draw_curves(page.axes(box), some, page.theme, label=said, unit=unit)
+
+
+def _curves_box(page: Page, curves: Sequence[Curve], room: Box, unit: str = "m") -> Box:
     """Return the box of the axes in the room for curves with all of their labels."""
     s = page.scale
     left, top, width, height = room
-    longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
     right = min(26 * s + longest, 0.45 * width)
     return left + 34 * s, top + 34 * s, width - 34 * s - right, height - 34 * s - 50 * s
 

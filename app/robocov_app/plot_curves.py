@@ -32,6 +32,7 @@ VARIANTS: tuple[tuple[Any, str], ...] = (
 """Those of controllers that have none of their own, and of one controller's second, third, ... gains."""
 
 DISTANCE = "mean distance to the nearest robot (m)"
+TIME = "mean time until the first robot is there (s)"
 WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
 
 _FROM_ZERO = 0.4

@@ -17,7 +17,7 @@ from robocov_app.figure_files import save_figure as save_figure
 from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style
 from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
 from robocov_app.plot_curves import Curve, draw_curves, end_label
-from robocov_app.view.phi import mean_words
+from robocov_app.view.phi import cost_words, mean_words
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
 
@@ -75,6 +75,7 @@ def plot_trajectories(
     colours: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
+    mean_time: float | None = None,
 ) -> Figure:
     """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
 
@@ -89,7 +90,9 @@ def plot_trajectories(
     size : (width, height) or None, px
         Of the page; by default what suits the shape of the map.
     mean_distance : float or None, m
-        Of the final positions, for the title.
+        Of the final positions, for the title, as
+    mean_time : float or None, s
+        where robots are not equally fast.
 
     Returns
     -------
@@ -102,7 +105,7 @@ def plot_trajectories(
             ticks_in_metres(axes, record.environment, theme)
             draw_run(axes, record, theme, colours)
             return _figure_of(axes)
-        facts = [_distance(record.environment, mean_distance), _time(record), _robots(record)]
+        facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
         page, axes = _map_page(
             record.environment,
             theme,
@@ -121,6 +124,7 @@ def plot_comparison(
     colours: str = "paper",
     size: tuple[int, int] | None = None,
     mean_distances: Sequence[float | None] | None = None,
+    mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
     """Plot several runs side by side at one scale.
 
@@ -133,7 +137,9 @@ def plot_comparison(
     size : (width, height) or None, px
         Of the page; by default what suits the shapes of the maps.
     mean_distances : sequence of float or None, m
-        Of the final positions, for the titles.
+        Of the final positions, for the titles, as
+    mean_times : sequence of float or None, s
+        where robots are not equally fast.
 
     Returns
     -------
@@ -142,7 +148,7 @@ def plot_comparison(
     Raises
     ------
     ParameterError
-        When there are no records, or not one mean distance for each.
+        When there are no records, or not one mean distance, and mean time, for each.
     """
     _check_colours(colours)
     costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
@@ -151,12 +157,17 @@ def plot_comparison(
             f"comparison: {len(records)} runs and {len(costs)} mean distances, "
             f"but at least one run and one distance for each was wanted"
         )
+    times = list(mean_times) if mean_times is not None else [None] * len(records)
+    if len(times) != len(records):
+        raise ParameterError(
+            f"comparison: {len(records)} runs and {len(times)} mean times, but one time for each was wanted"
+        )
     theme = _theme(theme)
     with plain_style():
         bounds = np.array([record.environment.region.bounds for record in records])
         limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
         aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
-        shared, captions = _captions(records, costs)
+        shared, captions = _captions(records, costs, times)
         handles: dict[str, Artist] = {}
         for record in sorted(records, key=has_goals, reverse=True):
             handles |= {str(h.get_label()): h for h in run_handles(record, theme, colours)}
@@ -320,10 +331,12 @@ def _titles(page: Page, box: Box, title: str, facts: str) -> None:
         page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
 
 
-def _captions(records: Sequence[Record], costs: Sequence[float | None]) -> tuple[str, list[str]]:
+def _captions(
+    records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
+) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
     same: list[str] = []
-    own = [[_distance(record.environment, cost)] for record, cost in zip(records, costs, strict=True)]
+    own = [[_cost(each.environment, *known)] for each, *known in zip(records, costs, times, strict=True)]
     for fact in (_map, _robots, _time):
         found = [fact(record) for record in records]
         if len(set(found)) == 1:
@@ -351,6 +364,7 @@ def _time(record: Record) -> str:
     return f"t = {record.time[-1]:.1f} s"
 
 
-def _distance(environment: Environment, mean_distance: float | None) -> str:
-    known = mean_distance is not None and np.isfinite(mean_distance)
-    return f"{mean_words(environment)} {mean_distance:.3f} m" if known else ""
+def _cost(environment: Environment, mean_distance: float | None, mean_time: float | None) -> str:
+    if mean_distance is None:
+        return ""
+    return cost_words(mean_words(environment), mean_distance, mean_time)

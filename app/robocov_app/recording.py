@@ -19,12 +19,16 @@ from robocov.errors import OutputError, ParameterError, shown
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
+    from robocov.metrics import CostHistory
     from robocov.record import Record
     from robocov_app.view.field import Fields
     from robocov_app.view.layers import Layer
 
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB picture, (height, width, 3), 0 to 255."""
+
+Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
+"""Times, s, and mean distances, m; and mean times, s, where robots are not equally fast."""
 
 Progress: TypeAlias = Callable[[int, int | None], None]
 """Is told how many frames are done, and of how many where that is known."""
@@ -86,7 +90,7 @@ def iter_frames(
     fields: Fields | None = None,
     layers: Sequence[Layer] | None = None,
     scale: float | None = None,
-    cost: tuple[Array, Array] | None = None,
+    cost: Costs | None = None,
     rows: IntArray | None = None,
 ) -> Iterator[Frame]:
     """Draw the frames of a saved run, one at a time.
@@ -110,8 +114,9 @@ def iter_frames(
         From the lowest to the topmost; None for `standard_layers`.
     scale : float or None
         Of text and lines; None for what suits the size.
-    cost : ((k,) s, (k,) m) or None
-        Times and mean distances; each frame says the latest known.
+    cost : ((k,) s, (k,) m) or ((k,) s, (k,) m, (k,) s) or None
+        Times and mean distances, and where robots are not equally fast the mean times until the first is
+        there; each frame says the latest known. See `told_costs`.
     rows : (m,) int or None
         The rows to show, instead of those that `fps` and `speed` give.
 
@@ -145,13 +150,20 @@ def iter_frames(
         yield frame
 
 
-def _cost_text(what: str, time: float, cost: tuple[Array, Array] | None) -> str:
+def told_costs(history: CostHistory) -> Costs:
+    """Return of a cost history what frames tell."""
+    if history.mean_time is None:
+        return history.time, history.mean_distance
+    return history.time, history.mean_distance, history.mean_time
+
+
+def _cost_text(what: str, time: float, cost: Costs | None) -> str:
     if cost is None:
         return ""
+    from robocov_app.view.phi import cost_words
+
     known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
-    if known < 0 or not np.isfinite(cost[1][known]):
-        return ""
-    return f"{what} {cost[1][known]:.3f} m"
+    return cost_words(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
 
 
 def png_bytes(frame: Frame) -> bytes:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from robocov_app.options import RunOptions
     from robocov_app.panes import Shown
     from robocov_app.plot_coverage import Moment
+    from robocov_app.plot_curves import Curve
     from robocov_app.recording import Frame
 
 FILM_SCALE = 1.3
@@ -59,6 +60,11 @@ class Run:
     record: Record
     history: CostHistory
     summary: dict[str, Any]
+
+    @property
+    def final_time(self) -> float | None:
+        """The mean time until the first robot is there at the end, s; None where all are equally fast."""
+        return None if self.history.mean_time is None else float(self.history.mean_time[-1])
 
 
 def team_of(options: RunOptions) -> Team:
@@ -164,16 +170,26 @@ def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOption
 
     record, history = run.record, run.history
     theme, size = theme_named(options.theme), options.picture_size()
-    final = float(history.mean_distance[-1])
+    final, final_time = float(history.mean_distance[-1]), run.final_time
     curve = (record.label, record.controller, history.time, history.mean_distance)
     save_figures(
         folder,
         {
             "trajectories": lambda: plot_trajectories(
-                record, theme=theme, colours=options.colours, size=size, mean_distance=final
+                record,
+                theme=theme,
+                colours=options.colours,
+                size=size,
+                mean_distance=final,
+                mean_time=final_time,
             ),
             "cost": lambda: plot_coverage(
-                [curve], last_moments([run], cost), theme=theme, size=size, title=cost_title(record)
+                [curve],
+                last_moments([run], cost),
+                theme=theme,
+                size=size,
+                title=cost_title(record),
+                times=time_curves([run]),
             ),
         },
         quiet=options.json,
@@ -203,8 +219,19 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
         now, rows = momentary.at(time), np.flatnonzero(counted)
         field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
         some = None if counted.all() else rows
-        moments.append(Moment.last_of(record, field, float(run.history.mean_distance[-1]), some))
+        moments.append(
+            Moment.last_of(record, field, float(run.history.mean_distance[-1]), some, run.final_time)
+        )
     return moments
+
+
+def time_curves(runs: Sequence[Run]) -> list[Curve]:
+    """Return the curves of the mean time of runs; none where robots are equally fast, or none worked."""
+    return [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_time)
+        for run in runs
+        if run.history.mean_time is not None and np.isfinite(run.history.mean_time).any()
+    ]
 
 
 def cost_title(record: Record) -> str:
@@ -322,7 +349,7 @@ def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
 
 def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown) -> Iterator[Frame]:
     """Draw the film frames of a run."""
-    from robocov_app.recording import iter_frames
+    from robocov_app.recording import iter_frames, told_costs
 
     return iter_frames(
         run.record,
@@ -335,5 +362,5 @@ def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown
         fps=options.fps,
         speed=options.film_speed,
         hold=FILM_HOLD,
-        cost=(run.history.time, run.history.mean_distance),
+        cost=told_costs(run.history),
     )

@@ -12,8 +12,9 @@ from driven_window import Driver, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.demo.chart import compared, curve_colour, spread, time_axis, value_axis
+from robocov_app.demo.chart import curve_colour, spread, time_axis, value_axis
 from robocov_app.demo.film import pixels
+from robocov_app.demo.plotted import compared
 from robocov_app.demo.scenario import Law
 
 

@@ -9,6 +9,7 @@ from PIL import Image
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov_app.plot_coverage import Moment, plot_coverage
+from robocov_app.plot_curves import DISTANCE, TIME
 from robocov_app.plots import save_figure
 from robocov_app.view.field import Field, FieldLattice
 from robocov_app.view.shading import FARTHEST, palette, round_limit
@@ -59,6 +60,21 @@ def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
         box = axes.get_window_extent()
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
+@pytest.mark.parametrize("count", [1, 3])
+def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
+    figure = plot_coverage(
+        curves(count), [moment_of(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
+    )
+    labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+    assert labels == [DISTANCE, TIME]
+    extents = written(figure)
+    for k, box in enumerate(extents):
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1
+        for other in extents[:k]:
+            assert not overlap(box, other)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)

@@ -17,12 +17,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
+from robocov.metrics import CostHistory
 from robocov_app.recording import (
     frame_rows,
     iter_frames,
     png_bytes,
     save_film,
     save_frames,
+    told_costs,
 )
 
 
@@ -93,6 +95,14 @@ class TestFrames:
         assert known == shown([0.9], [2.0])
         assert known != shown([0.9], [3.0])
         assert shown([1.5], [1.0]) == shown([], []) == shown([0.0], [np.nan])
+
+    def test_the_mean_time_is_told_with_it(self):
+        record = run_of(SQUARE, 3, steps=21)
+        options = {"size": (480, 240), "rows": np.array([10]), "show": ["status"]}
+        time, mean = np.array([0.0]), np.array([3.0])
+        histories = [CostHistory(time, mean, mean, mean, other) for other in (None, mean, 2.0 * mean)]
+        frames = [next(iter_frames(record, cost=told_costs(each), **options)).tobytes() for each in histories]
+        assert len(set(frames)) == 3
 
     def test_options_are_checked(self):
         record = run_of(SQUARE, 3, steps=5)

@@ -94,6 +94,15 @@ def test_every_run_has_a_row_as_long_as_they_are_few() -> None:
     assert runs_table(many, styles(many)) is None
 
 
+def test_the_mean_time_is_told_where_it_is_known() -> None:
+    result = result_of([entry(seed=k, mean_time_s=2.0 + k) for k in range(3)])
+    (summary,), runs = summary_tables(result, styles(result)), runs_table(result, styles(result))
+    assert column(summary, "Mean time, s") == ["3.000 (2.500–3.500)"]
+    assert runs is not None and column(runs, "Mean time, s") == ["2.000", "3.000", "4.000"]
+    without = result_of(FIVE)
+    assert "Mean time, s" not in summary_tables(without, styles(without))[0].head
+
+
 def test_gains_are_told_by_set_or_between_which_values_they_are() -> None:
     few = result_of([entry(gains=(("k_rep", 0.3),)), entry(gains=(("k_rep", 1.0),))], units={"k_rep": "N m³"})
     table = controllers_table(few, styles(few))

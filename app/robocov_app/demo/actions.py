@@ -119,6 +119,7 @@ _OTHERS = (
     Action("pan:up", "Pan up", "View", ("ctrl+up",)),
     Action("pan:down", "Pan down", "View", ("ctrl+down",)),
     Action("theme", "Light or dark", "View", ("t",)),
+    Action("plot", "Plot mean distance or mean time", "View", ("y",)),
     Action("fade", "Trajectories fade", "View", ("shift+t",)),
     Action("panel", "Hide or show the panel", "View", ("h",)),
     Action("tab", "Next page of the panel", "View", ("ctrl+tab",)),

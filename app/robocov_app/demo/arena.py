@@ -16,7 +16,7 @@ from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.furniture import Status, legend_rows, legend_strip
 from robocov_app.view.layers import drawn_radii
-from robocov_app.view.phi import mean_words
+from robocov_app.view.phi import cost_words, mean_words
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.scene import Scene
 from robocov_app.view.shading import round_limit
@@ -201,7 +201,7 @@ class Arena:
         number = desk.selected
         selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
         what = mean_words(circumstances.environment)
-        cost = "" if known is None else f"{what} {known.result.mean_distance:.3f} m"
+        cost = "" if known is None else cost_words(what, known.result.mean_distance, known.travel_time)
         starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
         scene = Scene.of(
             circumstances.environment.at(snapshot.time),

@@ -10,6 +10,7 @@ import pygame
 
 from robocov_app.demo.layout import inside
 from robocov_app.demo.overlays import tag
+from robocov_app.demo.plotted import DISTANCE, TIME, chosen, compared, curve_of
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera, round_length
 from robocov_app.view.canvas import Canvas
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from robocov_app.demo.curves import Event
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.lane import Lane
-    from robocov_app.demo.layout import Layout
-    from robocov_app.demo.session import Session
+    from robocov_app.demo.layout import Box, Layout
+    from robocov_app.demo.plotted import Plotted
     from robocov_app.view.theme import Colour, Theme
 
 LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20
@@ -88,6 +89,8 @@ class Chart:
         self._key: object = None
         self._samples: object = None
         self._drawn_at = -1.0
+        self._wanted = DISTANCE
+        self._other: Box | None = None
         self.hover: tuple[int, int] | None = None
         """Where the cursor is in the window."""
 
@@ -95,6 +98,25 @@ class Chart:
         """Take another layout and theme."""
         self.layout, self.theme = layout, theme
         self._page = None
+
+    # what is plotted
+
+    @property
+    def plotted(self) -> Plotted:
+        """What is plotted now."""
+        return chosen(self.desk.session, self._wanted)
+
+    def switch(self) -> str:
+        """Plot the other quantity, if there are two."""
+        wanted = TIME if self.plotted is DISTANCE else DISTANCE
+        if wanted is TIME and chosen(self.desk.session, TIME) is not TIME:
+            return "all robots are equally fast: the mean time goes as the mean distance"
+        self._wanted, self._page = wanted, None
+        return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
+
+    def offers(self, at: tuple[int, int]) -> bool:
+        """Return whether the name of the other quantity is at a pixel of the window."""
+        return self._other is not None and inside(self._other, at)
 
     # where time is
 
@@ -124,10 +146,17 @@ class Chart:
     def draw(self, screen: pygame.Surface) -> None:
         """Draw both."""
         session = self.desk.session
-        samples = [(len(lane.curve), lane.curve.last_time, lane.curve.at(np.inf)) for lane in session.lanes]
+        curves = [curve_of(lane, self.plotted) for lane in session.lanes]
+        samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
         rest = (
             *(tuple(lane.number for lane in session.lanes), len(session.events), len(session.ghosts)),
-            *(self._span, self.desk.costs.state, None if session.live else session.time, session.serial),
+            *(
+                self._span,
+                self.plotted,
+                self.desk.costs.state,
+                None if session.live else session.time,
+                session.serial,
+            ),
         )
         # curves grow sixty times a second, which nobody sees
         old = self.desk.now - self._drawn_at >= REFRESHED
@@ -149,11 +178,14 @@ class Chart:
         height = self.layout.chart[3]
         top, bottom = TOP * scale, height - BOTTOM * scale
         weighed = ", weighed by φ" if density_words(session.environment) else ""
-        title = f"Mean distance to the nearest robot{weighed}, m"
+        what = self.plotted
+        title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
+        self._offer(canvas, 12 * scale + canvas.text_width(title, bold=True))
         if self.desk.costs.state:
             canvas.text(self.desk.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
-        values = [lane.curve.value for lane in session.lanes] + [ghost.value for ghost in session.ghosts]
+        ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
+        values = [curve_of(lane, what).value for lane in session.lanes] + [ghost.value for ghost in ghosts]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
@@ -188,7 +220,7 @@ class Chart:
                 mix(theme.panel, theme.ink, 0.3), pygame.Rect(x, round(top), 1, round(bottom - top))
             )
         self._event_words(canvas, list(session.events), left, right, end, top)
-        for ghost in session.ghosts:
+        for ghost in ghosts:
             points = place(ghost.time, ghost.value)
             colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
             for k in range(len(points) - 1):
@@ -204,10 +236,23 @@ class Chart:
                     size=theme.small_text,
                 )
         for lane in session.lanes:
-            points = place(lane.curve.time, lane.curve.value)
+            curve = curve_of(lane, what)
+            points = place(curve.time, curve.value)
             if len(points) > 1:
                 self._curve(canvas, _thinned(points), self._colour(lane))
         self._values(canvas, place)
+
+    def _offer(self, canvas: Canvas, left: float) -> None:
+        """Name the other quantity beside the title, where there are two: a click plots it."""
+        self._other = None
+        if chosen(self.desk.session, TIME) is DISTANCE:
+            return
+        scale, words = self.layout.scale, (DISTANCE if self.plotted is TIME else TIME).short
+        left, small = left + 16 * scale, self.theme.small_text
+        canvas.text(f"{words} ›", (left, 0.5 * TOP * scale), colour=self.theme.faint, size=small)
+        x, y, _, _ = self.layout.chart
+        wide = canvas.text_width(f"{words} ›", small)
+        self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
 
     def _curve(self, canvas: Canvas, points: Array, colour: Colour) -> None:
         width = canvas.width(1.8)
@@ -239,7 +284,7 @@ class Chart:
         """Write each pane's value at the right, with the gap to the best; none over another."""
         session, theme, scale = self.desk.session, self.theme, self.layout.scale
         _, right, _ = self._span
-        time, known = compared(session)
+        time, known = compared(session, self.plotted)
         if not known:
             return
         best = min(known.values())
@@ -322,8 +367,9 @@ class Chart:
         if near:
             words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
         else:
-            values = [(lane.law.label, lane.curve.at(time)) for lane in session.lanes]
-            known = [f"{name} {value:.3f} m" for name, value in values if np.isfinite(value)]
+            what = self.plotted
+            values = [(lane.law.label, curve_of(lane, what).at(time)) for lane in session.lanes]
+            known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
         _, top, _, height = self.layout.chart
         x = round(self.column(time))
@@ -335,17 +381,6 @@ class Chart:
 
     def _colour(self, lane: Lane) -> Colour:
         return curve_colour(self.desk, self.theme, lane)
-
-
-def compared(session: Session) -> tuple[float, dict[int, float]]:
-    """Return the costs of the panes, m by number, and the newest time not after now for which all are known.
-
-    They come in one after the other; a pane without any yet is left out.
-    """
-    lanes = [lane for lane in session.lanes if len(lane.curve)]
-    time = min([session.time, *(lane.curve.last_time for lane in lanes)])
-    values = {lane.number: lane.curve.at(time) for lane in lanes}
-    return time, {number: value for number, value in values.items() if np.isfinite(value)}
 
 
 def curve_colour(desk: Desk, theme: Theme, lane: Lane) -> Colour:

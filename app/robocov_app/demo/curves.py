@@ -32,7 +32,7 @@ class Event:
 
 
 class Curve:
-    """The mean distance to the nearest robot, (22) by area or by ∫φ, at ascending times."""
+    """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
 
     def __init__(self) -> None:
         self._time: list[float] = []
@@ -48,7 +48,7 @@ class Curve:
 
     @property
     def value(self) -> Array:
-        """Mean distances, (k,) m."""
+        """Mean distances, (k,) m, or times, (k,) s."""
         return np.array(self._value)
 
     @property
@@ -105,10 +105,13 @@ class Ghost:
     words : str
         What was different then.
     time : (k,) s
-    value : (k,) m
+    value : (k,) m or s
+    of : str
+        What the value is: "distance" or "time".
     """
 
     law: str
     words: str
     time: Array
     value: Array
+    of: str = "distance"

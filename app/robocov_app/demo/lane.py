@@ -11,8 +11,9 @@ from robocov.controllers import remembers
 from robocov.errors import StartError
 from robocov.relocation import relocated
 from robocov.simulation import Simulation
-from robocov_app.demo.curves import Curve
+from robocov_app.demo.curves import Curve, Ghost
 from robocov_app.demo.history import Circumstances, State
+from robocov_app.demo.scenario import branch_words
 from robocov_app.demo.trail import Trail
 from robocov_app.view.sensed import Sensed
 
@@ -82,7 +83,7 @@ class Lane:
         self.starts = np.array(positions, dtype=float)
         self.trail = Trail(len(positions))
         self.trail.add(time, self.simulation.positions)
-        self.curve = Curve()
+        self.curve, self.times = Curve(), Curve()
         self.sensed = Sensed()
         self._steps = 0
 
@@ -123,6 +124,13 @@ class Lane:
         self._steps += 1
         self.simulation.step(pushes)
         self.trail.add(self.time, self.simulation.positions)
+
+    def leave(self, time: float) -> list[Ghost]:
+        """Cut the curves at a time, s; return what came after it, where there is more than a moment."""
+        self.curve, self.times = self.curve.copy(), self.times.copy()
+        rests = (("distance", self.curve.cut(time)), ("time", self.times.cut(time)))
+        words = branch_words(self.law)
+        return [Ghost(self.law.name, words, rest.time, rest.value, of) for of, rest in rests if len(rest) > 1]
 
     def state(self) -> State:
         """Return what is needed to go on from here."""

@@ -76,7 +76,8 @@ class Pointer(Mouse):
         elif pane is not None and desk.tool is not desk.hand:
             shape = pygame.SYSTEM_CURSOR_CROSSHAIR
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
-            shape = pygame.SYSTEM_CURSOR_SIZEWE
+            offered = self._chart.offers(self.at)
+            shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
         self._show_cursor(shape)
 
     def leave(self) -> None:
@@ -91,7 +92,9 @@ class Pointer(Mouse):
         pane = self._arena.pane_at(event.pos)
         self._pressed_at, self._button = event.pos, event.button
         if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
-            if event.button == 1:
+            if event.button == 1 and self._chart.offers(event.pos):
+                desk.attempt(self._chart.switch)
+            elif event.button == 1:
                 self._interrupt()
                 self._drag = "time"
                 desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))

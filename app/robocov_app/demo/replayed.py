@@ -304,6 +304,9 @@ def _put(lane: Lane, saved: Saved, history: History) -> None:
     if saved.history is not None:
         for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
             lane.curve.add(float(time), float(value))
+        if saved.history.mean_time is not None:
+            for time, value in zip(saved.history.time, saved.history.mean_time, strict=True):
+                lane.times.add(float(time), float(value))
 
 
 def _events_of(record: Record) -> list[Event]:

@@ -16,7 +16,6 @@ from robocov_app.demo.curves import Event, Ghost
 from robocov_app.demo.history import Circumstances, History, Moment
 from robocov_app.demo.lane import Lane, resumed
 from robocov_app.demo.past import Past
-from robocov_app.demo.scenario import branch_words
 from robocov_app.demo.trail import starts_of, trail_of
 from robocov_app.demo.undo import Undo
 
@@ -338,10 +337,7 @@ class Timeline:
         ghosts = list(self.ghosts)
         for lane, simulation in zip(self.lanes, simulations, strict=True):
             starts, trail = starts_of(self.history, lane.number, k), trail_of(self.history, lane.number, k)
-            lane.curve = lane.curve.copy()
-            rest = lane.curve.cut(time)
-            if len(rest) > 1:
-                ghosts.append(Ghost(lane.law.name, branch_words(lane.law), rest.time, rest.value))
+            ghosts += lane.leave(time)
             lane.resume(moment.states[lane.number], simulation, starts, trail)
         self.ghosts = deque(ghosts, maxlen=MOST_GHOSTS)
         self.history = self.history.until(k)

@@ -22,6 +22,7 @@ from robocov_app.demo.keyboard import Keyboard
 from robocov_app.demo.layout import inside, laid_out
 from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.demo.panel import TABS, Panel
+from robocov_app.demo.plotted import speeds_of
 from robocov_app.demo.pointer import Pointer
 from robocov_app.demo.report_page import ReportPage
 from robocov_app.demo.screen import shown, undisturbed
@@ -204,11 +205,13 @@ class Window:
                 and np.array_equal(known.result.positions, positions)
             ):
                 continue
-            desk.costs.ask(lane.number, session.time, positions, point)
+            desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
         for pane, known in desk.costs.poll():
             for lane in session.lanes:
                 if lane.number == pane and known.time <= lane.time + 1e-9:
                     lane.curve.add(known.time, known.result.mean_distance)
+                    if known.travel_time is not None:
+                        lane.times.add(known.time, known.travel_time)
 
     def _arrange(self) -> None:
         """Lay the window out anew when its size, look or number of panes is another."""
@@ -309,6 +312,7 @@ class Window:
             "pan:right": lambda: self.arena.pan(-_PAN, 0),
             "pan:up": lambda: self.arena.pan(0, _PAN),
             "pan:down": lambda: self.arena.pan(0, -_PAN),
+            "plot": self.chart.switch,
             "tab": self._next_tab,
             "fullscreen": self._fullscreen,
             "screenshot": self.screenshot,

@@ -149,6 +149,9 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
         text += (
             f" The mean distance to the nearest robot{weighed} {word} from {first:.3f} m to {final:.3f} m."
         )
+        if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
+            first, final = history.mean_time[[0, -1]]
+            text += f" The mean time until the first is there goes from {first:.3f} s to {final:.3f} s."
     return text
 
 

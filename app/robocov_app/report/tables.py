@@ -171,6 +171,7 @@ def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
     if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
         return None  # too many, or the summary tells all of them
     labels = {entry: group for group in variants(result) for entry in group.entries}
+    timed = any(_known(entry, TIME) for entry in result.fine)
     rows = []
     for entry in result.fine:
         figures = entry.figures
@@ -187,10 +188,12 @@ def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
                 Cell(_decimals(figures.get("min_clearance_m"), 3)),
                 Cell(_decimals(figures.get("path_length_m"), 2)),
                 Cell(_decimals(figures.get("stuck_robots"), 0)),
+                *([Cell(_decimals(figures.get(TIME), 3))] if timed else []),
             )
         )
     head = ("Controller", "Map", "Start", "Seed", *_HEAD[2:4], "Settled at, s", "Contacts", *_HEAD[7:])
-    return Table("Every run", head, rows, frozenset({1, 2}))
+    whole = (*head, "Mean time, s") if timed else head
+    return Table("Every run", whole, rows, frozenset({1, 2}))
 
 
 def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:

@@ -97,3 +97,19 @@ def range_words(span: tuple[float, float]) -> str:
 def mean_words(environment: Environment) -> str:
     """Return what the mean distance to the nearest robot is called, whether weighed or not."""
     return "mean distance by φ" if density_words(environment) else "mean distance"
+
+
+def cost_words(what: str, mean_distance: float, mean_time: float | None = None) -> str:
+    """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
+
+    What is not finite is left out: a team of which no robot works covers nothing.
+
+    >>> cost_words("mean distance", 1.25), cost_words("mean distance by φ", 1.25, 3.0)
+    ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
+    """
+    known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
+    return ", ".join(
+        f"{words} {value:.3f} {unit}"
+        for words, value, unit in known
+        if value is not None and np.isfinite(value)
+    )
