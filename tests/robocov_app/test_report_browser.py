@@ -17,8 +17,13 @@ import pytest
 from drawn_run import ROOMS
 from reported_results import HOSTILE, entry, falling, walk, watched
 
+from robocov.conditions import Conditions
+from robocov.environment import CircleObstacle
+from robocov.obstacle_path import ObstaclePath
 from robocov.voronoi import partition
+from robocov_app.plot_curves import curve_styles
 from robocov_app.report.document import report
+from robocov_app.report.embedding import embedded_map, embedded_run
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.view.theme import DARK, LIGHT
 
@@ -491,6 +496,41 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
         x, y = np.array(cell).reshape(-1, 2).T
         area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         assert area == pytest.approx(mass, rel=1e-9)
+
+
+@pytest.mark.parametrize("repeat", ["loop", "back-and-forth"])
+def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
+    path = ObstaclePath(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0)), 0.7, repeat)
+    cart = CircleObstacle((1.0, 1.0), 0.3, path=path)
+    (mover,) = embedded_map(replace(ROOMS, obstacles=(cart,)))["movers"]
+    mover["line"] = [0.001 * value for value in mover["line"]]
+    for seconds in (0.0, 1.0, 4.5, 7.3, 20.0, 1234.5):
+        shift = browser.js(asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
+        assert shift == pytest.approx(path.shift(seconds).tolist(), abs=1e-6)
+
+
+def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_on(browser, tmp_path) -> None:
+    record = replace(walk(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
+    page = tmp_path / "replay.html"
+    run = ReplayRun(record, falling(record, 2.0), "a run")
+    page.write_text(replay_html([run], standalone=True), encoding="utf-8")
+    browser.open(page)
+    browser.until(lambda: browser.all(".chart"))
+    notes = []
+    for seconds in (1.0, 3.0, 5.0):
+        browser.seek(seconds)
+        notes.append(browser.find(".facts").text.partition(" m ")[2])
+    assert notes == ["mean distance", "mean distance, robot 2 failed", "mean distance, robot 2 failed"]
+    script = (
+        asset("data.js")
+        + "const [data, times] = arguments; const run = new Run(data, new Plan(data.plan, () => {}));"
+        + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
+    )
+    data = embedded_run(run, 0, curve_styles(["rapf"])["rapf"], 5.0, goals=True)
+    states, said = browser.js(script, {**data, "plan": embedded_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
+    assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
+    assert said == ["robot 2 fails", "robot 3 joins"]
+    assert browser.complaints() == []
 
 
 def test_labels_of_curves_do_not_overlap(browser) -> None:

@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reported_results import HOSTILE, falling, walk
 
-from robocov.environment import Environment
+from robocov.conditions import Conditions
+from robocov.environment import Environment, PolygonObstacle
+from robocov.obstacle_path import ObstaclePath
 from robocov_app.plot_curves import curve_styles
 from robocov_app.report.embedding import (
     NONE,
@@ -24,6 +26,7 @@ from robocov_app.report.embedding import (
     embedded_run,
     even_times,
     has_path,
+    lives,
     quantised,
     script_json,
 )
@@ -134,6 +137,33 @@ def test_goals_that_come_and_go_are_none_where_they_are_not() -> None:
     data = embedded_run(run, 0, STYLE, RATE, goals=True)
     gone = np.isnan(places_of(data, record, "goals")).all(axis=(1, 2))
     assert gone.tolist() == [k < 10 for k in range(data["count"])]
+
+
+def test_it_is_told_when_robots_are_there_and_when_they_fail() -> None:
+    run = run_of()
+    assert "lives" not in embedded_run(run, 0, STYLE, 5.0, goals=True)
+    bad = Conditions(failures=((2, 2.0), (4, 5.0)), joins=((3, 1.5), (4, 3.0)))
+    record = replace(run.record, conditions=bad)
+    assert lives(record) == [(0.0, None), (0.0, 2.0), (1.5, None), (3.0, 5.0)]
+    assert embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)["lives"] == lives(record)
+    # who never comes is there after the end
+    late = replace(run.record, conditions=Conditions(joins=((1, 99.0),)))
+    assert lives(late)[0] == (7.0, None)
+
+
+def test_obstacles_that_move_are_apart_from_those_that_stand() -> None:
+    path = ObstaclePath(((2.0, 3.0), (4.0, 3.0), (4.0, 5.0)), 0.5, "back-and-forth")
+    cart = PolygonObstacle(((1.5, 2.5), (2.5, 2.5), (2.5, 3.5)), path=path)
+    environment = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
+    data = embedded_map(environment)
+    assert data["blocked"] == embedded_map(ROOMS)["blocked"]
+    assert "movers" not in embedded_map(ROOMS)
+    (mover,) = data["movers"]
+    assert (np.array(mover["line"]) * data["unit"]).tolist() == [2, 3, 4, 3, 4, 5, 4, 3, 2, 3]
+    assert mover["speed"] == 0.5
+    (ring,) = mover["rings"]
+    corners = {tuple(corner) for corner in (np.array(ring).reshape(-1, 2) * data["unit"]).tolist()}
+    assert corners == set(cart.vertices)
 
 
 def test_a_run_of_a_single_moment() -> None:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from reported_results import HOSTILE, falling, walk
 
+from robocov.conditions import Conditions
 from robocov_app.report.pictures import MOST_ROBOTS, Frame, _path, map_picture, run_picture
 
 
@@ -34,6 +35,19 @@ def test_relative_steps_of_a_path_add_up(points) -> None:
     walked = np.cumsum(numbers.reshape(-1, 2), axis=0)
     assert np.abs(walked[0] - points[0]).max() <= 0.051
     assert np.abs(walked[-1] - points[-1]).max() <= 0.051 + 1e-6
+
+
+def test_who_failed_is_crossed_out_and_who_never_joined_is_not_there() -> None:
+    record = walk(robots=5)
+    bad = Conditions(failures=((2, 2.0),), joins=((4, 3.0), (5, 99.0)))
+    picture = run_picture(replace(record, conditions=bad), None, numbers=True)
+    root = drawn(picture)
+    assert [each.text for each in root.iter() if each.tag.endswith("text")] == ["1", "3", "4"]
+    assert len(of_class(root, "robot")) == 3
+    assert [each.tag.rpartition("}")[2] for each in of_class(root, "failed")] == ["circle", "path"]
+    assert len(of_class(root, "start")) == 4
+    assert "Robot 2 fails at 2.0 s, robot 4 joins at 3.0 s." in picture
+    assert "fails" not in run_picture(record, None)
 
 
 def test_a_run_has_its_robots_where_they_ended() -> None:

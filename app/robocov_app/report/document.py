@@ -13,7 +13,7 @@ from robocov import __version__
 from robocov.errors import ParameterError, counted
 from robocov_app.report.choosing import MOST_RUNS, chosen
 from robocov_app.report.dependence_plots import dependence_plots
-from robocov_app.report.embedding import BUDGET, ReplayRun, has_path
+from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
 from robocov_app.report.facts import (
     facts,
     gaps,
@@ -166,6 +166,12 @@ def _section(result: Result, key: str, budget: int, tell: Callable[[int], None])
         "several": several,
         "choice": choice.words if len(replayed) > 1 else "",
         "sparse": any(not has_path(run.record) for run in replayed),
+        "changing": any(
+            failed is not None
+            for run in replayed
+            if run.record.conditions is not None
+            for _, failed in lives(run.record)
+        ),
         "thumbnails": [
             {
                 "title": run.title,

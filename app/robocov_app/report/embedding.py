@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from robocov.arrays import Array
-    from robocov.environment import Environment
+    from robocov.environment import Environment, Obstacle
     from robocov.metrics import CostHistory
     from robocov.record import Record
     from robocov_app.plot_curves import CurveStyle
@@ -97,17 +97,19 @@ def has_path(record: Record) -> bool:
 def embedded_map(environment: Environment) -> dict[str, Any]:
     """Return a map: ``region`` ring, ``blocked`` list of polygons (lists of rings), flat rings of x, y.
 
-    Where not every place counts the same there is also the address of a picture of the ``density``.
+    Where not every place counts the same there is also the address of a picture of the ``density``. Obstacles
+    that move are apart, in ``movers``: each with its rings, the line of one turn and its speed in m/s.
 
     Coordinates are whole numbers of ``unit`` metres, a millimetre or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
     unit = 10.0 ** min(-3, math.floor(math.log10(extent)) - 3)
-    blocked = environment.blocked
+    blocked = environment.standing.blocked
     if shapely.get_num_coordinates(blocked) > _VERTICES:
         blocked = shapely.simplify(blocked, extent / 2000)
     parts = [part for part in shapely.get_parts(blocked) if not part.is_empty]
+    movers = [_mover(shape, unit) for shape in environment.obstacles if shape.path is not None]
     return {
         "name": environment.name,
         "unit": unit,
@@ -118,7 +120,37 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
             [_whole(np.asarray(ring.coords)[:-1], unit) for ring in (part.exterior, *part.interiors)]
             for part in parts
         ],
+        **({"movers": movers} if movers else {}),
     }
+
+
+def _mover(shape: Obstacle, unit: float) -> dict[str, Any]:
+    path, outline = shape.path, shape.polygon
+    assert path is not None
+    back = path.points[:1] if path.repeat == "loop" else path.points[-2::-1]
+    return {
+        "rings": [
+            _whole(np.asarray(ring.coords)[:-1], unit)
+            for part in shapely.get_parts(outline)
+            for ring in (part.exterior, *part.interiors)
+        ],
+        "line": _whole(np.array([*path.points, *back]), unit),
+        "speed": path.speed,
+    }
+
+
+def lives(record: Record) -> list[tuple[float, float | None]]:
+    """Return of each robot when it is there first and when it fails, s from the begin; None for never.
+
+    A robot that never joins is there after the end.
+    """
+    since = record.time - record.time[0]
+    found: list[tuple[float, float | None]] = []
+    for present, working in zip(record.present.T, record.working.T, strict=True):
+        begins, failed = np.flatnonzero(present), np.flatnonzero(present & ~working)
+        begin = float(since[begins[0]]) if len(begins) else float(since[-1]) + 1.0
+        found.append((begin, float(since[failed[0]]) if len(failed) else None))
+    return found
 
 
 def embedded_run(
@@ -142,6 +174,7 @@ def embedded_run(
     times = even_times(end - begin, rate) if has_path(record) else np.unique([0.0, end - begin])
     wanted = goals and bool(np.isfinite(record.goals).any())
     radius = record.team.radius.tolist()
+    life = lives(record) if record.conditions is not None else []
     return {
         "title": run.title,
         "facts": run.facts,
@@ -153,6 +186,8 @@ def embedded_run(
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
         "numbers": list(roster_of(record).numbers),
+        **({"begin": begin} if begin and record.environment.moves else {}),
+        **({"lives": life} if any(each != (0.0, None) for each in life) else {}),
         "path": has_path(record),
         "step": 1.0 / rate if has_path(record) else max(end - begin, 1e-9),
         "end": end - begin,

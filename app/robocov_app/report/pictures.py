@@ -13,7 +13,7 @@ import shapely
 
 from robocov.weighted_cells import outlines_of
 from robocov_app.report.density_picture import density_picture
-from robocov_app.report.embedding import has_path
+from robocov_app.report.embedding import has_path, lives
 from robocov_app.saved import roster_of
 from robocov_app.view.phi import density_words
 from robocov_app.view.spacing import fitted_radii, mark_size
@@ -102,14 +102,24 @@ def run_picture(
     parts.append(_map_shapes(record.environment.at(float(record.time[-1])), frame))
     tracks = np.moveaxis(frame.at(record.positions), 1, 0)
     if has_path(record) and n <= MOST_ROBOTS:
-        lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in tracks if len(track) > 1]
+        # before it joins, a robot goes nowhere
+        began = np.argmax(record.present, axis=0).tolist()
+        there = [track[first:] for track, first in zip(tracks, began, strict=True)]
+        lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in there if len(track) > 1]
         parts.append(f'<path class="way" d="{_path([np.asarray(line.coords) for line in lines])}"/>')
-    starts, ends = frame.at(record.positions[0]), frame.at(last)
+    joined = record.present.any(axis=0)
+    began = np.argmax(record.present, axis=0)[joined]
+    starts, ends = frame.at(record.positions[began, np.flatnonzero(joined)]), frame.at(last)
     ring = mark_size(starts, 2.4, 5.0) / 2
     parts += [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}"/>' for x, y in starts]
     most = 9.0 if numbers else 4.5
     radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, most)
-    for number, (x, y), r in zip(roster_of(record).numbers, ends, radii, strict=True):
+    present, failed = record.present[-1], record.present[-1] & ~record.working[-1]
+    for row, (number, (x, y), r) in enumerate(zip(roster_of(record).numbers, ends, radii, strict=True)):
+        if failed[row]:
+            parts.append(_wreck(x, y, r))
+        if failed[row] or not present[row]:
+            continue
         parts.append(f'<circle class="robot" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>')
         size = r * (1.35, 1.15, 0.9, 0.7)[min(len(str(number)), 4) - 1]
         if numbers and size >= 6.0:
@@ -117,6 +127,27 @@ def run_picture(
                 f'<text x="{x:.1f}" y="{y + 0.36 * size:.1f}" font-size="{size:.1f}">{number}</text>'
             )
     return _svg(frame, "".join(parts), None if hidden else run_sentence(record, history))
+
+
+def _wreck(x: float, y: float, radius: float) -> str:
+    """Return a robot that has failed, crossed out."""
+    arm = 0.62 * radius
+    cross = "".join(f"M{x - arm:.1f} {y - s * arm:.1f}L{x + arm:.1f} {y + s * arm:.1f}" for s in (1, -1))
+    disc = f'<circle class="failed" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>'
+    return f'{disc}<path class="failed" d="{cross}"/>'
+
+
+def changes_sentence(record: Record) -> str:
+    """Return when robots joined and failed, in words; empty where all were there and worked."""
+    numbers, end = roster_of(record).numbers, float(record.time[-1] - record.time[0])
+    words = []
+    for number, (begin, failed) in zip(numbers, lives(record), strict=True):
+        if 0.0 < begin <= end:
+            words.append((begin, f"robot {number} joins at {begin:.1f} s"))
+        if failed is not None:
+            words.append((failed, f"robot {number} fails at {failed:.1f} s"))
+    text = ", ".join(said for _, said in sorted(words))
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def map_sentence(environment: Environment) -> str:
@@ -142,6 +173,8 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
         f"{record.label} on map {record.environment.name}: trajectories of {n} robot{'s' if n > 1 else ''}"
         f"{start} over {span:.4g} s."
     )
+    if record.conditions is not None and (changes := changes_sentence(record)):
+        text += f" {changes}"
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
         first, final = history.mean_distance[[0, -1]]
         word = "falls" if final < first else "goes"

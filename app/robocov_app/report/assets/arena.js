@@ -88,11 +88,11 @@ function traced(frame, rings) {
 }
 
 /** Radii in pixels: readable where there is room, in a crowd down to true size. */
-function drawnRadii(run, places, frame, most) {
+function drawnRadii(run, places, states, frame, most) {
   return run.radii.map((radius, i) => {
     let nearest = Infinity;
     for (let j = 0; j < run.robots; j += 1) {
-      if (j === i) continue;
+      if (j === i || states[j] === AWAY) continue;
       nearest = Math.min(nearest, Math.hypot(places[2 * i] - places[2 * j], places[2 * i + 1] - places[2 * j + 1]));
     }
     return Math.max(radius * frame.zoom, Math.min(Math.max((nearest * frame.zoom) / 2, 2.3), most));
@@ -104,12 +104,12 @@ function drawArena(canvas, run, time, look, show) {
   const context = prepared(canvas);
   if (!context) return;
   const frame = frameOf(run.plan, canvas.clientWidth, canvas.clientHeight);
-  const places = run.placesAt(time);
+  const [places, states] = [run.placesAt(time), run.statesAt(time)];
   const region = traced(frame, [run.plan.region]);
   context.lineJoin = "round";
   context.fillStyle = look.background;
   context.fill(region);
-  if (show.cells && run.robots <= MOST_CELLS) drawCells(context, run, places, frame, look);
+  if (show.cells && run.robots <= MOST_CELLS) drawCells(context, run, places, states, frame, look);
   const { density, left, high, width, height } = run.plan;
   if (density?.complete) {
     context.drawImage(density, frame.x(left), frame.y(high), width * frame.zoom, height * frame.zoom);
@@ -122,24 +122,40 @@ function drawArena(canvas, run, time, look, show) {
     context.fill(path, "evenodd");
     context.stroke(path);
   }
+  drawMovers(context, run, time, frame, region);
   context.lineWidth = 2;
   context.strokeStyle = look.boundary;
   context.stroke(region);
   if (show.trajectories && run.path) drawTrajectories(context, run, time, places, frame, look);
-  drawStarts(context, run, frame, look);
-  const radii = drawnRadii(run, places, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
+  drawStarts(context, run, states, frame, look);
+  const radii = drawnRadii(run, places, states, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
   if (show.goals && run.goals) drawGoals(context, run.placesAt(time, run.goals), places, radii, frame, look);
-  drawRobots(context, run, places, radii, frame, look);
+  drawFailed(context, run, places, states, radii, frame, look);
+  drawRobots(context, run, places, states, radii, frame, look);
+}
+
+/** Obstacles that move, where they are; what sticks out of the region is not seen. */
+function drawMovers(context, run, time, frame, region) {
+  if (!run.plan.movers.length) return;
+  context.save();
+  context.clip(region);
+  for (const mover of run.plan.movers) {
+    const [dx, dy] = shiftOf(mover, (run.begin ?? 0) + Math.min(time, run.end));
+    const path = traced(frame, mover.rings.map((ring) => ring.map((value, k) => value + (k % 2 ? dy : dx))));
+    context.fill(path, "evenodd");
+    context.stroke(path);
+  }
+  context.restore();
 }
 
 /** Cells by travel time: those of fast robots first, for those of slow ones are holes in them. */
-function drawTimedCells(context, run, places, frame, hues, look) {
+function drawTimedCells(context, run, places, states, frame, hues, look) {
   const { speeds } = run;
-  for (const i of [...speeds.keys()].sort((a, b) => speeds[b] - speeds[a])) {
-    const equal = traced(frame, [cellOf(run.plan.region, places, i, (j) => speeds[j] === speeds[i])]);
+  for (const i of [...speeds.keys()].filter((k) => states[k] === WORKS).sort((a, b) => speeds[b] - speeds[a])) {
+    const equal = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS && speeds[j] === speeds[i])]);
     const circles = [];
     for (let j = 0; j < run.robots; j += 1) {
-      if (speeds[j] <= speeds[i]) continue;
+      if (states[j] !== WORKS || speeds[j] <= speeds[i]) continue;
       // of Apollonius, around the slower one
       const part = (speeds[i] / speeds[j]) ** 2 / (1 - (speeds[i] / speeds[j]) ** 2);
       const [dx, dy] = [places[2 * j] - places[2 * i], places[2 * j + 1] - places[2 * i + 1]];
@@ -159,16 +175,17 @@ function drawTimedCells(context, run, places, frame, hues, look) {
   }
 }
 
-function drawCells(context, run, places, frame, look) {
+function drawCells(context, run, places, states, frame, look) {
   const hues = run.robots <= ONE_HUE_EACH ? ONE_HUE_EACH : MAP_COLOURS;
   context.lineWidth = 1;
   context.strokeStyle = look["cell-edge"];
   if (run.speeds) {
-    drawTimedCells(context, run, places, frame, hues, look);
+    drawTimedCells(context, run, places, states, frame, hues, look);
     return;
   }
   for (let i = 0; i < run.robots; i += 1) {
-    const path = traced(frame, [cellOf(run.plan.region, places, i)]);
+    if (states[i] !== WORKS) continue;
+    const path = traced(frame, [cellOf(run.plan.region, places, i, (j) => states[j] === WORKS)]);
     context.fillStyle = look[`cell-${i % hues}`];
     context.fill(path);
     context.stroke(path);
@@ -184,21 +201,26 @@ function drawTrajectories(context, run, time, places, frame, look) {
   context.strokeStyle = look.trajectory;
   context.beginPath();
   for (let i = 0; i < run.robots; i += 1) {
-    for (let row = 0; row <= last; row += 1) {
+    const begin = run.lives[i][0];
+    if (time < begin) continue;
+    let drawn = 0;
+    for (let row = begin > 0 ? run.where.before(begin) + 1 : 0; row <= last; row += 1) {
       const x = frame.x(left + values[row * width + 2 * i] * wide);
       const y = frame.y(low + values[row * width + 2 * i + 1] * high);
-      context[row ? "lineTo" : "moveTo"](x, y);
+      context[drawn ? "lineTo" : "moveTo"](x, y);
+      drawn += 1;
     }
-    context.lineTo(frame.x(places[2 * i]), frame.y(places[2 * i + 1]));
+    context[drawn ? "lineTo" : "moveTo"](frame.x(places[2 * i]), frame.y(places[2 * i + 1]));
   }
   context.stroke();
 }
 
-function drawStarts(context, run, frame, look) {
-  const begin = run.placesAt(0);
+function drawStarts(context, run, states, frame, look) {
   context.lineWidth = 1.8;
   context.strokeStyle = look.start;
   for (let i = 0; i < run.robots; i += 1) {
+    if (states[i] === AWAY) continue;
+    const begin = run.placesAt(run.lives[i][0]);
     context.beginPath();
     context.arc(frame.x(begin[2 * i]), frame.y(begin[2 * i + 1]), 4, 0, 2 * Math.PI);
     context.stroke();
@@ -221,10 +243,40 @@ function drawGoals(context, goals, places, radii, frame, look) {
   context.stroke();
 }
 
-function drawRobots(context, run, places, radii, frame, look) {
+/** Robots that have failed: what is left of them is an obstacle, crossed out, its number beside it. */
+function drawFailed(context, run, places, states, radii, frame, look) {
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  for (let i = 0; i < run.robots; i += 1) {
+    if (states[i] !== FAILED) continue;
+    const [x, y, radius] = [frame.x(places[2 * i]), frame.y(places[2 * i + 1]), radii[i]];
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.fillStyle = look.obstacle;
+    context.fill();
+    context.lineWidth = Math.min(1.5, 0.25 * radius);
+    context.strokeStyle = look.ink;
+    context.stroke();
+    const arm = 0.62 * radius;
+    context.lineWidth = Math.min(2, 0.3 * radius);
+    context.beginPath();
+    context.moveTo(x - arm, y - arm);
+    context.lineTo(x + arm, y + arm);
+    context.moveTo(x - arm, y + arm);
+    context.lineTo(x + arm, y - arm);
+    context.stroke();
+    if (radius < 6) continue;
+    context.fillStyle = look.ink;
+    context.font = `700 11px ${FONT}`;
+    context.fillText(String(run.numbers[i]), x + radius + 3, y);
+  }
+}
+
+function drawRobots(context, run, places, states, radii, frame, look) {
   context.textAlign = "center";
   context.textBaseline = "middle";
   for (let i = 0; i < run.robots; i += 1) {
+    if (states[i] !== WORKS) continue;
     const [x, y, radius] = [frame.x(places[2 * i]), frame.y(places[2 * i + 1]), radii[i]];
     context.beginPath();
     context.arc(x, y, radius, 0, 2 * Math.PI);

@@ -67,6 +67,7 @@ function drawChart(canvas, runs, time, look) {
     if (run.cost) drawCurve(context, run, x, y, look, Math.min(runs.length - 1 - k, 3));
   });
   const drawn = runs.filter((run) => run.cost);
+  drawEvents(context, box, x, drawn, look);
   context.lineWidth = 1;
   context.strokeStyle = look.ink;
   context.beginPath();
@@ -91,6 +92,33 @@ function drawChart(canvas, runs, time, look) {
     context.fillText(cutTo(context, names[k], room) + value, box.right + 12, heights[k]);
   });
   return (pixel) => Math.min(Math.max((pixel - box.left) / (box.right - box.left), 0), 1) * end;
+}
+
+/** When robots failed (×) and joined (+): a line each, its words where there is room. */
+function drawEvents(context, box, x, runs, look) {
+  const seen = new Set();
+  const events = runs.flatMap((run) => run.events).filter(({ time, words }) => {
+    const key = `${time.toFixed(2)} ${words}`;
+    return !seen.has(key) && seen.add(key); // under the same conditions all runs have them
+  });
+  context.font = `${SMALL}px ${FONT}`;
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  let free = box.left;
+  for (const { time, words } of events.sort((a, b) => a.time - b.time)) {
+    const at = Math.round(x(time)) + 0.5;
+    context.lineWidth = 1;
+    context.strokeStyle = look.grid;
+    context.beginPath();
+    context.moveTo(at, box.top);
+    context.lineTo(at, box.bottom);
+    context.stroke();
+    const wide = context.measureText(words).width;
+    if (at < free || at + 4 + wide > box.right) continue;
+    context.fillStyle = look.faint;
+    context.fillText(words, at + 4, box.top + 3);
+    free = at + wide + 10;
+  }
 }
 
 function cutTo(context, text, room) {

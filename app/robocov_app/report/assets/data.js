@@ -53,6 +53,7 @@ class Plan {
     this.height = this.high - this.low;
     this.region = metres(data.region);
     this.blocked = data.blocked.map((rings) => rings.map(metres));
+    this.movers = (data.movers ?? []).map(({ rings, line, speed }) => ({ rings: rings.map(metres), line: metres(line), speed }));
     if (data.density) {
       this.density = new Image();
       this.density.onload = again;
@@ -61,6 +62,24 @@ class Plan {
   }
 }
 
+/** By how much an obstacle has moved after some seconds, along the line of one turn. */
+function shiftOf({ line, speed }, time) {
+  const pieces = [];
+  for (let k = 2; k < line.length; k += 2) pieces.push(Math.hypot(line[k] - line[k - 2], line[k + 1] - line[k - 1]));
+  let left = (time * speed) % pieces.reduce((sum, length) => sum + length, 0);
+  let k = 0;
+  while (k < pieces.length - 1 && left > pieces[k]) {
+    left -= pieces[k];
+    k += 1;
+  }
+  const part = pieces[k] > 0 ? left / pieces[k] : 0;
+  return [0, 1].map((axis) => line[2 * k + axis] + part * (line[2 * k + 2 + axis] - line[2 * k + axis]) - line[axis]);
+}
+
+const AWAY = 0;
+const WORKS = 1;
+const FAILED = 2;
+
 class Run {
   constructor(data, plan) {
     Object.assign(this, data, { plan, robots: data.numbers.length });
@@ -68,8 +87,21 @@ class Run {
     this.goals = data.goals && new Series(data.goals, 2 * this.robots, data.step, data.count, data.end);
     this.range = data.cost;
     this.cost = data.cost && new Series(data.cost.values, 1, data.cost.step, data.cost.count, data.end);
+    this.lives = data.lives ?? Array.from({ length: this.robots }, () => [0, null]);
+    this.events = this.lives.flatMap(([begin, end], i) => [
+      ...(begin > 0 && begin <= this.end ? [{ time: begin, words: `+ ${this.numbers[i]}`, said: `robot ${this.numbers[i]} joins` }] : []),
+      ...(end !== null ? [{ time: end, words: `× ${this.numbers[i]}`, said: `robot ${this.numbers[i]} fails` }] : []),
+    ]).sort((a, b) => a.time - b.time);
     this.speeds = data.speeds ?? null; // where cells are by time
     this.radii = Array.from({ length: this.robots }, (_, k) => (Array.isArray(data.radius) ? data.radius[k] : data.radius));
+  }
+
+  /** Whether each robot is away, as it has not joined yet, works, or has failed. */
+  statesAt(time) {
+    return this.lives.map(([begin, end]) => {
+      if (time < begin - 1e-9) return AWAY;
+      return end !== null && time >= end - 1e-9 ? FAILED : WORKS;
+    });
   }
 
   /** Places in metres, x and y in turn. Where the record tells no path, robots stay until they are there. */

@@ -288,7 +288,10 @@ class Replay {
       const cost = run.costAt(this.time);
       const ended = this.time > run.end ? `, ended at ${run.end.toFixed(1)} s` : "";
       value.textContent = Number.isFinite(cost) ? `${cost.toFixed(3)} m` : "";
-      note.textContent = Number.isFinite(cost) ? ` mean distance${ended}` : ended.slice(2);
+      const states = run.statesAt(this.time);
+      const failed = run.numbers.filter((_, i) => states[i] === FAILED);
+      const lost = failed.length ? `, ${failed.length > 6 ? `${failed.length} robots` : `robot ${failed.join(", ")}`} failed` : "";
+      note.textContent = Number.isFinite(cost) ? ` mean distance${lost}${ended}` : `${lost}${ended}`.slice(2);
     }
     this.draw();
   }
@@ -301,7 +304,8 @@ class Replay {
       const cost = run.costAt(this.time);
       const distance = Number.isFinite(cost) ? `mean distance to the nearest robot ${cost.toFixed(3)} m` : "cost not known";
       const robots = run.robots === 1 ? "1 robot" : `${run.robots} robots`;
-      canvas.setAttribute("aria-label", `${run.title}: ${robots} on map ${run.plan.name}. ${at}, ${distance}. ${run.facts}`.trim());
+      const events = run.events.map(({ time, said }) => `${said} at ${time.toFixed(1)} s`);
+      canvas.setAttribute("aria-label", `${run.title}: ${robots} on map ${run.plan.name}. ${at}, ${distance}. ${[...events, run.facts].join(". ")}`.trim());
       return `${run.label}: ${distance}`;
     });
     const curves = this.panes.filter(({ run }) => run.cost).map(({ run }) => {
