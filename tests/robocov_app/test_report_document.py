@@ -158,7 +158,7 @@ def test_several_results_are_sections_that_share_nothing() -> None:
 
 def test_what_there_is_nothing_of_has_no_section() -> None:
     headings = re.findall(r"<h2[^>]*>([^<]+)", report([replace(watched([entry()]), kind="run")]).html)
-    assert headings == ["What was run", "Results", "Replay", "Cost over time"]
+    assert headings == ["What was run", "Results", "Replay", "Cost over time", "Metrics"]
     failed = report([result_of([entry(error="it broke")])]).html
     assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["What was run", "Failures"]
     assert "it broke" in failed and "No run has a result." in failed

@@ -26,6 +26,7 @@ from robocov_app.report.facts import (
     weighed_text,
 )
 from robocov_app.report.groups import comparisons, setting_label, settings, variants
+from robocov_app.report.measure_plots import measure_plots
 from robocov_app.report.pictures import map_picture, run_picture
 from robocov_app.report.replay import MOST_PANES, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.result_plots import MOST_PANELS, Curves, cost_plots, final_plots, paired_plot, styles
@@ -157,6 +158,7 @@ def _section(result: Result, key: str, budget: int, tell: Callable[[int], None])
         "runs": runs_table(result, looks),
         "costs": costs,
         "costs_words": _costs_words(result, costs),
+        "measures": measure_plots(result, replayed, choice.entries, f"{key}m"),
         "finals": list(final_plots(result, f"{key}f")),
         "pairs": pairs_table(pairs, looks) if pairs else None,
         "pairs_plot": paired_plot(pairs, f"{key}p"),

@@ -170,7 +170,7 @@ def paired_plot(comparisons: Sequence[Comparison], key: str) -> Plot | None:
 def _band_plot(
     title: str, bands: list[Band], groups: Sequence[Group], key: str, what: str, unit: str
 ) -> Plot:
-    looks = _looks(bands, groups)
+    looks = looks_of(bands, groups)
     figures = [
         plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=looks, label=what, unit=unit)
         for size in ((PANEL,) if title else (WIDE, PANEL))
@@ -202,7 +202,7 @@ def _sample_plot(
     samples = [sample for sample in samples if len(sample.values)]
     if not samples or max(len(sample.values) for sample in samples) < 2:
         return
-    looks = _looks(samples, groups)
+    looks = looks_of(samples, groups)
     figures = [
         plot_final_costs([("", samples)], size=(width, None), scale=SCALE, styles=looks, label=what)
         for width in ((PANEL[0],) if title else (WIDE[0], PANEL[0]))
@@ -218,7 +218,7 @@ def _sample_plot(
     yield _alone(title, figures, key, sentence)
 
 
-def _looks(shown: Sequence[Band | Sample], groups: Sequence[Group]) -> list[CurveStyle]:
+def looks_of(shown: Sequence[Band | Sample], groups: Sequence[Group]) -> list[CurveStyle]:
     """Return the styles that these have among all groups, so that they are the same in all plots."""
     every = dict(
         zip([group.label for group in groups], styles_of([group.controller for group in groups]), strict=True)
