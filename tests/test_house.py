@@ -84,6 +84,7 @@ TESTED_THROUGH = {
     ),
     **dict.fromkeys("densitymodels mapfields".split(), "test_densityfile"),
     "editor_weighing": "test_editor_densities",
+    "leading": "test_editor_paths",
     "density_picture": "test_weighing",
     **dict.fromkeys("base gains individual lloyd rapf repulsion rpf".split(), "test_controllers"),
     "disc_cells": "test_range_limited",

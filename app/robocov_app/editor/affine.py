@@ -99,18 +99,21 @@ class Affine:
         """Return where an obstacle goes.
 
         Radii and the widths of walls grow with it where all lengths do; where they do not, a circle becomes
-        a polygon, and a wall keeps its width.
+        a polygon, and a wall keeps its width. The path of one that moves goes with it, its speed stays.
         """
         factor = self.factor
+        path = None if shape.path is None else replace(shape.path, points=self.ring(shape.path.points))
         if isinstance(shape, PolygonObstacle):
             holes = tuple(self.ring(hole) for hole in shape.holes)
-            return replace(shape, vertices=self.ring(shape.vertices), holes=holes)
+            return replace(shape, vertices=self.ring(shape.vertices), holes=holes, path=path)
         if isinstance(shape, WallObstacle):
-            return replace(shape, points=self.ring(shape.points), width=_times(shape.width, factor or 1.0))
+            width = _times(shape.width, factor or 1.0)
+            return replace(shape, points=self.ring(shape.points), width=width, path=path)
         if factor is None:
             outline = shape.polygon.exterior.coords[:-1]
-            return PolygonObstacle(self.ring(outline), (), shape.name)
-        return replace(shape, center=self.point(shape.center), radius=_times(shape.radius, factor))
+            return PolygonObstacle(self.ring(outline), (), shape.name, path)
+        radius = _times(shape.radius, factor)
+        return replace(shape, center=self.point(shape.center), radius=radius, path=path)
 
     def start(self, spec: StartSpec) -> StartSpec:
         """Return where a start goes; one in the whole free space stays.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
+import shapely
 
 from robocov_app.editor.document import BOUNDARY
 from robocov_app.editor.drags import Moving
@@ -23,13 +24,16 @@ from robocov_app.editor.grips import KNOB, box_of, grips
 from robocov_app.editor.handles import (
     accent,
     draw_box,
+    draw_ghost,
     draw_grips,
     draw_guides,
     draw_outline,
+    draw_path,
     draw_preview,
     draw_start,
     draw_typed,
 )
+from robocov_app.editor.paths import goes, moving
 from robocov_app.editor.selection import Change
 from robocov_app.editor.sheet import Sheet, View
 from robocov_app.editor.strips import Strips
@@ -235,6 +239,7 @@ class Arena:
             self._hatching.draw(screen, view, desk.readout)
             if desk.readout.gap is not None:
                 draw_gap(canvas, desk.readout.gap, desk.readout.radius)
+        self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         self._draw_starts(canvas, now)
         if self.team is not None and "robots" in shown:
             self._draw_team(canvas, self.team)
@@ -278,6 +283,19 @@ class Arena:
         screen.blit(
             self._carried[2], (round(dx * zoom), round(-dy * zoom)), special_flags=pygame.BLEND_PREMULTIPLIED
         )
+
+    def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
+        """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
+        theme, since = canvas.theme, self.desk.moves_since
+        for key in moving(sketch):
+            item = sketch.item(key)
+            path = item.shape.path
+            assert path is not None
+            chosen = key in self.desk.selection.items
+            draw_path(canvas, path, accent(theme) if chosen else mix(theme.background, theme.ink, 0.6))
+            if since is not None and goes(path):
+                shift = path.shift(self.desk.now - since)
+                draw_ghost(canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by))
 
     def _draw_starts(self, canvas: Canvas, sketch: Sketch) -> None:
         for k, (name, spec) in enumerate(sketch.starts):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robocov.environment import WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor import arranging, booleans, edits, simplifying, vertices
+from robocov_app.editor import arranging, booleans, edits, paths, simplifying, vertices
 from robocov_app.editor.clipboard import copied, pasted
 from robocov_app.editor.document import BOUNDARY
 from robocov_app.editor.grips import things
@@ -93,6 +93,9 @@ def deeds(desk: Desk) -> dict[str, Callable[[], object]]:
         "fewer": lambda: desk.set_robots(max(desk.robots - 1, 1)),
         "background:none": lambda: desk.change(edits.underlaid(desk.sketch, None)),
         "problem:next": lambda: next_problem(desk),
+        "path:repeat": lambda: _do(desk, paths.path_turned),
+        "path:none": lambda: _do(desk, paths.path_removed),
+        "path:play": lambda: play(desk),
     }
 
 
@@ -109,6 +112,23 @@ def _do(desk: Desk, edit: Callable[..., Change], *rest: object, single: bool = F
 def whole(selection: Selection) -> Selection:
     """Return the selected things; of selected vertices, what they belong to."""
     return things(selection).plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
+
+
+def play(desk: Desk) -> str:
+    """Show where obstacles that move get to, or show them no more.
+
+    Raises
+    ------
+    MapError
+        When none moves.
+    """
+    if desk.moves_since is not None:
+        desk.moves_since = None
+        return "obstacles stand as they are at time zero"
+    if not paths.moving(desk.sketch):
+        raise MapError("no obstacle moves: the tool Path gives one a path")
+    desk.moves_since = desk.now
+    return "obstacles move as they will; L ends it"
 
 
 def back(desk: Desk) -> None:

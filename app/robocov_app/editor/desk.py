@@ -90,6 +90,8 @@ class Desk:
         What a pixel at scale 1 is on the sheet.
     cursor : (x, y) or None, m
         Where the mouse is.
+    moves_since : float or None, s
+        Since when obstacles that move are shown moving.
     asked : Question, ListQuestion or None
         What is waiting for an answer.
     problem : Problem or None
@@ -119,6 +121,7 @@ class Desk:
         self.cursor: Point | None = None
         self.typed = ""
         self.now = 0.0
+        self.moves_since: float | None = None
         self._said = 0.0
         self.snapper = Snapper()
         self._grips: tuple[object, tuple[Grip, ...]] = (None, ())

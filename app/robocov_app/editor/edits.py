@@ -238,7 +238,13 @@ def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     chosen = {key for key in selection.items if not isinstance(sketch.item(key).shape, PolygonObstacle)}
     if not chosen:
         raise MapError("select circles or walls first")
-    shapes = {key: outlines(sketch.item(key).geometry, sketch.item(key).shape.name) for key in chosen}
+    shapes = {
+        key: tuple(
+            replace(polygon, path=item.shape.path) for polygon in outlines(item.geometry, item.shape.name)
+        )
+        for key in chosen
+        for item in (sketch.item(key),)
+    }
     for key, polygons in shapes.items():
         if not polygons:
             raise MapError(f"the {called(sketch, key)} covers nothing: it cannot become a polygon")

@@ -19,8 +19,11 @@ from robocov_app.view.theme import mix
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from shapely.geometry.base import BaseGeometry
+
     from robocov.arrays import Array
     from robocov.environment import Point
+    from robocov.obstacle_path import ObstaclePath
     from robocov.starts import StartSpec
     from robocov_app.editor.grips import Grip
     from robocov_app.editor.snapping import Guide
@@ -159,16 +162,41 @@ def draw_start(
                 canvas.text(words, above, size=theme.small_text, colour=ink)
 
 
+def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
+    """Draw the way of an obstacle: dashed, with an arrow in each leg; the last one of a loop is fainter."""
+    points = pixels(canvas, path.points)
+    legs = list(pairwise(points))
+    if path.repeat == "loop" and len(points) > 2:
+        legs.append((points[-1], points[0]))
+    for k, (a, b) in enumerate(legs):
+        closing = k == len(points) - 1
+        canvas.dashes(a.tolist(), b.tolist(), colour, canvas.width(1.0 if closing else 1.6), dash=4.0)
+        length = float(np.hypot(*(b - a)))
+        if length < 24 * canvas.scale:
+            continue
+        along = (b - a) / length
+        across, tip = np.array([-along[1], along[0]]), (a + b) / 2 + 4 * canvas.scale * along
+        for side in (1.0, -1.0):
+            end = tip - 7 * canvas.scale * along + side * 4 * canvas.scale * across
+            canvas.line(tip.tolist(), end.tolist(), colour, canvas.width(1.6))
+    for x, y in points.tolist():
+        canvas.stamp(partial(sprites.dot, 2.5 * canvas.scale, colour), (x, y))
+
+
+def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
+    """Draw where something will be."""
+    for ring in outline_of(geometry).rings:
+        corners = canvas.camera.to_pixels(ring)
+        _tint(canvas, corners, accent(canvas.theme))
+        canvas.outline(corners, accent(canvas.theme), canvas.width(1.5))
+
+
 def draw_preview(canvas: Canvas, preview: Preview, at: tuple[float, float] | None) -> None:
     """Draw what a tool is about to do; words stand beside the cursor, px."""
     theme, scale = canvas.theme, canvas.scale
     colour = accent(theme)
     for shape in preview.shapes:
-        outline = outline_of(shape.polygon)
-        for ring in outline.rings:
-            corners = canvas.camera.to_pixels(ring)
-            _tint(canvas, corners, colour)
-            canvas.outline(corners, colour, canvas.width(1.5))
+        draw_ghost(canvas, shape.polygon)
     if preview.start is not None:
         draw_start(canvas, preview.start, "", chosen=True, first=False)
     line = pixels(canvas, preview.line)

@@ -134,9 +134,9 @@ OBJECT_HEIGHTS = {
     "boundary": 2 * ROW + 62,
     "disc": 3 * ROW + 62,
     "start": ROW + 62,
-    "polygon": 4 * ROW + 66,
-    "circle": 4 * ROW + 66,
-    "wall": 5 * ROW + 66,
+    "polygon": 4 * ROW + 96,
+    "circle": 4 * ROW + 96,
+    "wall": 5 * ROW + 96,
 }
 """Pixels at scale 1 that the page's widgets are high; below them is the list of vertices."""
 
@@ -222,7 +222,8 @@ def _buttons(widgets: Widgets, kind: str, y: float, wide: float) -> None:
             (("Join", "join"), ("Polygons", "polygons"), ("Simplify", "simplify"), ("Delete", "delete")),
         ]
     else:
-        rows = [turns]
+        path = (("Path", "tool:path"), ("Loop ↺", "path:repeat"), ("Play", "path:play"))
+        rows = [turns, (*path, ("No path", "path:none"))]
     for row in rows:
         for (x, width), (text, action) in zip(columns(len(row), wide), row, strict=True):
             widgets.does(text, widgets.rect(x, y, width, 26), action, style="#small")

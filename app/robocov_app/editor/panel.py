@@ -64,8 +64,9 @@ class Panel(Paged):
         """Make the widgets."""
         widgets.section("file", None, 8, lambda: self._file(widgets))
         widgets.section("tools", None, 94, lambda: self._tools(widgets))
-        widgets.section("tabs", None, 210, lambda: self._tabs(widgets))
-        y = 244.0
+        below = 100 + 30 * -(-len(self.desk.tools) // 4) + 20
+        widgets.section("tabs", None, below, lambda: self._tabs(widgets))
+        y = below + 34.0
         self._place_body(widgets, y)
         if self.tab == "map":
             map_page(widgets, self.desk, y)

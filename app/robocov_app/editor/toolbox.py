@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov_app.editor.drawing import Boundary, Measure, Places, Polygon, Wall
+from robocov_app.editor.leading import Leading
 from robocov_app.editor.selecting import Pan, Select
 from robocov_app.editor.stretching import Circle, Disc, Rectangle
 from robocov_app.editor.underlay import Underlay
@@ -28,6 +29,7 @@ def toolbox() -> dict[str, Tool]:
         Disc(),
         Places(),
         Weighing(),
+        Leading(),
         Underlay(),
     ]
     return {tool.name: tool for tool in tools}

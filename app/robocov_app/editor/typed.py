@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, unknown_name
 from robocov_app.demo.typed import parted
-from robocov_app.editor import booleans, densities, edits, vertices
+from robocov_app.editor import booleans, densities, edits, paths, vertices
 from robocov_app.editor.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.deeds import bevel, round_corners, simplify, whole
 from robocov_app.editor.edits import bounds_of
@@ -149,6 +149,10 @@ def _set_weight(desk: Desk, text: str) -> None:
     desk.tools["density"].enter(desk, text)
 
 
+def _set_speed(desk: Desk, text: str) -> None:
+    desk.change(paths.path_paced(desk.sketch, _selected(desk), paths.speed_of(text)))
+
+
 def _set_density(desk: Desk, text: str) -> None:
     if text.strip() != "none":
         raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
@@ -191,6 +195,7 @@ COMMANDS: dict[str, Callable[[Desk, str], None]] = {
     "floor": _set_floor,
     "weight": _set_weight,
     "density": _set_density,
+    "speed": _set_speed,
     "offset": _offset,
     "array": _array,
     "name": _name,
