@@ -260,6 +260,8 @@ class Record:
             Of the page.
         mean_distance : float, m
             Of the final positions, for the page's title.
+        mean_time : float, s
+            The mean time until the first is there, likewise, where robots are not equally fast.
 
         Returns
         -------
