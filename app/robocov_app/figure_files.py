@@ -6,8 +6,8 @@ import io
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from robocov.atomic import written
 from robocov.errors import OutputError, ParameterError, shown
+from robocov.files.atomic import written
 from robocov_app.page import plain_style
 
 if TYPE_CHECKING:

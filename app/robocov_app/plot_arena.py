@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.weighted_cells import outlines_of
+from robocov.voronoi.weighted_cells import outlines_of
 from robocov_app.page import tone
 from robocov_app.view.phi import density_words, shading
 from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size

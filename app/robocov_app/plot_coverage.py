@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.changing_world import only
 from robocov.errors import ParameterError
+from robocov.world.changing_world import only
 from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
 from robocov_app.plot_curves import DISTANCE, WEIGHED, draw_curves, end_label

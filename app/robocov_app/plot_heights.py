@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.best_points import best_points
 from robocov.locational import Distance, Sensing, value
-from robocov.region import Region
+from robocov.locational.best_points import best_points
+from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.page import SMALL, TEXT, TITLE, Page, plain_style, tone
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named

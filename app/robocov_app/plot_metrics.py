@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from robocov.arrays import Array
-    from robocov.run_metrics import RunMetrics
+    from robocov.metrics.run_metrics import RunMetrics
 
 
 class Measured(NamedTuple):

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
+from robocov.cost.momentary_cost import MomentaryCost
 from robocov.errors import ParameterError
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
-from robocov.momentary_cost import MomentaryCost
 from robocov.record import Record
-from robocov.recorder import Recorder
+from robocov.record.recorder import Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.building import FILM_LATTICE, built_cost, cost_for_pictures

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov_app.plot_heights import HEIGHTS, PENTAGON, best_at_heights, height_table, plot_heights
 from robocov_app.view.theme import DARK, LIGHT, contrast
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robocov.errors import ParameterError
-from robocov.run_metrics import RunMetrics
+from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.plot_metrics import PANELS, Measured, plot_metrics
 
 

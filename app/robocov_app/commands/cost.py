@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 
 from robocov.arrays import Array
-from robocov.atomic import written
 from robocov.errors import InputError, ParameterError, shown
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite

@@ -13,8 +13,8 @@ import tyro
 
 from robocov.environment import Environment
 from robocov.errors import InputError, MapError, OutputError, ParameterError, counted
-from robocov.mapcheck import check_map
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
+from robocov.mapfile.check import check_map
 from robocov_app.options import in_range
 from robocov_app.progress import progress
 

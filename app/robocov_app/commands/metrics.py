@@ -51,7 +51,7 @@ def command(options: Arguments) -> None:
         from robocov_app.figure_files import check_figure_path
 
         check_figure_path(options.plot)
-    from robocov.run_metrics import COLUMNS
+    from robocov.metrics.run_metrics import COLUMNS
 
     measured, answers = [], []
     for saved in load_saved(options.folder):
@@ -74,8 +74,8 @@ def command(options: Arguments) -> None:
 
 def measure(saved: Saved, options: Arguments) -> Measured:
     """Measure one run."""
-    from robocov.moments import nearest_moments
-    from robocov.run_metrics import run_metrics
+    from robocov.metrics.run_metrics import run_metrics
+    from robocov.record.moments import nearest_moments
     from robocov_app.plot_metrics import Measured
     from robocov_app.progress import progress
 
@@ -94,7 +94,7 @@ def measure(saved: Saved, options: Arguments) -> Measured:
 
 def answer_of(saved: Saved, run: Measured) -> dict[str, Any]:
     """Return what is said of one run: the figures of its end."""
-    from robocov.run_metrics import time_near_final
+    from robocov.metrics.run_metrics import time_near_final
 
     near = None if saved.history is None or not len(saved.history.time) else time_near_final(saved.history)
     return {

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 import tyro
 
-from robocov.array_cache import ArrayCache
-from robocov.atomic import written
 from robocov.errors import InputError, ParameterError
+from robocov.files.array_cache import ArrayCache
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.passages import Gap, narrowest_gap
+from robocov.environment.passages import Gap, narrowest_gap
 from robocov_app.figure_files import check_figure_path, save_figure
 from robocov_app.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
 from robocov_app.plot_arena import draw_map, map_handles

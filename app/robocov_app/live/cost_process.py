@@ -11,9 +11,9 @@ import threading
 import time
 from typing import TYPE_CHECKING, BinaryIO
 
-from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
+from robocov.files.array_cache import ArrayCache
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
 from robocov_app.live.own_process import own_streams
 

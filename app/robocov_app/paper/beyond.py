@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from robocov.cost import CoverageCost
-from robocov.results import read_results
+from robocov.metrics.results import read_results
 from robocov_app.degradation import degradations
 from robocov_app.paper import beyond_studies
 from robocov_app.paper import plan as planned

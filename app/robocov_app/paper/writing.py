@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.output import finite
 from robocov_app.paper import told
 from robocov_app.paper.asking import QUESTIONS

@@ -18,7 +18,7 @@ from scipy.ndimage import distance_transform_edt
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray, IntArray
     from robocov.cost import CoverageCost, CoverageResult
-    from robocov.lattice import Sites
+    from robocov.cost.lattice import Sites
 
 _SHALLOW = 0.05
 """Least angle in radians at which two distances are taken to grow apart, so that borders stay thin."""
