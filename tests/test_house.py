@@ -105,7 +105,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("measure plot render start step".split(), "test_bench"),
     "coverage": "test_coverage_layers",
     **dict.fromkeys("messages cost_process".split(), "test_cost_worker"),
-    **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
+    **dict.fromkeys("page plots_arena plots_curves plots_runs".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
     **dict.fromkeys(
         "arena asked film keyboard look pages panel pointer report_page sections typed widgets".split(),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from reported_results import HOSTILE, falling, walk
 
 from robocov.environment import Environment
-from robocov_app.plot_curves import curve_styles
+from robocov_app.plots.curves import curve_styles
 from robocov_app.report.embedding import (
     NONE,
     RATE,

@@ -12,7 +12,7 @@ import tyro
 from robocov_app.options import in_range
 
 if TYPE_CHECKING:
-    from robocov_app.plot_metrics import Measured
+    from robocov_app.plots.metrics import Measured
     from robocov_app.saved import Saved
 
 
@@ -48,7 +48,7 @@ def command(options: Arguments) -> None:
     from robocov_app.saved import load_saved
 
     if options.plot is not None:
-        from robocov_app.figure_files import check_figure_path
+        from robocov_app.plots.figure_files import check_figure_path
 
         check_figure_path(options.plot)
     from robocov.metrics.run_metrics import COLUMNS
@@ -60,8 +60,8 @@ def command(options: Arguments) -> None:
         measured.append(run)
         answers.append(answer_of(saved, run))
     if options.plot is not None:
-        from robocov_app.figure_files import save_figure
-        from robocov_app.plot_metrics import plot_metrics
+        from robocov_app.plots.figure_files import save_figure
+        from robocov_app.plots.metrics import plot_metrics
 
         save_figure(
             plot_metrics(measured, options.theme, title=f"Metrics  ·  {options.folder.name}"), options.plot
@@ -76,7 +76,7 @@ def measure(saved: Saved, options: Arguments) -> Measured:
     """Measure one run."""
     from robocov.metrics.run_metrics import run_metrics
     from robocov.record.moments import nearest_moments
-    from robocov_app.plot_metrics import Measured
+    from robocov_app.plots.metrics import Measured
     from robocov_app.progress import progress
 
     record = saved.record

@@ -135,7 +135,7 @@ def page(
     """
     from markupsafe import Markup
 
-    from robocov_app.plot_curves import curve_styles
+    from robocov_app.plots.curves import curve_styles
     from robocov_app.report.replay import ReplayRun, replay_css, replay_js, replay_part, script
 
     replays = [

@@ -5,7 +5,7 @@ import pytest
 
 from robocov.errors import ParameterError
 from robocov.metrics.run_metrics import RunMetrics
-from robocov_app.plot_metrics import PANELS, Measured, plot_metrics
+from robocov_app.plots.metrics import PANELS, Measured, plot_metrics
 
 
 def measured(controller: str, seed: int) -> Measured:

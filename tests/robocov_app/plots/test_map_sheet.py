@@ -6,7 +6,7 @@ import pytest
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.map_sheet import MOST, plot_maps
+from robocov_app.plots.map_sheet import MOST, plot_maps
 
 
 def words(figure) -> list[str]:  # type: ignore[no-untyped-def]

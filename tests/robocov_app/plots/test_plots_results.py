@@ -7,9 +7,9 @@ import pytest
 from clear_pages import all_clear
 
 from robocov.errors import ParameterError
-from robocov_app.page import tone
-from robocov_app.plot_curves import curve_styles
-from robocov_app.plot_results import (
+from robocov_app.plots.curves import curve_styles
+from robocov_app.plots.page import tone
+from robocov_app.plots.results import (
     Band,
     Pairs,
     Sample,

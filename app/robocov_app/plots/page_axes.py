@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 
 
 class PageAxes(Axes):
-    """Axes of a page of `robocov_app.page`.
+    """Axes of a page of `robocov_app.plots.page`.
 
     Without pyplot no notebook would show a figure; and what a cell ends with is the axes.
     """
 
     def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
         """Return the page as PNG, how wide it is to be shown, and its words for who cannot see it."""
-        from robocov_app.figure_files import figure_png
+        from robocov_app.plots.figure_files import figure_png
 
         page = cast("Figure", self.figure)
         words = [text.get_text() for text in page.texts if text.get_text()]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robocov.observation.region import Region
-from robocov_app.plot_heights import HEIGHTS, PENTAGON, best_at_heights, height_table, plot_heights
+from robocov_app.plots.heights import HEIGHTS, PENTAGON, best_at_heights, height_table, plot_heights
 from robocov_app.view.theme import DARK, LIGHT, contrast
 
 

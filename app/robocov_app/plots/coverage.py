@@ -9,10 +9,10 @@ import numpy as np
 
 from robocov.errors import ParameterError
 from robocov.world.changing_world import only
-from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
-from robocov_app.plot_curves import DISTANCE, WEIGHED, draw_curves, end_label
-from robocov_app.plots import plot_cost
+from robocov_app.plots.arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
+from robocov_app.plots.curves import DISTANCE, WEIGHED, draw_curves, end_label
+from robocov_app.plots.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
+from robocov_app.plots.runs import plot_cost
 from robocov_app.view.phi import density_words, mean_words
 from robocov_app.view.shading import levels, palette, round_limit, strength, ticks
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.record import Record
     from robocov.robots import Team
-    from robocov_app.plot_curves import Curve
+    from robocov_app.plots.curves import Curve
     from robocov_app.view.field import Field
 
 _FINE = 2

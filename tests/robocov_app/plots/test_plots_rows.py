@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.page import plain_style
-from robocov_app.plot_curves import curve_styles
-from robocov_app.plot_rows import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page, value_limits
+from robocov_app.plots.curves import curve_styles
+from robocov_app.plots.page import plain_style
+from robocov_app.plots.rows import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page, value_limits
 from robocov_app.view.theme import LIGHT
 
 STYLE = curve_styles(["rapf"])["rapf"]

@@ -11,8 +11,8 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import value_text
 from robocov.errors import ParameterError, shown
-from robocov_app.page import SMALL, TEXT, TITLE, Page, plain_style, tone
-from robocov_app.plot_curves import DISTANCE, CurveStyle, curve_styles
+from robocov_app.plots.curves import DISTANCE, CurveStyle, curve_styles
+from robocov_app.plots.page import SMALL, TEXT, TITLE, Page, plain_style, tone
 from robocov_app.view.theme import LIGHT, Colour, Theme, theme_named
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.page import HEADING, TEXT, Page, plain_style
-from robocov_app.plot_arena import draw_map, map_handles
+from robocov_app.plots.arena import draw_map, map_handles
+from robocov_app.plots.page import HEADING, TEXT, Page, plain_style
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
 

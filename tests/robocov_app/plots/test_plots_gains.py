@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.plot_gains import (
+from robocov_app.plots.gains import (
     HEAT_LEVELS,
     MOST_LEVELS,
     MOST_POINTS,

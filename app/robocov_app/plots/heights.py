@@ -12,7 +12,7 @@ from robocov.locational import Distance, Sensing, value
 from robocov.locational.best_points import best_points
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
-from robocov_app.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.plots.page import SMALL, TEXT, TITLE, Page, plain_style, tone
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.voronoi.weighted_cells import outlines_of
-from robocov_app.page import tone
+from robocov_app.plots.page import tone
 from robocov_app.view.phi import density_words, shading
 from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues

@@ -14,8 +14,8 @@ import pytest
 from drawn_run import HALL, ROOMS, run_of
 
 from robocov.errors import OutputError, ParameterError
-from robocov_app.figure_files import check_figure_path, save_figure
-from robocov_app.plots import plot_cost, plot_environment, plot_trajectories
+from robocov_app.plots.figure_files import check_figure_path, save_figure
+from robocov_app.plots.runs import plot_cost, plot_environment, plot_trajectories
 
 T = np.linspace(0.0, 60.0, 121)
 KINDS = ["png", "svg", "pdf"]
@@ -79,12 +79,12 @@ def test_the_bytes_do_not_depend_on_the_hashes_of_a_process(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "from drawn_run import ROOMS, run_of\n"
-        "from robocov_app.plots import plot_trajectories, save_figure\n"
+        "from robocov_app.plots.runs import plot_trajectories, save_figure\n"
         "for kind in ('svg', 'pdf'):\n"
         "    save_figure(plot_trajectories(run_of(ROOMS, 4)), f'{sys.argv[2]}.{kind}')\n"
     )
     for seed in ("1", "2"):
-        command = [sys.executable, "-c", script, str(Path(__file__).parent), str(tmp_path / seed)]
+        command = [sys.executable, "-c", script, str(Path(__file__).parents[1]), str(tmp_path / seed)]
         subprocess.run(command, check=True, env={"PYTHONHASHSEED": seed, "ROBOCOV_CACHE": ""})
     for kind in ("svg", "pdf"):
         assert (tmp_path / f"1.{kind}").read_bytes() == (tmp_path / f"2.{kind}").read_bytes()

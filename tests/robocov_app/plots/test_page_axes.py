@@ -8,8 +8,8 @@ import pytest
 from drawn_run import ROOMS, run_of
 from PIL import Image
 
-from robocov_app.page import Page
-from robocov_app.plots import plot_trajectories
+from robocov_app.plots.page import Page
+from robocov_app.plots.runs import plot_trajectories
 from robocov_app.view.theme import DARK
 
 

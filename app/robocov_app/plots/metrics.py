@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.page import TITLE, Page, plain_style
-from robocov_app.plot_curves import draw_curves, end_label
+from robocov_app.plots.curves import draw_curves, end_label
+from robocov_app.plots.page import TITLE, Page, plain_style
 from robocov_app.view.theme import LIGHT, Theme, theme_named
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_curves import curve_styles
+from robocov_app.plots.curves import curve_styles
+from robocov_app.plots.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.sweep.circumstances import UNITS
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from robocov_app.degradation import Degradation
-    from robocov_app.plot_curves import CurveStyle
+    from robocov_app.paper.degradation import Degradation
+    from robocov_app.plots.curves import CurveStyle
 
 _TITLES = {
     "loss": "Messages lost",

@@ -95,7 +95,7 @@ class Page:
 
     def axes(self, box: Box) -> Axes:
         """Return axes that fill `box`; a notebook shows the page for them."""
-        from robocov_app.page_axes import PageAxes
+        from robocov_app.plots.page_axes import PageAxes
 
         left, top, width, height = box
         x, y = self.at(left, top + height)

@@ -22,9 +22,9 @@ from matplotlib.text import Text
 from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.voronoi import partition
-from robocov_app.page import tone
-from robocov_app.plot_curves import spread
-from robocov_app.plots import (
+from robocov_app.plots.curves import spread
+from robocov_app.plots.page import tone
+from robocov_app.plots.runs import (
     plot_comparison,
     plot_cost,
     plot_environment,
@@ -335,19 +335,22 @@ class TestCost:
 
 _LAZY = """
 import sys
-import robocov_app.plots
+import robocov_app.plots.runs
 assert "matplotlib" not in sys.modules
 sys.path.insert(0, sys.argv[1])
 from clear_pages import all_clear, boxes, overlap
 from drawn_run import ROOMS, run_of
-robocov_app.plots.plot_trajectories(run_of(ROOMS, 3))
+robocov_app.plots.runs.plot_trajectories(run_of(ROOMS, 3))
 assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
 """
 
 
 def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
     done = subprocess.run(
-        [sys.executable, "-c", _LAZY, str(Path(__file__).parent)], capture_output=True, text=True, check=False
+        [sys.executable, "-c", _LAZY, str(Path(__file__).parents[1])],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
 

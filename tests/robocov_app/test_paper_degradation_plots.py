@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.degradation import Degradation
-from robocov_app.plot_degradation import plot_degradations
+from robocov_app.paper.degradation import Degradation
+from robocov_app.paper.degradation_plots import plot_degradations
 from robocov_app.statistics import Interval
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robocov.errors import RobocovError
-from robocov_app.degradation import AXES, QUICK, Degradation, DegradationPlan, degradations
+from robocov_app.paper.degradation import AXES, QUICK, Degradation, DegradationPlan, degradations
 from robocov_app.sweep.performing import FIGURES, Outcome, failed
 from robocov_app.sweep.task import Task
 

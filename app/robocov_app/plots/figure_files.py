@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from robocov.errors import OutputError, ParameterError, shown
 from robocov.files.atomic import written
-from robocov_app.page import plain_style
+from robocov_app.plots.page import plain_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""Rows of boxes and points that share one axis of values: what `robocov_app.plot_results` is made of.
+"""Rows of boxes and points that share one axis of values: what `robocov_app.plots.results` is made of.
 
 Heights are in rows from the top. Names stand to the left, level; names of groups above their rows.
 """
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.page import SMALL, TEXT, TITLE, Page, tone
+from robocov_app.plots.page import SMALL, TEXT, TITLE, Page, tone
 from robocov_app.view.theme import Theme
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from robocov_app.plot_curves import CurveStyle
+    from robocov_app.plots.curves import CurveStyle
 
 MOST_POINTS = 250
 """Points that are drawn of a sample; of more, so many that stand evenly among them by rank."""

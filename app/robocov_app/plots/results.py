@@ -1,7 +1,7 @@
 """Plots of many runs together: cost bands, final costs, and pairs of controllers.
 
 They take plain numbers. Each draws into axes that are given, or makes a page. What a result depends on
-(gains, team sizes) is in `robocov_app.plot_gains`.
+(gains, team sizes) is in `robocov_app.plots.gains`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
-from robocov_app.page import TITLE, Page, plain_style, tone
-from robocov_app.plot_curves import (
+from robocov_app.plots.curves import (
     DISTANCE,
     VARIANTS,
     Curve,
@@ -23,7 +22,8 @@ from robocov_app.plot_curves import (
     draw_curves,
     end_label,
 )
-from robocov_app.plot_rows import (
+from robocov_app.plots.page import TITLE, Page, plain_style, tone
+from robocov_app.plots.rows import (
     cut_to,
     draw_box,
     draw_heading,

@@ -8,8 +8,8 @@ from PIL import Image
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
-from robocov_app.plot_coverage import Moment, plot_coverage
-from robocov_app.plots import save_figure
+from robocov_app.plots.coverage import Moment, plot_coverage
+from robocov_app.plots.runs import save_figure
 from robocov_app.view.field import Field, FieldLattice
 from robocov_app.view.shading import FARTHEST, palette, round_limit
 from robocov_app.view.theme import DARK, LIGHT

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.page import SMALL, TEXT, tone
+from robocov_app.plots.page import SMALL, TEXT, tone
 from robocov_app.view.theme import Colour, Theme
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from robocov.errors import ParameterError, shown
-from robocov_app.figure_files import check_figure_path as check_figure_path
-from robocov_app.figure_files import figure_kind as figure_kind
-from robocov_app.figure_files import save_figure as save_figure
-from robocov_app.page import HEADING, TEXT, TITLE, Box, Page, plain_style
-from robocov_app.plot_arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
-from robocov_app.plot_curves import Curve, draw_curves, end_label
+from robocov_app.plots.arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
+from robocov_app.plots.curves import Curve, draw_curves, end_label
+from robocov_app.plots.figure_files import check_figure_path as check_figure_path
+from robocov_app.plots.figure_files import figure_kind as figure_kind
+from robocov_app.plots.figure_files import save_figure as save_figure
+from robocov_app.plots.page import HEADING, TEXT, TITLE, Box, Page, plain_style
 from robocov_app.view.phi import mean_words
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
