@@ -221,6 +221,8 @@ def test_public_names_are_what_the_package_says() -> None:
     assert sorted(robocov._HOME) == sorted(robocov.__all__)
     for name in robocov.__all__:
         assert getattr(robocov, name) is not None
+    modules = {path.stem for path in (ROOT / "coverage/robocov").iterdir()}
+    assert not modules & set(robocov.__all__), "once imported, a module would hide the name"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         robocov.nothing
     tree = ast.parse((ROOT / "coverage/robocov/__init__.py").read_text())

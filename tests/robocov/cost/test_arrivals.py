@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cost_cases import OFFICE, environment
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cost import OFFICE, environment
 
 from robocov.cost import CoverageCost
 from robocov.errors import InputError

@@ -5,46 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, box, environment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.cost import CoverageCost, corner_views, robot_views
 from robocov.cost import coverage as cost_module
 from robocov.cost.corner_views import CornerViews
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import InputError, ParameterError
 from robocov.files.array_cache import ArrayCache
 from robocov.geodesic import distances, visibility
-
-SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-
-
-def box(x0, y0, x1, y1):
-    return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
-
-
-def environment(*obstacles, boundary=SQUARE):
-    return Environment("test", boundary, tuple(PolygonObstacle(ring) for ring in obstacles))
-
-
-PILLAR = environment(box(3 / 8, 3 / 8, 5 / 8, 5 / 8))
-CUP = environment(
-    (
-        *((1 / 4, 1 / 4), (3 / 4, 1 / 4), (3 / 4, 3 / 4), (5 / 8, 3 / 4)),
-        *((5 / 8, 3 / 8), (3 / 8, 3 / 8), (3 / 8, 3 / 4), (1 / 4, 3 / 4)),
-    )
-)
-L_ROOM = environment(box(1 / 2, 1 / 2, 1, 1))
-OFFICE = Environment(
-    "office",
-    ((0, 0), (12, 0), (12, 5), (9, 5), (9, 8), (0, 8)),
-    (
-        WallObstacle(((4, 0), (4, 3), (6.5, 3)), 0.2),
-        WallObstacle(((3, 8), (3, 5)), 0.2),
-        CircleObstacle((8.5, 2.5), 0.8),
-        PolygonObstacle(((5, 5), (7, 4.5), (6.5, 6.5))),
-    ),
-)
 
 
 @pytest.mark.parametrize(

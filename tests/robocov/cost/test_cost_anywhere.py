@@ -10,6 +10,7 @@ import brute_force_geodesic as brute
 import numpy as np
 import pytest
 import shapely
+from cost_cases import compared
 from drawn_maps import KINDS, SIDE, drawn_map, drawn_places
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -19,45 +20,6 @@ from robocov.mapfile import bundled_maps, load_map
 
 kinds = st.sampled_from(sorted(KINDS))
 seeds = st.integers(0, 2**32)
-
-
-def compared(environment, lattice, robots):
-    """Return the largest error of any distance, as a part of the map's size, having checked the rest."""
-    cost = CoverageCost(environment, lattice)
-    result = cost(robots)
-    everything = cost.geodesics.distances(robots, cost.points)
-    nearest = everything.min(axis=0)
-    size = cost.geodesics.size
-    reached = np.isfinite(nearest)
-    np.testing.assert_array_equal(np.isfinite(result.distances), reached)
-    np.testing.assert_array_equal(result.owner >= 0, reached)
-    site = np.nonzero(reached)[0]
-    # the owner is as near as the nearest
-    own = everything[result.owner[site], site]
-    assert np.abs(own - nearest[site]).max(initial=0.0) < 1e-12 * size
-    # the first way-point is on a shortest way, and so is the last
-    straight = np.hypot(*(result.first[site] - robots[result.owner[site]]).T)
-    assert (straight <= nearest[site] * (1 + 1e-12) + 1e-12 * size).all()
-    bent = site[result.corner[site] >= 0]
-    corners, number = np.unique(result.corner[bent], return_inverse=True)
-    if len(bent):
-        rest = cost.geodesics.distances(cost.corners[corners], cost.points[bent])[
-            number, np.arange(len(bent))
-        ]
-        total = np.hypot(*(result.first[bent] - robots[result.owner[bent]]).T) + rest
-        # a corner at a pinch belongs to both sides at once, and would be a short cut
-        assert (total <= nearest[bent] + 1e-12 * size).all()
-    last = (
-        np.where(
-            result.last_corner[site, None] >= 0,
-            cost.corners[result.last_corner[site]],
-            robots[result.owner[site]],
-        )
-        if len(cost.corners)
-        else robots[result.owner[site]]
-    )
-    assert (np.hypot(*(cost.points[site] - last).T) <= nearest[site] * (1 + 1e-12) + 1e-12 * size).all()
-    return float(np.abs(result.distances[site] - nearest[site]).max(initial=0.0)) / size
 
 
 @settings(max_examples=120)

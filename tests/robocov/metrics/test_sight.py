@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from cost_cases import OFFICE
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cost import OFFICE
 
 from robocov.metrics.sight import Walls, covered, visibility_polygon
 
