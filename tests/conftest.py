@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.starts import DiscStart, UniformStart
+from robocov.environment.starts import DiscStart, UniformStart
 
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""

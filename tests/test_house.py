@@ -62,27 +62,35 @@ def test_files_do_one_thing() -> None:
 
 
 TESTED_THROUGH = {
-    "arrays": "everywhere",
+    "arrays_types": "everywhere",
     "mouse": "test_demo_window",
     "atomic": "test_record",
     "corner_views": "test_cost",
     "robot_views": "test_cost",
-    "cell_edges": "test_voronoi",
-    "clipped_cells": "test_voronoi",
+    **dict.fromkeys("bounded_cells cell_edges clipped_cells".split(), "test_voronoi"),
     "bisectors": "test_weighted_cells",
     "controllers_cells": "test_controllers",
-    "maprules": "test_map_errors",
-    "mapmodels": "test_map_errors",
-    "strictjson": "test_map_errors",
-    "observation": "test_controllers",
+    **dict.fromkeys("mapfile_models mapfile_rules strictjson".split(), "test_map_errors"),
+    "observations": "test_controllers",
     "decisions": "test_simulation",
-    "recorder": "test_record",
+    **dict.fromkeys("recorder run_record".split(), "test_record"),
     "region": "test_environment",
     **dict.fromkeys(
-        "density_base density_moments gaussian_moments polygon_moments raster_density raster_moments".split(),
+        "density_base density_kinds density_moments density_raster".split(),
         "test_density",
     ),
-    **dict.fromkeys("densitymodels mapfields".split(), "test_densityfile"),
+    **dict.fromkeys("gaussian_moments polygon_moments raster_moments".split(), "test_density"),
+    **dict.fromkeys("density_models mapfile_fields".split(), "test_mapfile_density"),
+    "conditions_parameters": "test_conditions",
+    "cost_coverage": "test_cost",
+    "environment_geometry": "test_environment",
+    "geodesic_distances": "test_geodesic",
+    "locational_cost": "test_locational",
+    "mapfile_conversion": "test_mapfile",
+    "metrics_summary": "test_metrics",
+    "optimum_search": "test_optimum",
+    "robots_team": "test_robots",
+    "world_bodies": "test_world",
     "editor_weighing": "test_editor_densities",
     "leading": "test_editor_paths",
     "density_picture": "test_weighing",
@@ -97,7 +105,7 @@ TESTED_THROUGH = {
     **dict.fromkeys("measure plot render start step".split(), "test_bench"),
     "coverage": "test_coverage_layers",
     **dict.fromkeys("messages cost_process evaluation".split(), "test_cost_worker"),
-    **dict.fromkeys("page plot_arena plot_curves".split(), "test_plots"),
+    **dict.fromkeys("page plots_arena plots_curves plots_runs".split(), "test_plots"),
     **dict.fromkeys("canvas clipping fonts scene sprites".split(), "test_layers"),
     **dict.fromkeys(
         "arena asked film keyboard look pages panel pointer report_page sections typed widgets".split(),
@@ -184,9 +192,19 @@ def test_every_module_has_its_tests() -> None:
     for path in SOURCES:
         if not path.stem.startswith("__"):
             homely = f"{path.parent.name}_{path.stem}"
-            stem = homely if f"test_{homely}" in tests else path.stem
-            where = TESTED_THROUGH.get(homely) or TESTED_THROUGH.get(path.stem, f"test_{stem}")
+            own = f"test_{homely}" if f"test_{homely}" in tests else f"test_{path.stem}"
+            elsewhere = None if own == f"test_{homely}" else TESTED_THROUGH.get(path.stem)
+            where = TESTED_THROUGH.get(homely) or elsewhere or own
             assert where in tests or where == "everywhere", f"{path.name} has no tests"
+
+
+def test_the_tests_of_the_library_stand_in_the_folders_of_its_packages() -> None:
+    tested = {path.parent.name for path in (ROOT / "tests/robocov").glob("*/test_*.py")}
+    packages = {path.parent.name for path in (ROOT / "coverage/robocov").glob("*/__init__.py")}
+    assert tested == packages
+    flat = {path.stem for path in (ROOT / "coverage/robocov").glob("*.py")}
+    loose = {path.stem.removeprefix("test_") for path in (ROOT / "tests/robocov").glob("test_*.py")}
+    assert loose - flat == {"errata"}, "tests beside the packages that belong into them"
 
 
 def test_the_version_is_said_once_in_each_place() -> None:
@@ -203,6 +221,8 @@ def test_public_names_are_what_the_package_says() -> None:
     assert sorted(robocov._HOME) == sorted(robocov.__all__)
     for name in robocov.__all__:
         assert getattr(robocov, name) is not None
+    modules = {path.stem for path in (ROOT / "coverage/robocov").iterdir()}
+    assert not modules & set(robocov.__all__), "once imported, a module would hide the name"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         robocov.nothing
     tree = ast.parse((ROOT / "coverage/robocov/__init__.py").read_text())

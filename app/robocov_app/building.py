@@ -6,8 +6,8 @@ import time
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
+from robocov.files.array_cache import ArrayCache
 from robocov_app.progress import progress
 
 if TYPE_CHECKING:

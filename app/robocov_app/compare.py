@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robocov_app.interruption import Interruption
     from robocov_app.options import RunOptions
     from robocov_app.panes import Shown
-    from robocov_app.plot_coverage import Moment
+    from robocov_app.plots.coverage import Moment
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 
@@ -103,8 +103,8 @@ def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
 
 def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
     """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
-    from robocov_app.plot_coverage import plot_coverage
-    from robocov_app.plots import plot_comparison
+    from robocov_app.plots.coverage import plot_coverage
+    from robocov_app.plots.runs import plot_comparison
     from robocov_app.view.theme import theme_named
 
     rows = rows_of(runs)

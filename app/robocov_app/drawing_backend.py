@@ -65,8 +65,8 @@ def plot_environment(
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
 ) -> Axes:
-    """Plot a map, and return its axes; see `robocov_app.plots.plot_environment`."""
-    from robocov_app.plots import plot_environment as plot
+    """Plot a map, and return its axes; see `robocov_app.plots.runs.plot_environment`."""
+    from robocov_app.plots.runs import plot_environment as plot
 
     return _map_axes(plot(environment, _checked(axes), theme, size), axes)
 
@@ -81,8 +81,8 @@ def plot_record(
     mean_distance: float | None = None,
     mean_time: float | None = None,
 ) -> Axes:
-    """Plot a run, and return its axes; see `robocov_app.plots.plot_trajectories`."""
-    from robocov_app.plots import plot_trajectories
+    """Plot a run, and return its axes; see `robocov_app.plots.runs.plot_trajectories`."""
+    from robocov_app.plots.runs import plot_trajectories
 
     figure = plot_trajectories(record, _checked(axes), theme, colours, size, mean_distance, mean_time)
     return _map_axes(figure, axes)
@@ -98,8 +98,8 @@ def plot_history(
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
 ) -> Axes:
-    """Plot the mean distance against time, and return the axes; see `robocov_app.plots.plot_cost`."""
-    from robocov_app.plots import plot_cost
+    """Plot the mean distance against time, and return the axes; see `robocov_app.plots.runs.plot_cost`."""
+    from robocov_app.plots.runs import plot_cost
 
     curve = (label, controller, history.time, history.mean_distance)
     return _map_axes(plot_cost([curve], _checked(axes), theme, size, title), axes)
@@ -113,7 +113,7 @@ def plot_result(
     size: tuple[int, int] | None = None,
     radius: ArrayLike | None = None,
 ) -> Axes:
-    """Plot the distance of every place to its nearest robot; see `robocov_app.plot_coverage`.
+    """Plot the distance of every place to its nearest robot; see `robocov_app.plots.coverage`.
 
     A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one.
 
@@ -124,7 +124,7 @@ def plot_result(
     """
     from robocov.robots import Team
     from robocov_app.building import PICTURE_LATTICE, built_cost
-    from robocov_app.plot_coverage import Moment, plot_coverage, plot_distances
+    from robocov_app.plots.coverage import Moment, plot_coverage, plot_distances
     from robocov_app.view.field import Field, FieldLattice
     from robocov_app.view.phi import mean_words
 
@@ -176,8 +176,8 @@ def environment_html(environment: Environment) -> str:
 
 def environment_png(environment: Environment) -> bytes:
     """Return a map's page."""
-    from robocov_app.figure_files import figure_png
-    from robocov_app.plots import plot_environment as plot
+    from robocov_app.plots.figure_files import figure_png
+    from robocov_app.plots.runs import plot_environment as plot
 
     return figure_png(plot(environment))
 
@@ -212,8 +212,8 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
-    from robocov_app.figure_files import figure_png
-    from robocov_app.plots import plot_trajectories
+    from robocov_app.plots.figure_files import figure_png
+    from robocov_app.plots.runs import plot_trajectories
 
     return figure_png(plot_trajectories(record))
 

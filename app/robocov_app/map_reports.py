@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from robocov.mapcheck import MapReport
+    from robocov.mapfile.check import MapReport
 
 _LISTED = 5
 """Components whose areas are told."""

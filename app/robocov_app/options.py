@@ -126,7 +126,7 @@ class RunOptions:
         }
         if self.team is None:
             return Team.homogeneous(self.robots, **said)
-        from robocov.teamfile import read_team
+        from robocov.robots.teamfile import read_team
 
         return read_team(self.team, said)
 

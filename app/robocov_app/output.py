@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from robocov.atomic import written
 from robocov.errors import InputError, OutputError
+from robocov.files.atomic import written
 
 _OF_A_RUN = (
     *("run.json", "record.npz", "cost.csv", "metrics.csv", "run.mp4"),

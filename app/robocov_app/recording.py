@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.atomic import written
 from robocov.errors import OutputError, ParameterError, shown
+from robocov.files.atomic import written
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray

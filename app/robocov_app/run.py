@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
+from robocov.cost.momentary_cost import MomentaryCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
-from robocov.momentary_cost import MomentaryCost
 from robocov.record import Record
-from robocov.recorder import Recorder
+from robocov.record.recorder import Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.building import FILM_LATTICE, built_cost, cost_for_pictures
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov_app.options import RunOptions
     from robocov_app.panes import Shown
-    from robocov_app.plot_coverage import Moment
-    from robocov_app.plot_curves import Curve
+    from robocov_app.plots.coverage import Moment
+    from robocov_app.plots.curves import Curve
     from robocov_app.recording import Frame
 
 FILM_SCALE = 1.3
@@ -164,8 +164,8 @@ def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
 
 def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:
     """Draw ``trajectories.png|svg`` and ``cost.png|svg``."""
-    from robocov_app.plot_coverage import plot_coverage
-    from robocov_app.plots import plot_trajectories
+    from robocov_app.plots.coverage import plot_coverage
+    from robocov_app.plots.runs import plot_trajectories
     from robocov_app.view.theme import theme_named
 
     record, history = run.record, run.history
@@ -202,7 +202,7 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     The others are on the same map, but for robots that failed at other places. Where all robots have
     failed there is nothing to draw.
     """
-    from robocov_app.plot_coverage import Moment
+    from robocov_app.plots.coverage import Moment
     from robocov_app.view.field import Field, FieldLattice
 
     drawn, moments = runs[0].record.environment, []
@@ -242,7 +242,7 @@ def cost_title(record: Record) -> str:
 
 def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
     """Draw each figure and write it as PNG and SVG under its name."""
-    from robocov_app.plots import save_figure
+    from robocov_app.plots.runs import save_figure
 
     with progress("pictures", 2 * len(figures), quiet=quiet) as update:
         done = 0

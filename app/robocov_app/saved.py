@@ -11,8 +11,8 @@ import numpy as np
 
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError, shown
+from robocov.metrics.results import read_history
 from robocov.record import Record
-from robocov.results import read_history
 
 if TYPE_CHECKING:
     from robocov.environment import Environment

@@ -17,7 +17,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from robocov.array_cache import ArrayCache
     from robocov.conditions import Conditions, Failure, Join
     from robocov.controllers import (
         CONTROLLERS,
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     )
     from robocov.controllers.gains import choice, gain
     from robocov.cost import CoverageCost, CoverageResult
+    from robocov.cost.momentary_cost import MomentaryCost
     from robocov.density import (
         Density,
         Gaussian,
@@ -44,33 +44,33 @@ if TYPE_CHECKING:
         WeightedPolygons,
     )
     from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+    from robocov.environment.obstacle_path import ObstaclePath
+    from robocov.environment.starts import DiscStart, PointsStart, UniformStart
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
+    from robocov.files.array_cache import ArrayCache
     from robocov.generator import GENERATORS, generated_map
-    from robocov.mapcheck import check_map
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
+    from robocov.mapfile.check import check_map
     from robocov.metrics import cost_history, settled_at, summarise
-    from robocov.momentary_cost import MomentaryCost
-    from robocov.neighbours import Neighbours
+    from robocov.metrics.results import Results, read_results
+    from robocov.metrics.run_metrics import RunMetrics, run_metrics
     from robocov.observation import Decision, Observations, Snapshot
-    from robocov.obstacle_path import ObstaclePath
+    from robocov.observation.neighbours import Neighbours
+    from robocov.observation.region import Region
     from robocov.optimum import Optimum
     from robocov.record import Record
-    from robocov.region import Region
-    from robocov.results import Results, read_results
     from robocov.robots import Team
-    from robocov.run_metrics import RunMetrics, run_metrics
+    from robocov.robots.teamfile import read_team
     from robocov.sensor import RangeSensor
     from robocov.simulation import Simulation
-    from robocov.starts import DiscStart, PointsStart, UniformStart
-    from robocov.teamfile import read_team
     from robocov.voronoi import VoronoiPartition, partition
-    from robocov.weighted_cells import WeightedCells, weighted_partition
+    from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
 
 __version__ = "0.1.0"
 
 _HOME = {
-    "ArrayCache": "array_cache",
+    "ArrayCache": "files.array_cache",
     "Atlas": "controllers",
     "AtlasShared": "controllers",
     "CONTROLLERS": "controllers",
@@ -81,7 +81,7 @@ _HOME = {
     "CoverageResult": "cost",
     "Decision": "observation",
     "Density": "density",
-    "DiscStart": "starts",
+    "DiscStart": "environment.starts",
     "Environment": "environment",
     "Failure": "conditions",
     "GENERATORS": "generator",
@@ -93,39 +93,39 @@ _HOME = {
     "Join": "conditions",
     "Lloyd": "controllers",
     "MapError": "errors",
-    "MomentaryCost": "momentary_cost",
-    "Neighbours": "neighbours",
+    "MomentaryCost": "cost.momentary_cost",
+    "Neighbours": "observation.neighbours",
     "Observations": "observation",
-    "ObstaclePath": "obstacle_path",
+    "ObstaclePath": "environment.obstacle_path",
     "Optimum": "optimum",
     "OutputError": "errors",
     "OwnView": "controllers",
     "ParameterError": "errors",
-    "PointsStart": "starts",
+    "PointsStart": "environment.starts",
     "PolygonObstacle": "environment",
     "RangeSensor": "sensor",
     "Rapf": "controllers",
     "Raster": "density",
     "Record": "record",
-    "Region": "region",
-    "Results": "results",
+    "Region": "observation.region",
+    "Results": "metrics.results",
     "RobocovError": "errors",
     "Rpf": "controllers",
-    "RunMetrics": "run_metrics",
+    "RunMetrics": "metrics.run_metrics",
     "Simulation": "simulation",
     "Snapshot": "observation",
     "StartError": "errors",
     "Team": "robots",
     "Uniform": "density",
-    "UniformStart": "starts",
+    "UniformStart": "environment.starts",
     "VoronoiPartition": "voronoi",
     "WallObstacle": "environment",
     "WeightedArea": "density",
-    "WeightedCells": "weighted_cells",
+    "WeightedCells": "voronoi.weighted_cells",
     "WeightedPolygons": "density",
     "World": "world",
     "bundled_maps": "mapfile",
-    "check_map": "mapcheck",
+    "check_map": "mapfile.check",
     "choice": "controllers.gains",
     "cost_history": "metrics",
     "gain": "controllers.gains",
@@ -134,13 +134,13 @@ _HOME = {
     "make_controller": "controllers",
     "map_schema": "mapfile",
     "partition": "voronoi",
-    "read_results": "results",
-    "read_team": "teamfile",
-    "run_metrics": "run_metrics",
+    "read_results": "metrics.results",
+    "read_team": "robots.teamfile",
+    "run_metrics": "metrics.run_metrics",
     "save_map": "mapfile",
     "settled_at": "metrics",
     "summarise": "metrics",
-    "weighted_partition": "weighted_cells",
+    "weighted_partition": "voronoi.weighted_cells",
 }
 
 __all__ = [

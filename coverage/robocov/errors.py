@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from robocov.mistakes import Mistake
+    from robocov.files.mistakes import Mistake
 
 
 _LONGEST_KNOWN = 60

@@ -12,10 +12,10 @@ import numpy as np
 import pymunk
 
 from robocov.arrays import Array, BoolArray
-from robocov.scans import headings
+from robocov.observation.scans import headings
 
 if TYPE_CHECKING:
-    from robocov.solid import Mover
+    from robocov.world.solid import Mover
 
 _FARTHEST = 1e6
 """An unlimited range, in metres, as the engine's bounding boxes can hold it."""

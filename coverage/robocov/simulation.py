@@ -11,25 +11,25 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.changing_world import ChangingWorld
-from robocov.communication import Inbox
 from robocov.conditions import Conditions
+from robocov.conditions.communication import Inbox
+from robocov.conditions.perception import Perception, of_working
 from robocov.controllers import CONTROLLERS, informed
 from robocov.controllers.base import Controller
-from robocov.decisions import checked_decision, given_forces
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
-from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.perception import Perception, of_working
+from robocov.observation.decisions import checked_decision, given_forces
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.scans import Scanning, Scans
 from robocov.record import Record
-from robocov.recorder import Recorder
-from robocov.relocation import check_starts
+from robocov.record.recorder import Recorder
 from robocov.robots import Team
-from robocov.scans import Scanning, Scans
 from robocov.sensor import RangeSensor
-from robocov.solid import movers, solid_pieces
 from robocov.world import SINK, World
+from robocov.world.changing_world import ChangingWorld
+from robocov.world.relocation import check_starts
+from robocov.world.solid import movers, solid_pieces
 
 DEFAULT_DT = 1 / 60
 """Control period in seconds where nothing else is said."""

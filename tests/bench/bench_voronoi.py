@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import Delaunay
 
-from robocov.neighbours import Neighbours
-from robocov.region import Region
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
 from robocov.voronoi import partition
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ import shapely
 sys.path.insert(0, str(Path(__file__).parents[1] / "robocov"))
 
 import brute_force_geodesic as brute
+from cost_cases import compared
 from drawn_maps import KINDS, SIDE, drawn_map, drawn_places
-from test_cost_anywhere import compared
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError

@@ -76,8 +76,8 @@ def _require_one_line(message: str) -> None:
 def _require_map(environment: Any) -> str:
     """Check that a map is one that can be saved and loaded again."""
     from robocov.environment import Environment
-    from robocov.mapcheck import check_map
     from robocov.mapfile import dump_map, from_json, parse_map, to_json
+    from robocov.mapfile.check import check_map
 
     if not isinstance(environment, Environment):
         raise WrongError(f"a map was wanted: {type(environment).__name__}")

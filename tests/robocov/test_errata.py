@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from voronoi_cases import PENTAGON, REGIONS, names, seeds
 
-from robocov.best_points import best_points
 from robocov.environment import Environment
 from robocov.locational import Sensing, gradient
+from robocov.locational.best_points import best_points
 from robocov.robots import Team
-from robocov.solid import solid_pieces
 from robocov.voronoi import partition
 from robocov.world import World
+from robocov.world.solid import solid_pieces
 
 # (28): F = m q'' - ν q'
 

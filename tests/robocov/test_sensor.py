@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import Environment
 from robocov.sensor import RangeSensor
-from robocov.solid import solid_pieces
+from robocov.world.solid import solid_pieces
 
 
 @pytest.fixture(scope="module")

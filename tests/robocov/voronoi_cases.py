@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from robocov.neighbours import Neighbours
-from robocov.region import Region
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.neighbours import Neighbours
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
 from robocov.robots import Team
-from robocov.starts import DiscStart, UniformStart
 from robocov_app.view.scene import Scene
 
 ROOMS = Environment(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.editor import arranging, booleans, clipboard, edits, simplifying, vertices
 from robocov_app.editor.background import Background
 from robocov_app.editor.document import BOUNDARY, Item, Sketch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_run import ROOMS
 
-from robocov import cost as cost_module
+from robocov.cost import coverage as cost_module
 from robocov_app import building
 from robocov_app.building import built_cost, cost_for_pictures
 

@@ -12,9 +12,9 @@ from called import COMMAND, SHORT, answer, complaint
 from PIL import Image
 
 from robocov.environment import Environment, WallObstacle
+from robocov.environment.starts import DiscStart
 from robocov.mapfile import save_map
 from robocov.optimum import optimum
-from robocov.starts import DiscStart
 from robocov_app.cli import main
 
 FAST = ("--lattice", "24", "--restarts", "3")

@@ -11,7 +11,7 @@ from called import answer, complaint
 from swept import ROOM, controller, run_folders, tables
 
 from robocov.mapfile import save_map
-from robocov.results import read_results
+from robocov.metrics.results import read_results
 from robocov_app.cli import main
 
 STUDY = """

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from called import SHORT, complaint
 
+from robocov.metrics.run_metrics import COLUMNS, run_metrics
 from robocov.record import Record
-from robocov.run_metrics import COLUMNS, run_metrics
 from robocov_app.cli import main
 
 

@@ -13,8 +13,8 @@ from shapely import Polygon
 from robocov.conditions import Conditions
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.errors import ParameterError
-from robocov.obstacle_path import ObstaclePath
 from robocov.simulation import Simulation
 from robocov_app.demo.costs import DirectCosts, WorkerCosts
 from robocov_app.demo.lane import Wanted

@@ -12,7 +12,7 @@ from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment
-from robocov.obstacle_path import ObstaclePath
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov_app.demo import costs as module
 from robocov_app.demo.costs import DirectCosts, WorkerCosts
 from robocov_app.live.messages import Answer, Building, Failed, Ready

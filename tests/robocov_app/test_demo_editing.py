@@ -7,9 +7,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.demo.editing import (
     SHORTEST,
     circle_of,

@@ -11,9 +11,9 @@ from kept_run import COUNTING, record_of, records_of, repeated, said_by, same_ar
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov.environment import CircleObstacle
+from robocov.environment.starts import PointsStart
 from robocov.mapfile import save_map
 from robocov.record import Record
-from robocov.starts import PointsStart
 from robocov_app.cli import main
 from robocov_app.demo import history
 from robocov_app.demo.editing import with_obstacle

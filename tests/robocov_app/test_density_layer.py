@@ -14,7 +14,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
-from robocov_app.plot_arena import draw_map, map_handles, ticks_in_metres
+from robocov_app.plots.arena import draw_map, map_handles, ticks_in_metres
 from robocov_app.view.field import Field, FieldLattice
 from robocov_app.view.picture import Painter
 from robocov_app.view.scene import Scene

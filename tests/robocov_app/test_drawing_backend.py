@@ -20,8 +20,8 @@ from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov.metrics import cost_history
 from robocov_app import drawing_backend
-from robocov_app.page import tone
-from robocov_app.plots import plot_comparison, plot_environment, plot_trajectories
+from robocov_app.plots.page import tone
+from robocov_app.plots.runs import plot_comparison, plot_environment, plot_trajectories
 from robocov_app.report.theme_css import hex_code
 from robocov_app.view.theme import DARK, LIGHT
 

@@ -7,7 +7,7 @@ from drawn_run import HALL, ROOMS
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.obstacle_path import ObstaclePath
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov_app.view.field import Field, FieldLattice, Fields
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))

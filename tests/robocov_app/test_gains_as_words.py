@@ -14,11 +14,11 @@ from swept import ROOM, small_study
 
 from robocov.errors import InputError, ParameterError
 from robocov.mapfile import save_map
+from robocov.metrics.results import read_results
 from robocov.record import Record
-from robocov.results import read_results
 from robocov_app.cli import main
 from robocov_app.demo.scenario import Law, branch_words, gain_words
-from robocov_app.plot_gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.plots.gains import Dependence, plot_gain_grid, plot_gains
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.gathering import gathered
 from robocov_app.report.groups import dependences, gain_text

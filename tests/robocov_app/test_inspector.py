@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from robocov import Individually, Lloyd, Rapf, Rpf, Simulation, Team, load_map
 from robocov.controllers import make_controller
 from robocov.metrics import SETTLED_WINDOW
-from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
 from robocov.voronoi import partition
 from robocov_app.demo import inspector
 from robocov_app.demo.inspector import REST, Line, Report, explain

@@ -11,7 +11,7 @@ from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.starts import UniformStart
+from robocov.environment.starts import UniformStart
 from robocov_app.view import knowledge
 from robocov_app.view.camera import Camera
 from robocov_app.view.knowledge import CursorPath, RayScan, SensedObstacles

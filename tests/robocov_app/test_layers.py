@@ -11,9 +11,9 @@ from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, neare
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
 from robocov.environment import Environment, PolygonObstacle
+from robocov.environment.starts import UniformStart
 from robocov.observation import Snapshot
 from robocov.robots import Team
-from robocov.starts import UniformStart
 from robocov.voronoi import partition
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.layers import drawn_radii

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.mapcheck import check_map
-from robocov.starts import DiscStart
+from robocov.environment.starts import DiscStart
+from robocov.mapfile.check import check_map
 from robocov_app.map_reports import report_lines
 
 

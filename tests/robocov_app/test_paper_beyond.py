@@ -14,7 +14,7 @@ import pytest
 from tiny_paper import TINY, TINY_BEYOND, means, shared
 
 from robocov.controllers import CONTROLLERS
-from robocov.results import read_results
+from robocov.metrics.results import read_results
 from robocov_app.cli import main
 from robocov_app.paper import beyond, beyond_studies, beyond_writing, evidence, goals, steps, studying
 from robocov_app.paper import plan as planned

@@ -12,9 +12,9 @@ from matplotlib.colors import to_rgb
 from robocov.errors import ParameterError
 from robocov.metrics import CostHistory
 from robocov.voronoi import partition
-from robocov_app.figure_files import save_figure
-from robocov_app.page import tone
 from robocov_app.paper.figures import NUMBERS, TEXTS, WIDE, Shown, draw_figure
+from robocov_app.plots.figure_files import save_figure
+from robocov_app.plots.page import tone
 from robocov_app.view.theme import DARK, LIGHT
 
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.degradation import Degradation
 from robocov_app.paper import goals as judged
 from robocov_app.paper.beyond_plan import HUGE, LARGE
 from robocov_app.paper.beyond_studies import TARGETS, TEAMS, UNTUNED, contender
+from robocov_app.paper.degradation import Degradation
 from robocov_app.paper.extensions import conditions_claim, density_claim, targets_claim, teams_claim
 from robocov_app.paper.goals import GOALS, RIVALS, goals, rival_claims, worst_median, worst_ratio
 from robocov_app.paper.outcomes import Outcomes, Scenario

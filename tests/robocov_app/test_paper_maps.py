@@ -5,9 +5,9 @@ import pytest
 import shapely
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle
+from robocov.environment.starts import DiscStart
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
-from robocov.starts import DiscStart
 from robocov_app.paper import maps
 
 

@@ -9,9 +9,9 @@ from drawn_run import SQUARE
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
+from robocov.environment.starts import UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
-from robocov.starts import UniformStart
 from robocov_app.interruption import Interruption
 from robocov_app.paper.references import Question, Reference, references
 from robocov_app.sweep.study import StudyMap

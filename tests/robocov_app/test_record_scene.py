@@ -6,11 +6,11 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment
-from robocov.obstacle_path import ObstaclePath
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.plots import plot_trajectories
+from robocov_app.plots.runs import plot_trajectories
 from robocov_app.recording import iter_frames
 from robocov_app.view.picture import Painter, standard_layers
 from robocov_app.view.record_scene import record_scene

@@ -19,9 +19,9 @@ from reported_results import HOSTILE, entry, falling, walk, watched
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle
-from robocov.obstacle_path import ObstaclePath
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.voronoi import partition
-from robocov_app.plot_curves import curve_styles
+from robocov_app.plots.curves import curve_styles
 from robocov_app.report.document import report
 from robocov_app.report.embedding import embedded_map, embedded_run
 from robocov_app.report.replay import ReplayRun, asset, replay_html

@@ -208,7 +208,7 @@ def test_a_page_knows_its_own(tmp_path) -> None:
 
 
 def test_marks_are_those_of_the_plots() -> None:
-    from robocov_app.plot_curves import curve_styles
+    from robocov_app.plots.curves import curve_styles
 
     used = {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", "a", "b", "c"]).values()}
     assert used == MARKS.keys()

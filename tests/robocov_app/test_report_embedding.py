@@ -15,8 +15,8 @@ from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment, PolygonObstacle
-from robocov.obstacle_path import ObstaclePath
-from robocov_app.plot_curves import curve_styles
+from robocov.environment.obstacle_path import ObstaclePath
+from robocov_app.plots.curves import curve_styles
 from robocov_app.report.embedding import (
     NONE,
     RATE,

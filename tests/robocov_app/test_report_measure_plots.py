@@ -8,8 +8,8 @@ import numpy as np
 from reported_results import entry, falling, result_of, walk
 
 from robocov.metrics import CostHistory
+from robocov.metrics.run_metrics import run_metrics
 from robocov.robots import Team
-from robocov.run_metrics import run_metrics
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.measure_plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
 

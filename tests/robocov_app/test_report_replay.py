@@ -11,7 +11,7 @@ from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
 from robocov.errors import ParameterError
-from robocov_app.plot_curves import curve_styles
+from robocov_app.plots.curves import curve_styles
 from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from reported_results import HOSTILE
 
-from robocov_app.plot_gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.plot_results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.plots.gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.plots.results import Band, Sample, plot_cost_bands, plot_final_costs
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import named_colours
 from robocov_app.view.theme import LIGHT

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.plot_gains import HEAT_LEVELS
+from robocov_app.plots.gains import HEAT_LEVELS
 from robocov_app.report.theme_css import hex_code, named_colours, theme_rules, variables
 from robocov_app.view.theme import DARK, LIGHT, contrast, rgb
 

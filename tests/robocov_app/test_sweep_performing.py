@@ -15,8 +15,8 @@ from swept import HEAD, ROOM, controller, small_study
 
 from robocov.cost import CoverageCost
 from robocov.metrics import cost_history, summarise
+from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
-from robocov.results import read_history
 from robocov_app.sweep.performing import FIGURES, Outcome, perform, prepared, simulated
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.table import columns_of

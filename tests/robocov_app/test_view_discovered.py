@@ -8,7 +8,7 @@ from drawn_pixels import ONE, distance, drawn
 from drawn_run import SQUARE, explained
 
 from robocov.controllers.atlas import Atlas
-from robocov.discovered import FREE, PRESUMED, WALL, DiscoveredMap, Raster
+from robocov.planning.discovered import FREE, PRESUMED, WALL, DiscoveredMap, Raster
 from robocov.robots import Team
 from robocov_app.view.discovered import discovered_map
 from robocov_app.view.sensed import Sensed

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.starts import DiscStart, UniformStart
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov_app.demo.lane import with_failed
 from robocov_app.demo.scenario import Law, Scenario
 from robocov_app.demo.session import Session

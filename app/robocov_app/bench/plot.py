@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from robocov_app.page import HEADING, SMALL, TEXT, Page, plain_style, tone
-from robocov_app.plots import save_figure
+from robocov_app.plots.page import HEADING, SMALL, TEXT, Page, plain_style, tone
+from robocov_app.plots.runs import save_figure
 from robocov_app.view.theme import LIGHT, Theme
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from robocov.errors import InputError, MapError
-from robocov.mapcheck import MapReport, check_map
+from robocov.files.mistakes import place, told
 from robocov.mapfile import load_map, map_file
-from robocov.mistakes import place, told
+from robocov.mapfile.check import MapReport, check_map
 from robocov_app.map_reports import report_lines
 from robocov_app.watching import changes
 

@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 
 from robocov.arrays import Array
-from robocov.atomic import written
 from robocov.errors import InputError, ParameterError, shown
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite
@@ -56,7 +56,7 @@ def command(options: Arguments) -> None:
     if options.sites is not None and (options.sites.is_dir() or not options.sites.name):
         raise InputError(f"--sites: {str(options.sites)!r}, but the name of a file was wanted")
     if options.plot is not None:
-        from robocov_app.plots import check_figure_path
+        from robocov_app.plots.runs import check_figure_path
 
         check_figure_path(options.plot)
     environment = load_map(options.map)
@@ -123,8 +123,8 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
 def draw(options: Arguments, environment: Environment, cost: CoverageCost, result: CoverageResult) -> None:
     """Draw the map of distances."""
     from robocov.robots import Team
-    from robocov_app.plot_coverage import Moment, plot_coverage
-    from robocov_app.plots import save_figure
+    from robocov_app.plots.coverage import Moment, plot_coverage
+    from robocov_app.plots.runs import save_figure
     from robocov_app.view.field import Field, FieldLattice
     from robocov_app.view.phi import mean_words
 

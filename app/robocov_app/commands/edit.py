@@ -70,7 +70,7 @@ def command(options: Arguments) -> int:
         if options.screenshot is None:
             window.run()
             return 0
-        from robocov.atomic import written
+        from robocov.files.atomic import written
         from robocov_app.demo.film import pixels
         from robocov_app.recording import png_bytes
 

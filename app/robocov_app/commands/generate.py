@@ -13,8 +13,8 @@ import tyro
 
 from robocov.environment import Environment
 from robocov.errors import InputError, MapError, OutputError, ParameterError, counted
-from robocov.mapcheck import check_map
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
+from robocov.mapfile.check import check_map
 from robocov_app.options import in_range
 from robocov_app.progress import progress
 
@@ -102,8 +102,8 @@ def command(options: Arguments) -> None:
                 rows.append(_row(path, made[-1]))
                 update(number + 1)
     if options.plot is not None:
-        from robocov_app.map_sheet import plot_maps
-        from robocov_app.plots import save_figure
+        from robocov_app.plots.map_sheet import plot_maps
+        from robocov_app.plots.runs import save_figure
 
         save_figure(plot_maps(made, options.theme), options.plot)
     if options.out is not None:
@@ -125,7 +125,7 @@ def _check(options: Arguments) -> None:
     if options.side != _SIDE and options.width is not None:
         raise InputError(f"--side: {options.side:g}, but --width and --height say how large the map is")
     if options.plot is not None:
-        from robocov_app.plots import check_figure_path
+        from robocov_app.plots.runs import check_figure_path
 
         check_figure_path(options.plot)
     _check_out(options.out, folder=bool(options.count or options.study), overwrite=options.overwrite)

@@ -11,11 +11,11 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError
+from robocov.files.strictjson import one_line
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
-from robocov.strictjson import one_line
-from robocov_app.figure_files import check_figure_path
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map
+from robocov_app.plots.figure_files import check_figure_path
 from robocov_app.progress import progress
 
 

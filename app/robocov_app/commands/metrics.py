@@ -12,7 +12,7 @@ import tyro
 from robocov_app.options import in_range
 
 if TYPE_CHECKING:
-    from robocov_app.plot_metrics import Measured
+    from robocov_app.plots.metrics import Measured
     from robocov_app.saved import Saved
 
 
@@ -48,10 +48,10 @@ def command(options: Arguments) -> None:
     from robocov_app.saved import load_saved
 
     if options.plot is not None:
-        from robocov_app.figure_files import check_figure_path
+        from robocov_app.plots.figure_files import check_figure_path
 
         check_figure_path(options.plot)
-    from robocov.run_metrics import COLUMNS
+    from robocov.metrics.run_metrics import COLUMNS
 
     measured, answers = [], []
     for saved in load_saved(options.folder):
@@ -60,8 +60,8 @@ def command(options: Arguments) -> None:
         measured.append(run)
         answers.append(answer_of(saved, run))
     if options.plot is not None:
-        from robocov_app.figure_files import save_figure
-        from robocov_app.plot_metrics import plot_metrics
+        from robocov_app.plots.figure_files import save_figure
+        from robocov_app.plots.metrics import plot_metrics
 
         save_figure(
             plot_metrics(measured, options.theme, title=f"Metrics  ·  {options.folder.name}"), options.plot
@@ -74,9 +74,9 @@ def command(options: Arguments) -> None:
 
 def measure(saved: Saved, options: Arguments) -> Measured:
     """Measure one run."""
-    from robocov.moments import nearest_moments
-    from robocov.run_metrics import run_metrics
-    from robocov_app.plot_metrics import Measured
+    from robocov.metrics.run_metrics import run_metrics
+    from robocov.record.moments import nearest_moments
+    from robocov_app.plots.metrics import Measured
     from robocov_app.progress import progress
 
     record = saved.record
@@ -94,7 +94,7 @@ def measure(saved: Saved, options: Arguments) -> Measured:
 
 def answer_of(saved: Saved, run: Measured) -> dict[str, Any]:
     """Return what is said of one run: the figures of its end."""
-    from robocov.run_metrics import time_near_final
+    from robocov.metrics.run_metrics import time_near_final
 
     near = None if saved.history is None or not len(saved.history.time) else time_near_final(saved.history)
     return {

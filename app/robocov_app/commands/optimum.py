@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 import tyro
 
-from robocov.array_cache import ArrayCache
-from robocov.atomic import written
 from robocov.errors import InputError, ParameterError
+from robocov.files.array_cache import ArrayCache
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
@@ -140,7 +140,7 @@ def _check(options: Arguments) -> None:
         if options.positions.exists() and not options.overwrite:
             raise InputError(f"{options.positions}: exists already; another name, or --overwrite, was wanted")
     if options.plot is not None:
-        from robocov_app.plots import check_figure_path
+        from robocov_app.plots.runs import check_figure_path
 
         check_figure_path(options.plot)
 
@@ -228,8 +228,8 @@ def _draw(path: Path, theme: str, environment: Environment, best: Optimum, radiu
     """Draw the map of distances."""
     from robocov.robots import Team
     from robocov_app.building import PICTURE_LATTICE
-    from robocov_app.plot_coverage import Moment, plot_coverage
-    from robocov_app.plots import save_figure
+    from robocov_app.plots.coverage import Moment, plot_coverage
+    from robocov_app.plots.runs import save_figure
     from robocov_app.view.field import Field, FieldLattice
     from robocov_app.view.phi import mean_words
 

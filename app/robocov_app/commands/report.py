@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from robocov.atomic import written
 from robocov.errors import InputError, OutputError, ParameterError, counted
+from robocov.files.atomic import written
 from robocov_app.output import REPORT, is_report
 
 if TYPE_CHECKING:

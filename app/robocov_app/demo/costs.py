@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from robocov.cost import CoverageCost
+from robocov.cost.momentary_cost import MomentaryCost
 from robocov.errors import RobocovError
-from robocov.momentary_cost import MomentaryCost
 from robocov_app.live.cost_worker import CostWorker
 from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Answer, Building, Failed, Question, Ready
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.cost import CoverageResult
+    from robocov.cost.lattice import Sites
     from robocov.environment import Environment
-    from robocov.lattice import Sites
 
 LATTICE = 128
 """Sites along a side."""

@@ -10,8 +10,8 @@ import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
+from robocov.files.strictjson import place
 from robocov.mapfile import from_json, to_json
-from robocov.strictjson import place
 
 if TYPE_CHECKING:
     from robocov.environment import Environment, Obstacle

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from robocov.arrays import Array, IntArray
-    from robocov.communication import Inbox
     from robocov.conditions import Conditions
+    from robocov.conditions.communication import Inbox
     from robocov.environment import Environment
     from robocov.observation import Decision
     from robocov.robots import Team

@@ -9,8 +9,8 @@ import numpy as np
 
 from robocov.controllers import remembers
 from robocov.errors import StartError
-from robocov.relocation import relocated
 from robocov.simulation import Simulation
+from robocov.world.relocation import relocated
 from robocov_app.demo.curves import Curve, Ghost
 from robocov_app.demo.history import Circumstances, State
 from robocov_app.demo.scenario import branch_words

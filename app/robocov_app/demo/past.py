@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.conditions.perception import Perception
 from robocov.controllers import informed
 from robocov.errors import ParameterError
-from robocov.neighbours import Neighbours
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.perception import Perception
+from robocov.observation.neighbours import Neighbours
 from robocov.sensor import RangeSensor
 from robocov.simulation import DEFAULT_DT
-from robocov.solid import movers, solid_pieces
+from robocov.world.solid import movers, solid_pieces
 
 if TYPE_CHECKING:
     from robocov.controllers.base import Controller

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from robocov.controllers.base import Controller
     from robocov.controllers.gains import Gain, Option
     from robocov.observation import Observations
+    from robocov.observation.region import Region
     from robocov.record import Record
-    from robocov.region import Region
     from robocov.robots import Team
     from robocov_app.saved import Saved
 

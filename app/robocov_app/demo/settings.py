@@ -8,8 +8,8 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from robocov.atomic import written
 from robocov.errors import OutputError
+from robocov.files.atomic import written
 
 FOLDER = "ROBOCOV_SETTINGS"
 """Environment variable with another folder for the settings; empty for none."""

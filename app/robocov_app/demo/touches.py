@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.conditions import SOON
 from robocov.errors import ParameterError
-from robocov.relocation import nearest_free
+from robocov.world.relocation import nearest_free
 from robocov_app.demo.lane import Wanted
 from robocov_app.demo.scenario import MOST_ROBOTS
 from robocov_app.demo.timeline import Timeline

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.atomic import written
 from robocov.errors import RobocovError
+from robocov.files.atomic import written
 from robocov_app.demo.actions import all_actions
 from robocov_app.demo.arena import Arena
 from robocov_app.demo.asked import report_on

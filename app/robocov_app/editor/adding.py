@@ -14,10 +14,10 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
-from robocov.mapmodels import LARGEST, SMALLEST
-from robocov.starts import DiscStart, PointsStart, UniformStart
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.demo.editing import SHORTEST, words_for
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.plane import ring_near, tenths
@@ -25,7 +25,7 @@ from robocov_app.editor.selection import Change, Selection, called
 
 if TYPE_CHECKING:
     from robocov.environment import Obstacle, Point, Ring
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 _LONGEST_NAME = 100
 

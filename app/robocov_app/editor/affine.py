@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.environment import PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart
 from robocov_app.editor.plane import cos_sin, ring_near, tenths
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.environment import Obstacle, Point, Ring
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 _ALIKE = 1e-12
 """Relative difference of what is the same but for rounding."""

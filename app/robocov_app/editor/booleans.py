@@ -18,7 +18,7 @@ from shapely import Polygon
 
 from robocov.environment import GRID, CircleObstacle, PolygonObstacle
 from robocov.errors import MapError, counted
-from robocov.mapmodels import LARGEST, SMALLEST
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.document import Item, Sketch
 from robocov_app.editor.outlines import outlines
 from robocov_app.editor.plane import tenths

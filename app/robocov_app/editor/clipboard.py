@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.environment import PolygonObstacle
 from robocov.errors import MapError
+from robocov.files.strictjson import parse
 from robocov.mapfile import dump_document
-from robocov.mapmodels import FORMAT as MAP_FORMAT
-from robocov.mapmodels import VERSION
-from robocov.strictjson import parse
+from robocov.mapfile.models import FORMAT as MAP_FORMAT
+from robocov.mapfile.models import VERSION
 from robocov_app.editor.adding import free_name
 from robocov_app.editor.affine import Affine
 from robocov_app.editor.document import Sketch, draft_document, sketch_of

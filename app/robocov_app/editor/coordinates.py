@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, shown
-from robocov.mapmodels import FARTHEST, LARGEST
+from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.plane import cos_sin
 
 if TYPE_CHECKING:

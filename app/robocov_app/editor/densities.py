@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.density import HEAVIEST, Gaussian, Gaussians, Raster
 from robocov.errors import MapError
-from robocov.mapmodels import FARTHEST, LARGEST
+from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.demo.editing import SHORTEST
 from robocov_app.editor.plane import ring_near, tenths
 from robocov_app.editor.selection import Change, Selection

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from robocov.errors import MapError, RobocovError
-from robocov.mapmodels import SMALLEST
+from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.grips import Grip, grips, handled
 from robocov_app.editor.selection import Selection

@@ -16,11 +16,11 @@ import shapely
 from shapely import GeometryCollection, LineString, Polygon
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
+from robocov.files.strictjson import located, one_line, parse, require_json
 from robocov.mapfile import density_of, dump_document, from_json, to_json
-from robocov.mapmodels import FARTHEST, LARGEST, check_header
-from robocov.starts import DiscStart, PointsStart
-from robocov.strictjson import located, one_line, parse, require_json
+from robocov.mapfile.models import FARTHEST, LARGEST, check_header
 from robocov_app.editor.annotations import annotated, taken_apart
 from robocov_app.editor.background import Background
 from robocov_app.editor.plane import DECIMALS as DECIMALS
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from robocov.density import Density
     from robocov.environment import Obstacle, Point, Ring
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 BOUNDARY: Final = -1
 """Stands for the boundary where obstacles have their keys."""

@@ -19,9 +19,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from robocov.atomic import written
 from robocov.errors import MapError, OutputError, counted
-from robocov.strictjson import one_line, parse, read_bytes
+from robocov.files.atomic import written
+from robocov.files.strictjson import one_line, parse, read_bytes
 from robocov_app.editor.document import Sketch, draft_document, sketch_of, sketch_text
 from robocov_app.editor.files import OnDisk
 from robocov_app.sweep.lock import locked

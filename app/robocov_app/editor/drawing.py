@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from robocov.environment import WallObstacle
+from robocov.environment.starts import PointsStart
 from robocov.errors import MapError
-from robocov.starts import PointsStart
 from robocov_app.editor import edits
 from robocov_app.editor.coordinates import next_point_of, size_of
 from robocov_app.editor.tool import Preview, Tool, apart, bearing_words, held, length_words, swept

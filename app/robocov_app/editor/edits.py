@@ -14,10 +14,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart
 from robocov.errors import MapError
-from robocov.mapmodels import LARGEST, SMALLEST
-from robocov.starts import DiscStart
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor import vertices
 from robocov_app.editor.adding import (
     boundary_drawn,
@@ -53,7 +53,7 @@ from robocov_app.editor.selection import Change, Selection, called, exchanged
 
 if TYPE_CHECKING:
     from robocov.environment import Obstacle
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
     from robocov_app.editor.background import Background
 
 __all__ = [

@@ -11,15 +11,15 @@ import shapely
 from shapely import LineString, MultiPoint, Polygon
 
 from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.mapmodels import FARTHEST, LARGEST, SMALLEST
-from robocov.starts import DiscStart, PointsStart
+from robocov.environment.starts import DiscStart, PointsStart
+from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array
     from robocov.environment import Obstacle, Point, Ring, WallObstacle
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 _FLAT = 1e-9
 """An outline whose area is below this part of its width or height squared is a line."""

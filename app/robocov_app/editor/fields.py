@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, WallObstacle
+from robocov.environment.starts import DiscStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart
 from robocov_app.editor import edits, vertices
 from robocov_app.editor.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.deeds import whole

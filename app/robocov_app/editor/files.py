@@ -9,9 +9,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from robocov.atomic import written
 from robocov.errors import MapError, OutputError
-from robocov.strictjson import one_line, read_bytes
+from robocov.files.atomic import written
+from robocov.files.strictjson import one_line, read_bytes
 from robocov_app.editor.document import Sketch, parse_sketch, sketch_text
 
 State: TypeAlias = Literal["same", "changed", "gone"]

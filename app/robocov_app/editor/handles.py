@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.starts import DiscStart, PointsStart
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov_app.demo.overlays import tag
 from robocov_app.editor.drawn_rings import outline_of
 from robocov_app.editor.tool import apart, length_words
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.environment import Point
-    from robocov.obstacle_path import ObstaclePath
-    from robocov.starts import StartSpec
+    from robocov.environment.obstacle_path import ObstaclePath
+    from robocov.environment.starts import StartSpec
     from robocov_app.editor.grips import Grip
     from robocov_app.editor.snapping import Guide
     from robocov_app.editor.tool import Preview

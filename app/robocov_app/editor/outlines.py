@@ -8,7 +8,7 @@ import shapely
 from shapely import Polygon
 
 from robocov.environment import PolygonObstacle
-from robocov.mapmodels import SMALLEST
+from robocov.mapfile.models import SMALLEST
 from robocov_app.editor.plane import DECIMALS, rounded
 
 if TYPE_CHECKING:

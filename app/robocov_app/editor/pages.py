@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.starts import DiscStart
+from robocov.environment.starts import DiscStart
 from robocov_app.demo.actions import key_words
 from robocov_app.demo.pages import GAP, MARGIN, WIDE, columns
 from robocov_app.editor.actions import all_actions

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from robocov.environment.obstacle_path import ObstaclePath, Repeat
 from robocov.errors import MapError
-from robocov.mapmodels import FASTEST, SLOWEST, SMALLEST
-from robocov.obstacle_path import ObstaclePath, Repeat
+from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.plane import nearest_on, ring_near
 from robocov_app.editor.selection import Change, Selection, called
 

@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
-from robocov.mapmodels import LARGEST, SMALLEST
-from robocov.starts import DiscStart, PointsStart
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.adding import free_name
 from robocov_app.editor.affine import Affine
 from robocov_app.editor.document import BOUNDARY, Sketch

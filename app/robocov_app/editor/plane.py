@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import MapError
-from robocov.mapmodels import FARTHEST
+from robocov.mapfile.models import FARTHEST
 
 if TYPE_CHECKING:
     from robocov.arrays import Array

@@ -1,7 +1,8 @@
 """What is wrong with a sketch, where, in words: for maps, and for drafts that are far from being one.
 
-The rules are those of `robocov.mapmodels` and `robocov.maprules`, which know of places in files and stop
-where it makes no sense to go on; here every fault has its place on the map, and the rest is still looked at.
+The rules are those of `robocov.mapfile.models` and `robocov.mapfile.rules`, which know of places in files and
+stop where it makes no sense to go on; here every fault has its place on the map, and the rest is still looked
+at.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from robocov.environment.starts import DiscStart, PointsStart, Start
 from robocov.errors import MapError, StartError, counted
-from robocov.mapmodels import FARTHEST, LARGEST, validate
-from robocov.maprules import check_rules
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST, LARGEST, validate
+from robocov.mapfile.rules import check_rules
 from robocov.robots import DEFAULT_RADIUS
-from robocov.starts import DiscStart, PointsStart, Start
-from robocov.strictjson import one_line
 from robocov_app.editor.document import BOUNDARY, Owner, Sketch, draft_document
 from robocov_app.editor.faults import label_faults, place_words, ring_faults, shape_faults, start_faults
 from robocov_app.editor.selection import called, rings_of
@@ -28,7 +29,7 @@ from robocov_app.editor.selection import called, rings_of
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 _LONGEST_TEXT = 10_000
 

@@ -6,18 +6,18 @@ import math
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import REPEATS, ObstaclePath
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import unknown_name
-from robocov.mistakes import Mistake, place, refusal
-from robocov.obstacle_path import REPEATS, ObstaclePath
-from robocov.starts import DiscStart, PointsStart, UniformStart
-from robocov.strictjson import shown_json
+from robocov.files.mistakes import Mistake, place, refusal
+from robocov.files.strictjson import shown_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from robocov.environment import Obstacle, Point, Ring
-    from robocov.mistakes import Path
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
+    from robocov.files.mistakes import Path
 
 _KEYS = {
     "polygon": ("kind", "name", "vertices", "holes", "path"),

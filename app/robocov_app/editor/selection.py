@@ -11,9 +11,9 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 from robocov_app.demo.editing import words_for
 from robocov_app.editor.document import BOUNDARY, Item, Owner, Sketch
 from robocov_app.editor.plane import nearest_on
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.environment import Obstacle, Point
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
 
 
 @dataclass(frozen=True, slots=True)

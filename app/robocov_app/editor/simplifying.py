@@ -10,7 +10,7 @@ import shapely
 from shapely import LineString, Polygon
 
 from robocov.errors import MapError, counted
-from robocov.mapmodels import LARGEST
+from robocov.mapfile.models import LARGEST
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.plane import ring_near
 from robocov_app.editor.selection import Change, Selection, ring_points, rings_of, with_rings

@@ -10,7 +10,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov.starts import DiscStart, PointsStart
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov_app.editor.document import BOUNDARY, Owner, Sketch
 from robocov_app.editor.plane import nearest_on
 from robocov_app.editor.selection import Vertex, ring_points

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from robocov.environment import Obstacle, Point, Ring
-    from robocov.starts import StartSpec
+    from robocov.environment.starts import StartSpec
     from robocov_app.editor.desk import Desk
     from robocov_app.editor.snapping import Guide
 

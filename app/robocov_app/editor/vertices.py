@@ -16,9 +16,9 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
-from robocov.mapmodels import SMALLEST
-from robocov.starts import DiscStart, PointsStart
+from robocov.mapfile.models import SMALLEST
 from robocov_app.editor.corners import bevelled as bevelled
 from robocov_app.editor.corners import rounded_off as rounded_off
 from robocov_app.editor.document import BOUNDARY, Owner, Sketch

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.demo.film import pixels
 from robocov_app.demo.layout import inside, laid_out
 from robocov_app.demo.overlays import draw_keys, draw_message

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from robocov.arrays.grouping import ranges
 from robocov.errors import ParameterError
-from robocov.grouping import ranges
 from robocov_app.importers.limits import MAX_CELLS
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.atomic import written
 from robocov.errors import ParameterError, RobocovError
 from robocov.extras import extra
+from robocov.files.atomic import written
 from robocov_app.exporters.cells import not_held
 from robocov_app.exporters.coordinates import DIGITS, free_area, on_grid, rings
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.exporters.cells import free_cells, grid_over, not_held
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 

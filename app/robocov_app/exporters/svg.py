@@ -8,8 +8,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 from shapely import Polygon
 
-from robocov.atomic import written
 from robocov.environment import CircleObstacle, Obstacle, Ring, WallObstacle
+from robocov.files.atomic import written
 from robocov_app.exporters.cells import not_held
 from robocov_app.exporters.coordinates import decimal, free_area
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.exporters.cells import not_held
 from robocov_app.exporters.coordinates import DIGITS, decimal, free_on_grid, rings
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions

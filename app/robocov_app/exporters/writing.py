@@ -133,8 +133,8 @@ class Exporter:
     suffixes : tuple of str
         Lower case, with the dot.
     write : callable
-        ``write(environment, path, options)`` writes the map whole or not at all (`robocov.atomic.written`)
-        and returns an `ExportReport`. Raises ParameterError or OutputError.
+        ``write(environment, path, options)`` writes the map whole or not at all
+        (`robocov.files.atomic.written`) and returns an `ExportReport`. Raises ParameterError or OutputError.
     options : frozenset of str
         Names of the `WriteOptions` that mean something here.
     files : callable

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, ParameterError, unknown_name
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 from robocov_app.importers import (
     dxf,
     geojson,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from robocov.arrays.grouping import ranges
 from robocov.environment import SAGITTA
-from robocov.grouping import ranges
 
 if TYPE_CHECKING:
     from collections.abc import Callable

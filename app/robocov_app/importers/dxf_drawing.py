@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import MapError, RobocovError, shown
-from robocov.mapmodels import FARTHEST
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.curves import TOLERANCE
 from robocov_app.importers.dxf_curves import Plane, ellipse, flat, spline
 from robocov_app.importers.limits import MAX_DEPTH

@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.environment import GRID
 from robocov.errors import MapError, counted, shown
-from robocov.mapmodels import LARGEST
+from robocov.mapfile.models import LARGEST
 from robocov_app.importers.fills import polygons_of, united
 from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.shapes import Line, Outline, Shapes, polygonised

@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.errors import MapError, RobocovError, shown
 from robocov.extras import extra
-from robocov.mapmodels import LARGEST
+from robocov.mapfile.models import LARGEST
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

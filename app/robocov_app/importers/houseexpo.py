@@ -8,8 +8,8 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError, counted
-from robocov.mapmodels import FARTHEST
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.fills import edges_of, enclosed, require_untangled
 from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.json_file import begins_with, located_errors, read_json, refused

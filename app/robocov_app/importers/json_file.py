@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import MapError
-from robocov.mistakes import Mistake, refusal
-from robocov.strictjson import located, one_line, parse, shown_json
+from robocov.files.mistakes import Mistake, refusal
+from robocov.files.strictjson import located, one_line, parse, shown_json
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from robocov.arrays import Array
-    from robocov.mistakes import Path as Steps
+    from robocov.files.mistakes import Path as Steps
 
 _BEFORE = b"\xef\xbb\xbf \t\r\n"
 
@@ -33,7 +33,7 @@ def read_json(path: Path) -> tuple[Any, bytes, str]:
     Raises
     ------
     MapError
-        When it cannot be read, is too large, or is not JSON; see `robocov.strictjson.parse`.
+        When it cannot be read, is too large, or is not JSON; see `robocov.files.strictjson.parse`.
     """
     where = one_line(path)
     content = limits.content(path, limits.MAX_TEXT_BYTES)

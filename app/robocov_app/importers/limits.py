@@ -7,8 +7,8 @@ import stat
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, shown
-from robocov.mapmodels import FARTHEST, LARGEST
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST, LARGEST
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -124,7 +124,7 @@ def require_coordinate(value: float, where: str) -> None:
     Raises
     ------
     MapError
-        When it is not a finite number within `robocov.mapmodels.FARTHEST`.
+        When it is not a finite number within `robocov.mapfile.models.FARTHEST`.
     """
     if not abs(value) <= FARTHEST:
         raise MapError(

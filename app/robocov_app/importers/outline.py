@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.grouping import beginnings, ranges, sizes
+from robocov.arrays.grouping import beginnings, ranges, sizes
 from robocov_app.importers.tracing import NECK
 
 if TYPE_CHECKING:

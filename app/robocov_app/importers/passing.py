@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.grouping import ranges
+from robocov.arrays.grouping import ranges
 
 if TYPE_CHECKING:
     from shapely import Polygon

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import MapError
-from robocov.mapmodels import FARTHEST
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.images import Brightness, is_picture, read_picture
 from robocov_app.importers.raster import BLOCKED, FREE, UNKNOWN, foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import yaml
 
 from robocov.errors import MapError, shown
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 
 Value: TypeAlias = str | list[str] | None
 """Text, a flat list of it, or None for what is nested deeper."""

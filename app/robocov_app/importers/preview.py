@@ -9,10 +9,10 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.passages import Gap, narrowest_gap
-from robocov_app.figure_files import check_figure_path, save_figure
-from robocov_app.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
-from robocov_app.plot_arena import draw_map, map_handles
+from robocov.environment.passages import Gap, narrowest_gap
+from robocov_app.plots.arena import draw_map, map_handles
+from robocov_app.plots.figure_files import check_figure_path, save_figure
+from robocov_app.plots.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Colour, Theme, theme_named
 

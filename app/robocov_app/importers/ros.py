@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import MapError, ParameterError, shown
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 from robocov_app.importers import limits, plain_yaml
 from robocov_app.importers.images import Brightness, read_picture
 from robocov_app.importers.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map

@@ -13,7 +13,7 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, unknown_name
-from robocov.mapmodels import FARTHEST, SMALLEST
+from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.importers import limits
 from robocov_app.importers.fills import Rule, edges_of, enclosed, require_untangled
 

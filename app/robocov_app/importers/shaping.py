@@ -11,12 +11,12 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
+from robocov.environment.starts import GAP, DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, counted, shown
+from robocov.files.strictjson import one_line
 from robocov.mapfile import from_json, to_json
-from robocov.mapmodels import SMALLEST
+from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-from robocov.starts import GAP, DiscStart, StartSpec, UniformStart
-from robocov.strictjson import one_line
 from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
 from robocov_app.importers.corners import sharpened
 from robocov_app.importers.passing import rooms

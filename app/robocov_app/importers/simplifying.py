@@ -14,8 +14,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
+from robocov.arrays.grouping import beginnings
 from robocov.errors import counted
-from robocov.grouping import beginnings
 from robocov_app.importers.outline import (
     Drawing,
     Outline,

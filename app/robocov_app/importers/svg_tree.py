@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NoReturn
 from xml.parsers import expat
 
 from robocov.errors import MapError, shown
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:

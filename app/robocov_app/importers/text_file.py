@@ -6,7 +6,7 @@ import codecs
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError
-from robocov.strictjson import one_line
+from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import shapely
 from scipy import ndimage
 from shapely import MultiPolygon
 
-from robocov.grouping import ranges, sizes
+from robocov.arrays.grouping import ranges, sizes
 from robocov_app.importers.limits import require_vertices
 
 if TYPE_CHECKING:

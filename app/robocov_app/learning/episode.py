@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from robocov.cost.momentary_cost import MomentaryCost
 from robocov.errors import ParameterError, StartError, shown
 from robocov.metrics import TOUCHING
-from robocov.momentary_cost import MomentaryCost
-from robocov.neighbours import close_pairs
 from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import close_pairs
+from robocov.observation.scans import Scanning
 from robocov.record import Record
-from robocov.recorder import Recorder
-from robocov.scans import Scanning
+from robocov.record.recorder import Recorder
 from robocov.simulation import Simulation
 from robocov_app.learning.driving import driving_forces
 from robocov_app.learning.rewards import reference_distance, shares
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from robocov.conditions import Conditions
     from robocov.cost import CoverageCost
     from robocov.environment import Environment
+    from robocov.observation.region import Region
     from robocov.record import Record
-    from robocov.region import Region
     from robocov.robots import Team
     from robocov_app.learning.layout import Rows
     from robocov_app.learning.task import CoverageTask

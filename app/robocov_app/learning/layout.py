@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from robocov.controllers.cells import cells_seen
 from robocov.errors import ParameterError, shown
-from robocov.scans import MOST_RAYS
+from robocov.observation.scans import MOST_RAYS
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.observation import Observations
-    from robocov.region import Region
+    from robocov.observation.region import Region
+    from robocov.observation.scans import Scans
     from robocov.robots import Team
-    from robocov.scans import Scans
 
 Rows: TypeAlias = NDArray[np.float32]
 """(n, size): one row for each robot."""

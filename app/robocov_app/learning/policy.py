@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from robocov.controllers.gains import gain, validate_gains
 from robocov.errors import ParameterError, shown
 from robocov.observation import Decision
-from robocov.scans import Scanning
+from robocov.observation.scans import Scanning
 from robocov_app.learning.driving import Action, checked_action, driving_forces
 from robocov_app.learning.layout import ObservationLayout
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.observation import Observations
-    from robocov.region import Region
+    from robocov.observation.region import Region
     from robocov.robots import Team
 
 Policy: TypeAlias = "Callable[[NDArray[np.float32]], Any]"

@@ -11,10 +11,10 @@ import threading
 import time
 from typing import BinaryIO
 
-from robocov.array_cache import ArrayCache
 from robocov.cost import CoverageCost
+from robocov.cost.momentary_cost import MomentaryCost
 from robocov.errors import RobocovError
-from robocov.momentary_cost import MomentaryCost
+from robocov.files.array_cache import ArrayCache
 from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
 from robocov_app.live.own_process import own_streams

@@ -12,8 +12,8 @@ import numpy as np
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
     from robocov.cost import CoverageResult
+    from robocov.cost.lattice import Sites
     from robocov.environment import Environment
-    from robocov.lattice import Sites
     from robocov_app.live.evaluation import Evaluation
 
 _LENGTH = struct.Struct("<Q")

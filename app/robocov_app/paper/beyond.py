@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from robocov.cost import CoverageCost
-from robocov.results import read_results
-from robocov_app.degradation import degradations
+from robocov.metrics.results import read_results
 from robocov_app.paper import beyond_studies
 from robocov_app.paper import plan as planned
 from robocov_app.paper.beyond_plan import HUGE, LARGE, SMALL
 from robocov_app.paper.contenders import best
+from robocov_app.paper.degradation import degradations
 from robocov_app.paper.doing import swept_together
 from robocov_app.paper.figures import Shown
 from robocov_app.paper.maps import KINDS
@@ -36,8 +36,8 @@ from robocov_app.sweep.performing import Outcome
 
 if TYPE_CHECKING:
     from robocov.record import Record
-    from robocov_app.degradation import Degradation
     from robocov_app.paper.contenders import Contender
+    from robocov_app.paper.degradation import Degradation
     from robocov_app.paper.outcomes import Scenario
     from robocov_app.paper.plan import Plan
     from robocov_app.paper.references import Reference

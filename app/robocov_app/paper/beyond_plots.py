@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov_app.page import SMALL, TITLE, plain_style
 from robocov_app.paper.beyond_plan import OURS
 from robocov_app.paper.beyond_studies import TARGETS, TEAMS
 from robocov_app.paper.claims import compared
+from robocov_app.paper.degradation_plots import plot_degradations
 from robocov_app.paper.evidence import evidence_rows
 from robocov_app.paper.figures import DOTS, WIDE, panels
-from robocov_app.plot_arena import draw_run, run_handles
-from robocov_app.plot_curves import CurveStyle, curve_styles
-from robocov_app.plot_degradation import plot_degradations
-from robocov_app.plot_heights import plot_heights
-from robocov_app.plot_results import Pairs, Sample, plot_final_costs, plot_paired
+from robocov_app.plots.arena import draw_run, run_handles
+from robocov_app.plots.curves import CurveStyle, curve_styles
+from robocov_app.plots.heights import plot_heights
+from robocov_app.plots.page import SMALL, TITLE, plain_style
+from robocov_app.plots.results import Pairs, Sample, plot_final_costs, plot_paired
 from robocov_app.view.theme import Theme, theme_named
 
 if TYPE_CHECKING:

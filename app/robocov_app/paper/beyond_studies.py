@@ -5,7 +5,7 @@
 2. ``targets``: RAPF heading for another optimum of its cell than the centroid;
 3. ``density``, ``density-ignored``: RAPF that knows what places count, and RAPF that does not;
 4. ``teams``: robots that are not equally fast, with cells by distance and by time;
-5. ``conditions-…``: what goes wrong, one study for each axis of `robocov_app.degradation`.
+5. ``conditions-…``: what goes wrong, one study for each axis of `robocov_app.paper.degradation`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import CONTROLLERS
 from robocov.density import Gaussian, Gaussians
 from robocov.mapfile import load_map
-from robocov_app.degradation import AXES, DegradationPlan
 from robocov_app.paper.beyond_plan import IN_CLAIMS, OURS, BeyondPlan
 from robocov_app.paper.contenders import LLOYD, RAPF_DEFAULT, RAPF_SHARED, RPF_SHARED, Contender
+from robocov_app.paper.degradation import AXES, DegradationPlan
 from robocov_app.paper.maps import with_kinds_of_starts
 from robocov_app.paper.plan import Plan, claim_maps, generated_test_map, study_of
 from robocov_app.sweep.study import TEAM, Study, StudyMap
@@ -131,7 +131,7 @@ def hot_spots(environment: Environment, seed: int) -> Gaussians:
     seed : int
         The same seed gives the same density.
     """
-    from robocov.starts import UniformStart
+    from robocov.environment.starts import UniformStart
 
     start = replace(environment, starts={"uniform": UniformStart()}).start("uniform")
     centres = start.sample(HOT_SPOTS, seed=seed, radius=0.3)

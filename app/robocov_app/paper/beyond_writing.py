@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.paper import told
 from robocov_app.paper.beyond_plan import HUGE, LARGE, OURS, SMALL
 from robocov_app.paper.beyond_plots import WORDS, beyond_figures

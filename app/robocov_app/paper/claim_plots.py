@@ -12,8 +12,8 @@ from robocov_app.paper.claims import compared
 from robocov_app.paper.contenders import LABELS
 from robocov_app.paper.figures import DOTS, WIDE
 from robocov_app.paper.tables import ORDER
-from robocov_app.plot_gains import plot_gain_grid
-from robocov_app.plot_results import Pairs, Sample, plot_final_costs, plot_paired
+from robocov_app.plots.gains import plot_gain_grid
+from robocov_app.plots.results import Pairs, Sample, plot_final_costs, plot_paired
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -97,7 +97,7 @@ def gap_rows(outcomes: Outcomes) -> list[tuple[str, list[Sample]]]:
 
 def gains_figure(gains: Mapping[str, GainOutcomes], theme: Theme | str) -> Figure:
     """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
-    from robocov_app.page import TITLE, Page, plain_style
+    from robocov_app.plots.page import TITLE, Page, plain_style
     from robocov_app.view.theme import theme_named
 
     look = theme_named(theme) if isinstance(theme, str) else theme

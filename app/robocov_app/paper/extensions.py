@@ -17,8 +17,8 @@ from robocov_app.paper.goals import EXTENSIONS
 from robocov_app.paper.verdicts import Claim, Criterion, amount
 
 if TYPE_CHECKING:
-    from robocov_app.degradation import Degradation
     from robocov_app.paper.beyond import BeyondMaterial, Weighed
+    from robocov_app.paper.degradation import Degradation
     from robocov_app.paper.outcomes import Outcomes
 
 BORNE = (("loss", 0.6, "60 % of all messages are lost"), ("delay", 1.0, "messages arrive after 1 s"))

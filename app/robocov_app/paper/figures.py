@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.page import SMALL, TITLE, Page, plain_style, tone
-from robocov_app.plot_arena import (
+from robocov_app.plots.arena import (
     draw_map,
     draw_robots,
     draw_run,
@@ -23,7 +22,8 @@ from robocov_app.plot_arena import (
     robot_handle,
     run_handles,
 )
-from robocov_app.plot_curves import draw_curves, end_label
+from robocov_app.plots.curves import draw_curves, end_label
+from robocov_app.plots.page import SMALL, TITLE, Page, plain_style, tone
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
 if TYPE_CHECKING:

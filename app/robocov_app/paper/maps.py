@@ -18,8 +18,8 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment
+from robocov.environment.starts import DiscStart, StartSpec, UniformStart
 from robocov.errors import StartError
-from robocov.starts import DiscStart, StartSpec, UniformStart
 
 KINDS = ("corner", "centre", "uniform")
 """The starts on non-convex maps; all but the last are clustered."""

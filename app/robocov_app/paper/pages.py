@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from robocov.errors import OutputError
-from robocov_app.figure_files import save_figure
 from robocov_app.paper.bars import interval_bar
 from robocov_app.paper.tables import settled_text
 from robocov_app.paper.verdicts import amount, described
+from robocov_app.plots.figure_files import save_figure
 from robocov_app.progress import progress
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.results import read_results
+from robocov.metrics.results import read_results
 from robocov_app.paper.claims import EARLY, FIRST_MINUTE
 from robocov_app.paper.contenders import Contender
 from robocov_app.paper.maps import side_of_share
@@ -18,7 +18,7 @@ from robocov_app.paper.plan import ROBOTS, complete_gains
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.metrics import CostHistory
-    from robocov.results import Results
+    from robocov.metrics.results import Results
     from robocov_app.paper.references import Reference
     from robocov_app.sweep.study import Study
 

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robocov.atomic import written
 from robocov.errors import OutputError
+from robocov.files.atomic import written
 from robocov.mapfile import to_json
 from robocov_app.progress import progress
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.atomic import written
 from robocov.controllers import gain_values, make_controller
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.record import versions
 from robocov.simulation import Simulation

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robocov.atomic import written
 from robocov.errors import InputError, OutputError
-from robocov.results import read_results
+from robocov.files.atomic import written
+from robocov.metrics.results import read_results
 from robocov_app.paper import plan as planned
 from robocov_app.paper.contenders import RAPF_SHARED, Contender, best
 from robocov_app.paper.figures import Shown

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
-from robocov.atomic import written
+from robocov.files.atomic import written
 from robocov_app.output import finite
 from robocov_app.paper import told
 from robocov_app.paper.asking import QUESTIONS
@@ -135,7 +135,7 @@ def page(
     """
     from markupsafe import Markup
 
-    from robocov_app.plot_curves import curve_styles
+    from robocov_app.plots.curves import curve_styles
     from robocov_app.report.replay import ReplayRun, replay_css, replay_js, replay_part, script
 
     replays = [

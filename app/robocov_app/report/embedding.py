@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment, Obstacle
     from robocov.metrics import CostHistory
     from robocov.record import Record
-    from robocov_app.plot_curves import CurveStyle
+    from robocov_app.plots.curves import CurveStyle
 
 RATE = 5.0
 """Moments of a run per simulated second, where there is room."""

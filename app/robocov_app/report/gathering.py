@@ -15,8 +15,8 @@ from robocov.controllers import CONTROLLERS, gains_of
 from robocov.errors import InputError, RobocovError, shown
 from robocov.mapfile import from_json
 from robocov.metrics import mean_over_run
+from robocov.metrics.results import read_history, read_results
 from robocov.record import Record
-from robocov.results import read_history, read_results
 from robocov_app.saved import load_saved, roster_of
 from robocov_app.sweep.circumstances import UNITS, circumstance_column
 from robocov_app.sweep.table import gain_column

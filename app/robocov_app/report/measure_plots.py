@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.run_metrics import run_metrics
-from robocov_app.plot_results import Band, plot_cost_bands
+from robocov.metrics.run_metrics import run_metrics
+from robocov_app.plots.results import Band, plot_cost_bands
 from robocov_app.report.embedding import has_path
 from robocov_app.report.groups import shown_groups
 from robocov_app.report.result_plots import PANEL, SCALE, Plot, looks_of
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from robocov.arrays import Array
-    from robocov.run_metrics import RunMetrics
+    from robocov.metrics.run_metrics import RunMetrics
     from robocov_app.report.embedding import ReplayRun
     from robocov_app.report.gathering import Entry, Result
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.weighted_cells import outlines_of
+from robocov.voronoi.weighted_cells import outlines_of
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path, lives
 from robocov_app.saved import roster_of

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
-from robocov_app.plot_curves import curve_styles
+from robocov_app.plots.curves import curve_styles
 from robocov_app.report.embedding import BUDGET, ReplayRun, embedded, script_json
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.theme_css import theme_rules
@@ -16,7 +16,7 @@ from robocov_app.report.theme_css import theme_rules
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from robocov_app.plot_curves import CurveStyle
+    from robocov_app.plots.curves import CurveStyle
 
 __all__ = [
     "MOST_PANES",

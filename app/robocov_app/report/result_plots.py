@@ -9,8 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import counted
-from robocov_app.plot_curves import CurveStyle, curve_styles
-from robocov_app.plot_results import (
+from robocov_app.plots.curves import CurveStyle, curve_styles
+from robocov_app.plots.results import (
     Band,
     Pairs,
     Sample,

@@ -11,7 +11,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from robocov_app.page import plain_style
+from robocov_app.plots.page import plain_style
 from robocov_app.report.theme_css import hex_code, named_colours
 from robocov_app.view.theme import LIGHT
 

@@ -6,7 +6,7 @@ and dark. Names begin with ``--rc-``, so that they meet no others in a notebook.
 
 from __future__ import annotations
 
-from robocov_app.plot_gains import quiet_heat
+from robocov_app.plots.gains import quiet_heat
 from robocov_app.view.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
 
 

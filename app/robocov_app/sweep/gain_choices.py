@@ -13,7 +13,7 @@ import numpy as np
 from robocov.controllers import gain_values, gains_of
 from robocov.controllers.gains import Option, Value, with_gains
 from robocov.errors import ParameterError, RobocovError, shown, unknown_name
-from robocov.strictjson import place
+from robocov.files.strictjson import place
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from robocov.atomic import written
 from robocov.errors import InputError, OutputError
+from robocov.files.atomic import written
 from robocov_app.sweep.lock import locked
 
 if TYPE_CHECKING:

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.array_cache import ArrayCache
 from robocov.controllers import make_controller
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
+from robocov.files.array_cache import ArrayCache
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
+from robocov.metrics.run_metrics import figures_of
 from robocov.record import ARRAYS
-from robocov.recorder import Recorder
-from robocov.run_metrics import figures_of
+from robocov.record.recorder import Recorder
 from robocov.simulation import Simulation
 from robocov_app.output import csv_text, finite
 from robocov_app.run import cost_columns, cost_rows

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from robocov.controllers import controller_kind
 from robocov.errors import InputError, ParameterError, shown, unknown_name
+from robocov.files.strictjson import place
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team
+from robocov.robots.teamfile import team_of_groups
 from robocov.simulation import DEFAULT_DT, check_dt
-from robocov.strictjson import place
-from robocov.teamfile import team_of_groups
 from robocov_app.options import MOST_ROWS
 from robocov_app.sweep.circumstances import GROUPS, condition_axes, conditions_of
 from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
@@ -113,7 +113,7 @@ class Study:
     record_hz : float, Hz
         How many moments of each run are kept; 0: the first and the last.
     metrics : bool
-        Whether the table holds the metrics of the end of each run as well; see `robocov.run_metrics`.
+        Whether the table holds the metrics of the end of each run as well; see `robocov.metrics.run_metrics`.
     sampling : Sampling or None
         How ranges of gains are sampled.
     folder : Path

@@ -8,10 +8,10 @@ import os
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from robocov.atomic import written
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
+from robocov.files.atomic import written
 from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
 from robocov_app.sweep.performing import FIGURES, TIMED
 

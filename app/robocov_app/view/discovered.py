@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
+from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.changing_world import only
-from robocov.neighbours import Neighbours
 from robocov.observation import Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.world.changing_world import only
 from robocov_app.view.scene import Scene
 
 if TYPE_CHECKING:

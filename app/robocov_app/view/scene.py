@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.weighted_cells import WeightedCells, outlines_of, weighted_partition
+from robocov.voronoi.weighted_cells import WeightedCells, outlines_of, weighted_partition
 
 if TYPE_CHECKING:
     from robocov_app.view.field import Field

@@ -8,19 +8,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov import steering
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.atlas_memory import AtlasMemory, Mind, Watch
 from robocov.controllers.base import Information
 from robocov.controllers.driving import drive
 from robocov.controllers.gains import gain, validate_gains
-from robocov.discovered import DiscoveredMap, Raster
 from robocov.observation import Decision, Observations
-from robocov.placement import Stock, Table, own_place, team_places
-from robocov.region import Region
+from robocov.observation.region import Region
+from robocov.observation.scans import Scanning, headings
+from robocov.planning import steering
+from robocov.planning.discovered import DiscoveredMap, Raster
+from robocov.planning.placement import Stock, Table, own_place, team_places
+from robocov.planning.wayfinding import Ways, Window
 from robocov.robots import Team
-from robocov.scans import Scanning, headings
-from robocov.wayfinding import Ways, Window
 
 FINEST_CELL = 0.1
 """Side of a cell of the discovered maps in metres, larger where a region is very large."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.discovered import DiscoveredMap
-from robocov.placement import Table
+from robocov.planning.discovered import DiscoveredMap
+from robocov.planning.placement import Table
+from robocov.planning.wayfinding import Ways
 from robocov.robots import Team
-from robocov.wayfinding import Ways
 
 STILL_WITHIN = 0.1
 """Metres that a robot must get away to count as moving."""

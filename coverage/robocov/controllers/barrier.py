@@ -11,14 +11,14 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows
 from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.projection import nearest_allowed
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.observation.scans import Scanning
 from robocov.potential import separation
-from robocov.projection import nearest_allowed
-from robocov.region import Region
 from robocov.robots import Team
-from robocov.scans import Scanning
-from robocov.triangulation import Triangulation
+from robocov.voronoi.triangulation import Triangulation
 
 _ROUNDING = 1e-3
 """Distance in metres over which the braking curve, which is vertical at the safe distance, is rounded."""

@@ -9,7 +9,7 @@ from robocov.errors import ParameterError, shown
 if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Decision, Observations
-    from robocov.region import Region
+    from robocov.observation.region import Region
     from robocov.robots import Team
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
@@ -29,7 +29,7 @@ class Controller(Protocol):
     Optional are
 
     - the class variable ``information``, one of `Information`, "own" where it is not stated,
-    - the attribute ``scanning``, a `robocov.scans.Scanning`, of laws that want ray scans, and
+    - the attribute ``scanning``, a `robocov.observation.scans.Scanning`, of laws that want ray scans, and
     - the method ``informed(environment) -> Controller``, which only laws with the whole map have: it
       returns the law that knows that map, with the same gains. `Simulation` asks for it.
     """

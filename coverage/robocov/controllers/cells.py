@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.controllers.gains import choice
 from robocov.voronoi import partition
-from robocov.weighted_cells import weighted_partition
+from robocov.voronoi.weighted_cells import weighted_partition
 
 if TYPE_CHECKING:
     from robocov.observation import Observations
-    from robocov.triangulation import Triangulation
     from robocov.voronoi import VoronoiPartition
-    from robocov.weighted_cells import WeightedCells
+    from robocov.voronoi.triangulation import Triangulation
+    from robocov.voronoi.weighted_cells import WeightedCells
 
 
 def choice_of_cells() -> Any:

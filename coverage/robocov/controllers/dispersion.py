@@ -12,10 +12,10 @@ from robocov.controllers.driving import drive, kept_off, offsets_from_neighbours
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.observation.scans import Scanning
 from robocov.potential import separation
-from robocov.region import Region
 from robocov.robots import Team
-from robocov.scans import Scanning
 
 _TOGETHER = 1e-9
 """Distance in metres at which robots in one place are taken to be."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.controllers.projection import nearest_allowed
 from robocov.observation import Observations
-from robocov.projection import nearest_allowed
 from robocov.robots import Team
 
 

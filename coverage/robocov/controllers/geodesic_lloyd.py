@@ -18,7 +18,7 @@ from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError, shown
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov.robots import Team
 
 _SEGMENTS = 2

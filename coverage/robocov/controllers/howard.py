@@ -12,10 +12,10 @@ from robocov.controllers.driving import summed
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns
 from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.observation.scans import Scanning
 from robocov.potential import separation
-from robocov.region import Region
 from robocov.robots import Team
-from robocov.scans import Scanning
 
 _NEAREST = 0.05
 """Distance in metres below which the forces no longer grow; robots that touch are farther apart."""

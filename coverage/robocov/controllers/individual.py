@@ -10,10 +10,10 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov.robots import Team
-from robocov.triangulation import Triangulation
 from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.triangulation import Triangulation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,11 +9,11 @@ import numpy as np
 
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.gains import choice, gain, validate_gains
+from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov.robots import Team
-from robocov.targets import HEIGHT, MEANING, TARGETS, targets
-from robocov.triangulation import Triangulation
+from robocov.voronoi.triangulation import Triangulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,8 +13,8 @@ from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.repulsion import repulsion_from_obstacle
 from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
 from robocov.potential import CONTACT_DISTANCE, separation
-from robocov.region import Region
 from robocov.robots import Team
 
 _TOGETHER = 1e-9

@@ -11,10 +11,10 @@ from robocov.controllers.cells import cells_seen
 from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.lloyd import LloydMemory
-from robocov.disc_cells import disc_limited, disc_polygons
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov.robots import Team
+from robocov.voronoi.disc_cells import disc_limited, disc_polygons
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class RangeLimited:
     that is.
 
     The centroid is exact with density 1; another density is integrated over a polygon, whose chords
-    stand for the arcs (see `robocov.disc_cells`).
+    stand for the arcs (see `robocov.voronoi.disc_cells`).
 
     Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text.
     """

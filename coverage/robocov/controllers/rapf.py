@@ -8,12 +8,12 @@ from typing import ClassVar
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.gains import choice, gain, validate_gains
 from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
+from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
 from robocov.potential import attractive_force
-from robocov.region import Region
 from robocov.robots import Team
-from robocov.targets import HEIGHT, MEANING, TARGETS, targets
-from robocov.triangulation import Triangulation
+from robocov.voronoi.triangulation import Triangulation
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
 from robocov.robots import Team
 
 

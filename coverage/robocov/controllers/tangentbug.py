@@ -15,10 +15,10 @@ from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.controllers.tangents import free_distances
 from robocov.observation import Decision, Observations
-from robocov.region import Region
+from robocov.observation.region import Region
+from robocov.observation.scans import Scanning, headings
 from robocov.robots import Team
-from robocov.scans import Scanning, headings
-from robocov.triangulation import Triangulation
+from robocov.voronoi.triangulation import Triangulation
 
 _GRAIN = 0.1
 """Side in metres of the squares in which a robot remembers what it has met."""

@@ -9,6 +9,8 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment
+from robocov.environment.passages import narrowest_gap
+from robocov.environment.starts import DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, shown, unknown_name
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave
@@ -17,9 +19,7 @@ from robocov.generator.polygons import scattered
 from robocov.generator.request import AREA_TOLERANCE as AREA_TOLERANCE
 from robocov.generator.request import SIDES, Request, checked
 from robocov.generator.rooms import building
-from robocov.maprules import check_rules
-from robocov.passages import narrowest_gap
-from robocov.starts import DiscStart, StartSpec, UniformStart
+from robocov.mapfile.rules import check_rules
 
 if TYPE_CHECKING:
     from collections.abc import Callable

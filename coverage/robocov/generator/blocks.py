@@ -15,8 +15,8 @@ from robocov.environment import PolygonObstacle
 
 if TYPE_CHECKING:
     from robocov.environment import Obstacle
+    from robocov.environment.starts import DiscStart
     from robocov.generator.request import Request
-    from robocov.starts import DiscStart
 
 _TILTS = 0.0, 0.05, 0.1
 """Streets of a town bend by about so much (standard deviation, radians): each is taken as often."""

@@ -18,17 +18,17 @@ import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon
 
 from robocov.environment import PolygonObstacle
+from robocov.environment.passages import narrowest_gap
 from robocov.generator.contours import Field
 from robocov.generator.request import AREA_TOLERANCE
-from robocov.passages import narrowest_gap
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.environment import Obstacle
+    from robocov.environment.passages import Gap
+    from robocov.environment.starts import DiscStart
     from robocov.generator.request import Request
-    from robocov.passages import Gap
-    from robocov.starts import DiscStart
 
 _RIM = 0.012
 """Least thickness of rock at the boundary, in shorter sides of the map; the disc of the start keeps more."""

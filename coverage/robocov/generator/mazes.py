@@ -22,8 +22,8 @@ from robocov.generator.request import AREA_TOLERANCE
 
 if TYPE_CHECKING:
     from robocov.environment import Obstacle
+    from robocov.environment.starts import DiscStart
     from robocov.generator.request import Request
-    from robocov.starts import DiscStart
 
 Cell: TypeAlias = tuple[int, int]
 """Column and row."""

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array, BoolArray
     from robocov.environment import Obstacle
+    from robocov.environment.starts import DiscStart
     from robocov.generator.request import Request
-    from robocov.starts import DiscStart
 
 MIX = {"convex": 0.6, "L": 0.2, "U": 0.2}
 """Chances of the shapes. A U that would be too narrow for the gap becomes an L."""

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.environment.starts import GAP
 from robocov.errors import ParameterError, shown
 from robocov.robots import DEFAULT_RADIUS
-from robocov.starts import GAP
 
 if TYPE_CHECKING:
     from robocov.arrays import Array

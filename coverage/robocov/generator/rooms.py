@@ -13,9 +13,9 @@ from robocov.generator.floorplan import Box, floor_plan
 
 if TYPE_CHECKING:
     from robocov.environment import Obstacle
+    from robocov.environment.starts import DiscStart
     from robocov.generator.floorplan import FloorPlan
     from robocov.generator.request import Request
-    from robocov.starts import DiscStart
 
 _WALLS = 0.3, 0.5, 0.9
 """Part of the blocked area that walls take: the least, the most, and the most where rooms are small."""

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, UniformStart
 from robocov_app.editor.arranging import SIDES, aligned, distributed, distributed_centres
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.edits import bounds_of

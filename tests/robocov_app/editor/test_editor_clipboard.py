@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map
-from robocov.starts import DiscStart, UniformStart
 from robocov_app.editor import edits
 from robocov_app.editor.clipboard import copied, pasted
 from robocov_app.editor.document import Sketch, sketch_text

@@ -10,8 +10,8 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart
 from robocov_app.demo.actions import all_actions as demo_actions
 from robocov_app.editor import actions
 from robocov_app.editor.actions import GROUPS, REPEATING, all_actions, told_actions

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.editor import vertices
 from robocov_app.editor.annotations import annotated, taken_apart
 from robocov_app.editor.background import Background

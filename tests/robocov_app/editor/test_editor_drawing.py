@@ -10,7 +10,7 @@ from driven_editor import Hands, opened_editor, sheet
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.starts import DiscStart, PointsStart
+from robocov.environment.starts import DiscStart, PointsStart
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from shapely import affinity
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.editor import edits
 from robocov_app.editor.affine import Affine
 from robocov_app.editor.background import Background

@@ -10,9 +10,9 @@ import pytest
 from driven_editor import opened_editor, sheet
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.errors import MapError
 from robocov.mapfile import load_map
-from robocov.obstacle_path import ObstaclePath
 from robocov_app.editor import edits, paths
 from robocov_app.editor.affine import Affine
 from robocov_app.editor.document import Sketch, parse_sketch, sketch_text

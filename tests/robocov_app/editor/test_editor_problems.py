@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.problems import problems, runnable
 

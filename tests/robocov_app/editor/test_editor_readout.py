@@ -13,9 +13,9 @@ from scipy import ndimage
 from shapely import MultiPolygon
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.mapcheck import check_map
+from robocov.environment.starts import DiscStart
 from robocov.mapfile import bundled_maps, load_map
-from robocov.starts import DiscStart
+from robocov.mapfile.check import check_map
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.problems import problems
 from robocov_app.editor.readout import reach_of, readout

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart, UniformStart
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.selection import (
     Edge,

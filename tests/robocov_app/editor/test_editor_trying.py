@@ -9,7 +9,7 @@ import pygame
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.starts import DiscStart
+from robocov.environment.starts import DiscStart
 from robocov_app.editor import edits
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.selection import Selection

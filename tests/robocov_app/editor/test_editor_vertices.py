@@ -10,8 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
-from robocov.starts import DiscStart, PointsStart
 from robocov_app.editor import vertices
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.selection import Edge, Selection, Vertex, place_of, points_of, ring_points, rings_of

@@ -12,7 +12,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.starts import DiscStart
+from robocov.environment.starts import DiscStart
 from robocov_app.demo.layout import SMALLEST
 from robocov_app.editor.actions import told_actions
 from robocov_app.editor.document import Sketch

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
+from robocov.environment.starts import UniformStart
 from robocov.errors import ParameterError
-from robocov.starts import UniformStart
 from robocov_app.exporters.cells import Grid, free_cells, grid_over, not_held
 
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from robocov.environment import Environment, PolygonObstacle
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
-from robocov.starts import DiscStart, UniformStart
 from robocov_app.importers import Shaping, detect, import_map
 from robocov_app.importers.corners import sharpened
 from robocov_app.importers.report import ImportReport

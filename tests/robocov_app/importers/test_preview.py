@@ -18,7 +18,7 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.errors import OutputError, ParameterError
 from robocov_app.importers import ForeignMap, Shaping, shaped
 from robocov_app.importers.preview import plot_import, preview
-from robocov_app.page import tone
+from robocov_app.plots.page import tone
 from robocov_app.view.theme import DARK, LIGHT
 
 HALL = box(0, 0, 12, 8)

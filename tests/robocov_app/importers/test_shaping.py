@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, box
 
+from robocov.environment.starts import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
-from robocov.starts import DiscStart, UniformStart
 from robocov_app.importers.bounding import bounded, rounded
 from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.shaping import Shaping, shaped

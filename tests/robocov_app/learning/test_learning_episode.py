@@ -10,9 +10,9 @@ from robocov.conditions import Conditions
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.errors import InputError, ParameterError, StartError
 from robocov.metrics import clearances, contacts
-from robocov.obstacle_path import ObstaclePath
 from robocov.simulation import Simulation
 from robocov_app.learning import CoverageTask, ObservationLayout
 from robocov_app.learning.episode import Episode, drawn_episode

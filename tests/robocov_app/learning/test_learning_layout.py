@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov.neighbours import Neighbours
 from robocov.observation import Observations
-from robocov.region import Region
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
+from robocov.observation.scans import Scans
 from robocov.robots import Team
-from robocov.scans import Scans
 from robocov.voronoi import partition
 from robocov_app.learning import ObservationLayout
 

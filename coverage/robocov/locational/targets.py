@@ -1,0 +1,54 @@
+"""What a robot heads for in its cell: the point from which the cell's locational cost (4) is best."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from robocov.errors import ParameterError, unknown_name
+from robocov.locational.best_points import best_points
+from robocov.locational.cost import Distance, Sensing
+from robocov.locational.weighed_best_points import weighed_best_points
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.density import Density
+    from robocov.voronoi import VoronoiPartition
+    from robocov.voronoi.weighted_cells import WeightedCells
+
+TARGETS = ("centroid", "sensing", "median")
+"""The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, by which the coverage cost (22) counts."""
+
+MEANING = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h²), or for r"
+HEIGHT = "h of (14), for the target sensing: how high above the ground the sensor is"
+
+
+def targets(
+    cells: VoronoiPartition | WeightedCells, density: Density | None, target: str, height: float
+) -> Array:
+    """Return where each robot heads for, (n, 2) m: within its cell, if that is convex.
+
+    An empty cell's is its generator.
+
+    Parameters
+    ----------
+    cells : VoronoiPartition or WeightedCells
+        With the density, if there is one.
+    density : Density or None
+        φ; None for 1 everywhere.
+    target : one of `TARGETS`
+    height : float, m
+        h of equation (14), for "sensing".
+
+    Raises
+    ------
+    ParameterError
+        On another target, or a height that is not above 0.
+    """
+    if target == "centroid":
+        return cells.centroid
+    if target not in TARGETS:
+        raise ParameterError(f"target: {unknown_name('target', target, TARGETS)}")
+    f = Distance() if target == "median" else Sensing(height)
+    if density is not None and not density.uniform:
+        return weighed_best_points(cells, density, f)
+    return best_points(cells, f)

@@ -1,0 +1,182 @@
+"""The point of a cell from which its locational cost (4) with a density φ that varies is best, by quadrature.
+
+A cell is taken apart into the triangles that the point itself spans with the edges. In the coordinates
+q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that Gauss's
+rule converges quickly where φ is smooth; where it jumps within a cell, the error is of the order of the
+distance of the nodes. Newton's method is safeguarded as in `best_points`: a step must not go beyond where the
+cost begins to rise.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from robocov.locational.cost import CellSides, Sensing
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array, BoolArray
+    from robocov.density import Density
+    from robocov.locational.cost import Distance
+    from robocov.voronoi import VoronoiPartition
+    from robocov.voronoi.weighted_cells import WeightedCells
+
+_ALONG, _OUTWARD = 16, 12
+"""Nodes along an edge, and from the point to it."""
+
+_NEAR = 1e-6
+"""A step so short, relative to the cell's size, is the last."""
+
+_ROUNDS = 30
+"""Evaluations after which a cell has what it has."""
+
+_RISE = 0.5
+"""Where the cost rises again at the end of a step, it may rise so many times as fast as it fell."""
+
+_NOTHING = 1e-12
+"""φ so small, relative to its highest value, all over a cell is nothing: its centroid is as good a point."""
+
+
+class _Slopes(NamedTuple):
+    """Gradient and Hessian of what is to be small, (n,) each."""
+
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+
+
+def weighed_best_points(
+    cells: VoronoiPartition | WeightedCells, density: Density, f: Distance | Sensing
+) -> Array:
+    """Return the points where ∫ f(|q-p|) φ(q) dq over each cell is best, (n, 2) m.
+
+    From the centroid by φ on: of f = r and a convex cell it is the best of all, of f = 1/(r²+h²) the one
+    that lies downhill from there. A cell that is not convex, or in which φ is nothing, keeps its centroid.
+
+    Parameters
+    ----------
+    cells : VoronoiPartition or WeightedCells
+        With the density.
+    density : Density
+    f : Distance or Sensing
+    """
+    start = cells.centroid - cells.generators
+    sides = CellSides(cells.edges, len(start))
+    x, y = start[:, 0].copy(), start[:, 1].copy()
+    room = sides.room(sides.seen_from(x, y))
+    searching = (room > 1e-9 * sides.size) & (cells.mass > _NOTHING * density.highest * sides.area)
+    quadrature = _Quadrature(cells, density, f, sides.size)
+    go_x, go_y, fall = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    part = np.ones_like(x)
+    fresh = searching
+    slopes = quadrature.slopes(x, y, fresh)
+    for _ in range(_ROUNDS):
+        step = _newton_steps(slopes, sides.size)
+        go_x, go_y = np.where(fresh, step[0], go_x), np.where(fresh, step[1], go_y)
+        fall, part = np.where(fresh, step[2], fall), np.where(fresh, 1.0, part)
+        there_x, there_y = x + part * go_x, y + part * go_y
+        length = part * np.hypot(go_x, go_y)
+        inside = sides.room(sides.seen_from(there_x, there_y)) > 0.0
+        last = searching & inside & (length <= _NEAR * sides.size)
+        x, y = np.where(last, there_x, x), np.where(last, there_y, y)
+        searching &= ~last & (length > 1e-3 * _NEAR * sides.size)
+        if not searching.any():
+            break
+        slopes = quadrature.slopes(there_x, there_y, searching & inside)
+        rise = slopes.x * go_x + slopes.y * go_y
+        fresh = searching & inside & (rise <= -_RISE * fall)
+        x, y = np.where(fresh, there_x, x), np.where(fresh, there_y, y)
+        part = np.where(fresh, part, 0.5 * part)
+    return cells.generators + np.column_stack([x, y])
+
+
+class _Quadrature:
+    """Gradients and Hessians of the cells' costs by their points."""
+
+    def __init__(
+        self,
+        cells: VoronoiPartition | WeightedCells,
+        density: Density,
+        f: Distance | Sensing,
+        size: Array,
+    ) -> None:
+        self._edges, self._generators = cells.edges, cells.generators
+        self._density, self._f = density, f
+        nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
+        self._t, self._t_weights = 0.5 * (nodes + 1.0), 0.5 * weights
+        nodes, weights = np.polynomial.legendre.leggauss(_OUTWARD)
+        tau, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+        if isinstance(f, Sensing):
+            # as close to the point as f is steep
+            bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
+            self._u = np.sinh(bend * tau) / np.sinh(bend)
+            self._u_weights = weights * bend * np.cosh(bend * tau) / np.sinh(bend) * self._u
+        else:
+            self._u = np.broadcast_to(tau, (len(size), _OUTWARD))
+            self._u_weights = np.broadcast_to(weights * tau, (len(size), _OUTWARD))
+
+    def slopes(self, x: Array, y: Array, wanted: BoolArray) -> _Slopes:
+        """Return the slopes at points relative to the generators, zero for cells that are not wanted."""
+        edges = self._edges
+        some = np.flatnonzero(wanted[edges.cell])
+        cell = edges.cell[some]
+        at_x, at_y = x[cell], y[cell]
+        sx, sy = edges.start[some, 0] - at_x, edges.start[some, 1] - at_y
+        ex, ey = edges.end[some, 0] - at_x, edges.end[some, 1] - at_y
+        double = sx * ey - ex * sy
+        # (s, along, outward)
+        rim_x = (sx[:, None] + (ex - sx)[:, None] * self._t)[:, :, None]
+        rim_y = (sy[:, None] + (ey - sy)[:, None] * self._t)[:, :, None]
+        u = self._u[cell][:, None, :]
+        dx, dy = rim_x * u, rim_y * u
+        weight = double[:, None, None] * self._t_weights[:, None] * self._u_weights[cell][:, None, :]
+        generator = self._generators[cell]
+        places = np.stack(
+            [
+                dx + (generator[:, 0] + at_x)[:, None, None],
+                dy + (generator[:, 1] + at_y)[:, None, None],
+            ],
+            axis=-1,
+        )
+        weight = weight * self._density.value(places.reshape(-1, 2)).reshape(weight.shape)
+        square = dx * dx + dy * dy
+        if isinstance(self._f, Sensing):
+            low = 1.0 / (square + self._f.height**2)
+            first, second = 2.0 * weight * low * low, -8.0 * weight * low * low * low
+        else:
+            inverse = 1.0 / np.sqrt(np.maximum(square, 1e-300))
+            first, second = weight * inverse, -weight * inverse * inverse * inverse
+        parts = (
+            -first * dx,
+            -first * dy,
+            first + second * dx * dx,
+            second * dx * dy,
+            first + second * dy * dy,
+        )
+        count = len(x)
+        return _Slopes(
+            *(np.bincount(cell, part.sum(axis=(1, 2)), minlength=count).astype(float) for part in parts)
+        )
+
+
+def _newton_steps(slopes: _Slopes, size: Array) -> tuple[Array, Array, Array]:
+    """Return steps x and y, (n,) m, and the slope along them, which is not positive.
+
+    Newton's where the Hessian is positive definite, else down the slope; none longer than a quarter of the
+    cell's size, which is half its perimeter.
+    """
+    x, y, xx, xy, yy = slopes
+    determinant, trace = xx * yy - xy * xy, xx + yy
+    definite = (determinant > 1e-12 * trace * trace) & (trace > 0.0)
+    safe = np.where(definite, determinant, 1.0)
+    steep = np.hypot(x, y)
+    down = 0.25 * size / np.where(steep > 0.0, steep, 1.0)
+    go_x = np.where(definite, -(yy * x - xy * y) / safe, -x * down)
+    go_y = np.where(definite, -(xx * y - xy * x) / safe, -y * down)
+    length = np.hypot(go_x, go_y)
+    part = np.minimum(1.0, 0.25 * size / np.maximum(length, 1e-300))
+    go_x, go_y = go_x * part, go_y * part
+    return go_x, go_y, x * go_x + y * go_y

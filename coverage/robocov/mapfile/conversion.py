@@ -1,0 +1,411 @@
+"""Map files: the map JSON, version 1, to and from `Environment`; the bundled maps."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
+from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment.starts import DiscStart, PointsStart, StartSpec, UniformStart
+from robocov.errors import MapError, OutputError, unknown_name
+from robocov.files.strictjson import located, one_line, parse, read_bytes, require_json
+from robocov.mapfile.density import density_document, density_from
+from robocov.mapfile.fields import TINY as _TINY
+from robocov.mapfile.models import (
+    FORMAT,
+    VERSION,
+    CircleModel,
+    DiscModel,
+    ObstacleModel,
+    PointsModel,
+    PolygonModel,
+    StartModel,
+    map_schema,
+    validate,
+    validate_density,
+)
+from robocov.mapfile.rules import check_rules
+
+if TYPE_CHECKING:
+    from robocov.density import Density
+    from robocov.mapfile.density_models import DensityModel
+
+__all__ = [
+    "bundled_maps",
+    "density_of",
+    "dump_document",
+    "dump_map",
+    "from_json",
+    "load_map",
+    "map_file",
+    "map_schema",
+    "parse_map",
+    "save_map",
+    "to_json",
+]
+
+_LINE = 100
+"""Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
+
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+_MEASURED = ("boundary", "obstacles", "starts", "density")
+"""Keys of numbers that `dump_map` writes short."""
+
+_DIGITS = 9
+"""Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
+
+_NOISE = 16
+"""What a few sums and a rotation miss a decimal by at most, in units of the last place (of 1 m at least)."""
+
+
+def load_map(source: str | Path) -> Environment:
+    """Return the map in a file, or the bundled map of that name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A path to a map JSON, or the name of a bundled map: a str without suffix and separator.
+
+    Raises
+    ------
+    MapError
+        One line: the file with line and column, the JSON path, the value and what was wanted; for an
+        unknown name the nearest one.
+
+    Examples
+    --------
+    >>> load_map("square").area
+    100.0
+    """
+    path = map_file(source)
+    return parse_map(read_bytes(path), str(path), path.parent)
+
+
+def map_file(source: str | Path) -> Path:
+    """Return the file of the map that `load_map` returns for the same source; it need not be there.
+
+    Raises
+    ------
+    MapError
+        For an unknown name.
+    """
+    if not isinstance(source, str) or not _is_name(source):
+        return Path(source)
+    known = bundled_maps()
+    if source in known:
+        return known[source]
+    if _is_file(source):
+        return Path(source)
+    raise MapError(unknown_name("map", source, known))
+
+
+def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
+    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    document = parse(text, where)
+    try:
+        return _environment(document, one_line(where), folder)
+    except MapError as error:
+        raise located(error, text, where) from None
+
+
+def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
+    """Return the map in a parsed JSON `document`; messages call it `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    where = one_line(where)
+    require_json(document, where)
+    return _environment(document, where, folder)
+
+
+def to_json(environment: Environment) -> dict[str, Any]:
+    """Return `environment` as a JSON document that `from_json` turns into an equal one.
+
+    Whole numbers are int, so that the text is short.
+    """
+    document: dict[str, Any] = {} if environment.schema is None else {"$schema": environment.schema}
+    document |= {"format": FORMAT, "version": VERSION, "name": environment.name}
+    if environment.description:
+        document["description"] = environment.description
+    document["boundary"] = _points(environment.boundary)
+    document["obstacles"] = [_obstacle_document(obstacle) for obstacle in environment.obstacles]
+    document["starts"] = {name: _start_document(spec) for name, spec in environment.starts.items()}
+    if environment.density is not None:
+        document["density"] = density_document(environment.density)
+    if environment.extra:
+        document["extra"] = dict(environment.extra)
+    return document
+
+
+def dump_map(environment: Environment) -> str:
+    """Return the text of a map file: keys in a fixed order, one list of vertices on a line.
+
+    Numbers are the shortest that stand for the same place. What is the result of a sum, as
+    0.30000000000000004, is written as the decimal that it misses by rounding errors alone, 0.3. What was
+    written by hand stays as it is.
+    """
+    return dump_document(_file_document(environment))
+
+
+def _file_document(environment: Environment) -> dict[str, Any]:
+    """Return what stands in a map file."""
+    document = to_json(environment)
+    return document | {key: _short(document[key]) for key in _MEASURED if key in document}
+
+
+def _short(value: Any) -> Any:
+    """Return a JSON value with numbers as `dump_map` writes them."""
+    if isinstance(value, float):
+        decimal = round(value, _DIGITS)
+        noise = _NOISE * math.ulp(max(abs(value), 1.0))
+        return _number(decimal if abs(decimal - value) <= noise else value)
+    if isinstance(value, list):
+        return [_short(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    return value
+
+
+def dump_document(document: dict[str, Any]) -> str:
+    """Return the text of a map file with this document, which may be a draft that no map can be made of.
+
+    How it is broken into lines does not depend on the lengths of its numbers: in the next version of a
+    file, a vertex that has moved changes one line.
+    """
+    document = document | {key: _short(document[key]) for key in _MEASURED if key in document}
+    lines = []
+    for key, value in document.items():
+        if key in ("obstacles", "starts"):
+            text = _expanded(value, "  ")
+        else:
+            text = _text(value, "  ", len(key) + 6)
+        lines.append(f"  {_compact(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def save_map(environment: Environment, path: str | Path) -> None:
+    """Write `environment` to `path`, whole or not at all.
+
+    Raises
+    ------
+    MapError
+        When the map breaks a rule, so that it could not be loaded again.
+    OutputError
+        When the file cannot be written; a file that was there before is then untouched.
+    """
+    target = Path(path)
+    document = _file_document(environment)
+    from_json(document, str(path))
+    text = dump_document(document).encode()
+    try:
+        # through a link, the file that it points to is replaced, not the link
+        target = target.resolve()
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+        try:
+            with temporary.open("wb") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"{one_line(path)}: cannot be written: {one_line(reason)}") from None
+
+
+def bundled_maps() -> dict[str, Path]:
+    """Return the files of the bundled maps by name, sorted.
+
+    An installed package holds them; in a checkout they are in the folder ``maps``.
+    """
+    here = Path(__file__).resolve()
+    for folder in (here.parents[1] / "maps", here.parents[3] / "maps"):
+        files = sorted(folder.glob("*.json"))
+        if files:
+            return {file.stem: file for file in files}
+    return {}
+
+
+def _is_file(source: str) -> bool:
+    try:
+        return Path(source).is_file()
+    except OSError:  # as of a name that is longer than any file's
+        return False
+
+
+def _is_name(source: str) -> bool:
+    return not any(char in source for char in "./\\\0")
+
+
+def _environment(document: object, where: str, folder: Path | None = None) -> Environment:
+    model = validate(document, where)
+    boundary = _ring(model.boundary)
+    environment = Environment(
+        name=model.name,
+        boundary=boundary,
+        obstacles=tuple(_obstacle(item) for item in model.obstacles),
+        starts={name: _start(item) for name, item in model.starts.items()},
+        description=model.description,
+        extra=_plain(model.extra),
+        schema=model.schema_,
+        density=None if model.density is None else _density(model.density, boundary, folder, where),
+    )
+    check_rules(environment, where)
+    return environment
+
+
+def _ring(vertices: list[list[float]]) -> Ring:
+    if any(value and -_TINY < value < _TINY for point in vertices for value in point):
+        vertices = [[value if abs(value) >= _TINY else 0.0 for value in point] for point in vertices]
+    return tuple((x, y) for x, y in vertices)
+
+
+def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
+    """Return the density that the JSON value at a map's ``density`` stands for.
+
+    Parameters
+    ----------
+    value : object
+    boundary : ring of [x, y], m
+        A raster that does not say what it covers covers its bounding box.
+    where : str
+        What messages call the map.
+    folder : Path or None
+        That holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    return _density(validate_density(value, where), boundary, folder, where)
+
+
+def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
+    x, y = zip(*boundary, strict=True)
+    return density_from(model, (min(x), min(y), max(x), max(y)), folder, where)
+
+
+def _obstacle(model: ObstacleModel) -> Obstacle:
+    path = None
+    if model.path is not None:
+        path = ObstaclePath(_ring(model.path.points), model.path.speed, model.path.repeat)
+    if isinstance(model, PolygonModel):
+        holes = tuple(_ring(hole) for hole in model.holes)
+        return PolygonObstacle(_ring(model.vertices), holes, model.name, path)
+    if isinstance(model, CircleModel):
+        return CircleObstacle(_ring([model.center])[0], model.radius, model.name, path)
+    return WallObstacle(_ring(model.points), model.width, model.name, path)
+
+
+def _start(model: StartModel) -> StartSpec:
+    if isinstance(model, DiscModel):
+        return DiscStart(_ring([model.center])[0], model.radius)
+    if isinstance(model, PointsModel):
+        return PointsStart(_ring(model.positions))
+    return UniformStart()
+
+
+def _plain(value: Any) -> Any:
+    """Return a copy of a JSON value made of plain dict and list."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _number(value: float) -> int | float:
+    # beyond that, floats are whole without being meant so, and JSON gets long
+    return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
+
+
+def _points(points: Ring) -> list[list[int | float]]:
+    return [[_number(x), _number(y)] for x, y in points]
+
+
+def _obstacle_document(obstacle: Obstacle) -> dict[str, Any]:
+    document: dict[str, Any]
+    if isinstance(obstacle, PolygonObstacle):
+        document = {"kind": "polygon", "vertices": _points(obstacle.vertices)}
+        if obstacle.holes:
+            document["holes"] = [_points(hole) for hole in obstacle.holes]
+    elif isinstance(obstacle, CircleObstacle):
+        (center,) = _points((obstacle.center,))
+        document = {"kind": "circle", "center": center, "radius": _number(obstacle.radius)}
+    else:
+        document = {"kind": "wall", "points": _points(obstacle.points), "width": _number(obstacle.width)}
+    if obstacle.name is not None:
+        document = {"kind": document.pop("kind"), "name": obstacle.name, **document}
+    path = obstacle.path
+    if path is not None:
+        document["path"] = {
+            "points": _points(path.points),
+            "speed": _number(path.speed),
+            "repeat": path.repeat,
+        }
+    return document
+
+
+def _start_document(spec: StartSpec) -> dict[str, Any]:
+    if isinstance(spec, DiscStart):
+        (center,) = _points((spec.center,))
+        return {"kind": "disc", "center": center, "radius": _number(spec.radius)}
+    if isinstance(spec, PointsStart):
+        return {"kind": "points", "positions": _points(spec.positions)}
+    return {"kind": "uniform"}
+
+
+def _compact(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _is_ring(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
+
+
+def _text(value: object, indent: str, used: int) -> str:
+    """Return `value` on one line where it fits or is a list of points, else one item on a line."""
+    line = _compact(value)
+    if used + len(_NUMBER.sub("00", line)) <= _LINE or not isinstance(value, (dict, list)):
+        return line
+    if isinstance(value, list) and all(isinstance(item, list) and not _is_ring(item) for item in value):
+        return line
+    return _expanded(value, indent)
+
+
+def _expanded(value: dict[str, Any] | list[Any], indent: str) -> str:
+    """Return a list or an object with one item on a line."""
+    inner = indent + "  "
+    if not value:
+        return _compact(value)
+    if isinstance(value, dict):
+        items = []
+        for key, item in value.items():
+            head = f"{_compact(key)}: "
+            # the rows of a raster are no points: one on a line
+            rows = key == "rows" and isinstance(item, list) and len(item) > 1
+            items.append(
+                head + (_expanded(item, inner) if rows else _text(item, inner, len(inner) + len(head)))
+            )
+        left, right = "{", "}"
+    else:
+        items = [_text(item, inner, len(inner)) for item in value]
+        left, right = "[", "]"
+    return left + "\n" + ",\n".join(inner + item for item in items) + f"\n{indent}{right}"

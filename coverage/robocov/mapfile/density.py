@@ -1,0 +1,270 @@
+"""The density of a map JSON: from the models to `Density` and back, with the pictures beside a map."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.density import (
+    FINEST,
+    Density,
+    Gaussian,
+    Gaussians,
+    Raster,
+    Uniform,
+    WeightedArea,
+    WeightedPolygons,
+)
+from robocov.errors import MapError
+from robocov.files.mistakes import MOST_LISTED, Mistake, refusal
+from robocov.files.strictjson import one_line, shown_json
+from robocov.mapfile.density_models import (
+    LEAST_VARIANCE,
+    LIGHTEST,
+    DensityModel,
+    GaussianDensityModel,
+    PeakModel,
+    PolygonDensityModel,
+    RasterDensityModel,
+    UniformDensityModel,
+)
+from robocov.mapfile.fields import LARGEST, SMALLEST, TINY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov.arrays import Array
+
+MOST_BYTES = 8_000_000
+"""Largest picture of a density, in bytes."""
+
+_DIGITS = 6
+"""Digits after the point of the weights that greys stand for: a map that is written again stays short."""
+
+Bounds = tuple[float, float, float, float]
+
+
+def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where: str) -> Density:
+    """Return the density that a model stands for.
+
+    Parameters
+    ----------
+    model : DensityModel
+    bounds : (x_min, y_min, x_max, y_max), m
+        Of the boundary: what a raster without an extent covers.
+    folder : Path or None
+        Where the map is, and a picture that it names; None when it came without a file.
+    where : str
+        What messages call the map.
+
+    Raises
+    ------
+    MapError
+        When a rule is broken that the model alone does not know, or a picture cannot be used.
+    """
+    found = list(_mistakes(model))
+    if found:
+        raise refusal(where, found[:MOST_LISTED], len(found[MOST_LISTED:]))
+    if isinstance(model, UniformDensityModel):
+        return Uniform(model.weight)
+    if isinstance(model, GaussianDensityModel):
+        return Gaussians(tuple(_peak(peak) for peak in model.peaks), model.floor)
+    if isinstance(model, PolygonDensityModel):
+        areas = (
+            WeightedArea(_ring(area.vertices), area.weight, tuple(map(_ring, area.holes)), area.name)
+            for area in model.areas
+        )
+        return WeightedPolygons(tuple(areas), model.background)
+    extent = bounds if model.extent is None else tuple(model.extent)
+    if model.rows is not None:
+        values = np.array(model.rows, dtype=float)
+        values[values < LIGHTEST] = 0.0
+    else:
+        low, high = model.black or 0.0, 1.0 if model.white is None else model.white
+        values = np.round(low + (high - low) * _greys(str(model.picture), folder, where), _DIGITS)
+        if not values.max() > 0.0:
+            raise refusal(where, [_nothing(("density", "picture"))])
+    return Raster(values[::-1], (extent[0], extent[1], extent[2], extent[3]), model.interpolation)
+
+
+def density_document(density: Density) -> dict[str, Any]:
+    """Return a density as a JSON document that `density_from` makes an equal one of; it names no picture."""
+    if isinstance(density, Uniform):
+        return {"kind": "uniform", "weight": _number(density.weight)}
+    if isinstance(density, Gaussians):
+        peaks = [_peak_document(peak) for peak in density.peaks]
+        return {"kind": "gaussians", "floor": _number(density.floor), "peaks": peaks}
+    if isinstance(density, WeightedPolygons):
+        areas = [_area_document(area) for area in density.areas]
+        return {"kind": "polygons", "background": _number(density.background), "areas": areas}
+    assert isinstance(density, Raster), f"no document for {type(density).__name__}"
+    return {
+        "kind": "raster",
+        "extent": [_number(value) for value in density.extent],
+        "interpolation": density.interpolation,
+        "rows": [[_number(value) for value in row] for row in density.values[::-1].tolist()],
+    }
+
+
+def _mistakes(model: DensityModel) -> Iterator[Mistake]:
+    """Yield what is wrong with a density that its structure does not show."""
+    at = ("density",)
+    if isinstance(model, UniformDensityModel):
+        if not model.weight > 0.0:
+            yield _nothing((*at, "weight"))
+    elif isinstance(model, GaussianDensityModel):
+        for k, peak in enumerate(model.peaks):
+            yield from _peak_mistakes(peak, (*at, "peaks", k))
+        if not model.floor and not any(peak.weight for peak in model.peaks):
+            yield _nothing(at)
+    elif isinstance(model, PolygonDensityModel):
+        if not model.background and not any(area.weight for area in model.areas):
+            yield _nothing(at)
+    else:
+        yield from _raster_mistakes(model)
+
+
+def _nothing(at: tuple[str | int, ...]) -> Mistake:
+    return Mistake.at(at, "all places count 0, but a weight above 0 was wanted")
+
+
+def _peak_mistakes(peak: PeakModel, at: tuple[str | int, ...]) -> Iterator[Mistake]:
+    if (peak.sigma is None) == (peak.covariance is None):
+        count = "neither" if peak.sigma is None else "both"
+        yield Mistake.at(at, f"{count} of sigma and covariance, but one of them was wanted")
+    elif peak.covariance is not None:
+        (a, b), (c, d) = peak.covariance
+        # the smaller eigenvalue
+        spread = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
+        if b != c or not spread >= LEAST_VARIANCE or a * d - b * c <= 1e-9 * a * d:
+            wanted = f"a symmetric, positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
+            yield Mistake.at((*at, "covariance"), f"{shown_json(peak.covariance)}, but {wanted} was wanted")
+
+
+def _raster_mistakes(model: RasterDensityModel) -> Iterator[Mistake]:
+    at = ("density",)
+    if (model.rows is None) == (model.picture is None):
+        count = "neither" if model.rows is None else "both"
+        yield Mistake.at(at, f"{count} of rows and picture, but one of them was wanted")
+        return
+    if model.extent is not None:
+        x_min, y_min, x_max, y_max = model.extent
+        sides = x_max - x_min, y_max - y_min
+        if not (min(sides) >= SMALLEST and max(sides) <= LARGEST):
+            wanted = f"[x_min, y_min, x_max, y_max] with sides from {SMALLEST:g} to {LARGEST:.0f} m"
+            yield Mistake.at((*at, "extent"), f"{shown_json(model.extent)}, but {wanted} was wanted")
+    if model.rows is not None:
+        for name in ("black", "white"):
+            if getattr(model, name) is not None:
+                yield Mistake.at((*at, name), "is for a picture, but there are rows of numbers")
+        width = len(model.rows[0])
+        for k, row in enumerate(model.rows):
+            if len(row) != width:
+                wanted = f"{width}, as in the first row, were wanted"
+                yield Mistake.at((*at, "rows", k), f"{len(row)} numbers, but {wanted}")
+                return
+        if not max(map(max, model.rows)) >= LIGHTEST:
+            yield _nothing((*at, "rows"))
+
+
+def _greys(name: str, folder: Path | None, where: str) -> Array:
+    """Return the greys of a picture from 0 (black) to 1 (white), (rows, columns), the top row first."""
+    at = ("density", "picture")
+
+    def refused(what: str) -> MapError:
+        return refusal(where, [Mistake.at(at, f"{shown_json(name)}: {what}")])
+
+    if folder is None:
+        raise refused("a map that is no file has no folder, but rows of numbers were wanted")
+    path = _inside(name, folder)
+    if path is None:
+        raise refused("leaves the folder of the map, but a file in it was wanted")
+    try:
+        if not path.is_file():
+            raise refused("no such file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise refused(f"cannot be read: {one_line(reason)}") from None
+    if len(content) > MOST_BYTES:
+        raise refused(f"larger than {MOST_BYTES / 1e6:g} MB, but a smaller file was wanted")
+    return _decoded(content, refused)
+
+
+def _inside(name: str, folder: Path) -> Path | None:
+    """Return the file of that name in a folder or below it; None when it is elsewhere."""
+    # a drive, a root or a backslash means something on some system
+    if "\0" in name or "\\" in name or PureWindowsPath(name).anchor or Path(name).is_absolute():
+        return None
+    try:
+        home = folder.resolve()
+        path = (home / name).resolve()
+    except (OSError, RuntimeError):  # as of links in a circle
+        return None
+    return path if path.is_relative_to(home) else None
+
+
+def _decoded(content: bytes, refused: Any) -> Array:
+    """Return the greys in the content of a picture file."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(content), formats=("PNG", "PPM")) as image:
+            width, height = image.size
+            if not 1 <= min(width, height) <= max(width, height) <= FINEST:
+                wanted = f"at most {FINEST} each way"
+                raise refused(f"{width} x {height} pixels, but {wanted} were wanted")
+            if image.mode.startswith("I"):  # 16 bits
+                return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
+            return np.asarray(image.convert("L"), dtype=float) / 255.0
+    except MapError:
+        raise
+    except Exception as error:  # whatever a damaged picture makes of a decoder
+        reason = one_line(str(error)) or type(error).__name__
+        raise refused(f"cannot be read as PNG or PGM: {reason}") from None
+
+
+def _ring(vertices: list[list[float]]) -> tuple[tuple[float, float], ...]:
+    return tuple((_place(x), _place(y)) for x, y in vertices)
+
+
+def _place(coordinate: float) -> float:
+    return coordinate if abs(coordinate) >= TINY else 0.0
+
+
+def _peak(model: PeakModel) -> Gaussian:
+    covariance = None
+    if model.covariance is not None:
+        (a, b), (c, d) = model.covariance
+        covariance = (a, b), (c, d)
+    return Gaussian((_place(model.center[0]), _place(model.center[1])), model.weight, model.sigma, covariance)
+
+
+def _number(value: float) -> int | float:
+    return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
+
+
+def _points(points: tuple[tuple[float, float], ...]) -> list[list[int | float]]:
+    return [[_number(x), _number(y)] for x, y in points]
+
+
+def _peak_document(peak: Gaussian) -> dict[str, Any]:
+    document: dict[str, Any] = {"center": _points((peak.center,))[0]}
+    if peak.sigma is not None:
+        document["sigma"] = _number(peak.sigma)
+    else:
+        document["covariance"] = _points(peak.matrix)
+    return document | {"weight": _number(peak.weight)}
+
+
+def _area_document(area: WeightedArea) -> dict[str, Any]:
+    document: dict[str, Any] = {} if area.name is None else {"name": area.name}
+    document["vertices"] = _points(area.vertices)
+    if area.holes:
+        document["holes"] = [_points(hole) for hole in area.holes]
+    return document | {"weight": _number(area.weight)}

@@ -1,0 +1,224 @@
+"""The geometric rules of a map: rings, holes, walls, sizes, free space, room at the starts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from robocov.density import WeightedArea, WeightedPolygons
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment.starts import GAP, DiscStart, PointsStart, UniformStart
+from robocov.errors import StartError
+from robocov.files.mistakes import MOST_LISTED, Mistake, place, refusal
+from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.robots import DEFAULT_RADIUS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov.arrays import Array
+    from robocov.environment import Ring
+    from robocov.environment.obstacle_path import ObstaclePath
+    from robocov.files.mistakes import Path
+
+_FLAT = 1e-9
+"""A ring whose area is below this part of its bounding box squared is a line."""
+
+
+def check_rules(environment: Environment, where: str) -> None:
+    """Check that `environment` can be simulated.
+
+    Parameters
+    ----------
+    environment : Environment
+    where : str
+        What messages call the map: a file's name.
+
+    Raises
+    ------
+    MapError
+        One line with the first broken rule, and how many more there are.
+    """
+    found = list(_ring_mistakes(("boundary",), environment.boundary))
+    for k, obstacle in enumerate(environment.obstacles):
+        found += _obstacle_mistakes(("obstacles", k), obstacle)
+        if obstacle.path is not None:
+            found += _path_mistakes(("obstacles", k, "path"), obstacle.path)
+    if isinstance(environment.density, WeightedPolygons):
+        for k, area in enumerate(environment.density.areas):
+            found += _area_mistakes(("density", "areas", k), area)
+    if not found:
+        found = list(_space_mistakes(environment))
+    if found:
+        raise refusal(where, found[:MOST_LISTED], len(found[MOST_LISTED:]))
+
+
+def _ring_mistakes(at: Path, ring: Ring) -> Iterator[Mistake]:
+    """Yield what is wrong with a closed ring of at least 3 points."""
+    points = np.asarray(ring, dtype=float)
+    extent = np.ptp(points, axis=0)
+    count = len(np.unique(points, axis=0))
+    if count < 3:
+        what = f"{count} different point{'s' if count > 1 else ''}, but at least 3 were wanted"
+        yield Mistake.at(at, what)
+        return
+    wrong_size = _wrong_size(extent)
+    if wrong_size:
+        yield Mistake.at(at, wrong_size)
+        return
+    polygon = Polygon(points)
+    # a ring that crosses itself may have no area either
+    flat = _FLAT * float(extent.max()) ** 2
+    if shapely.convex_hull(polygon).area <= flat:
+        what = f"area {polygon.area:g} m², but points that are not on one line were wanted"
+        yield Mistake.at(at, what)
+    elif not polygon.is_valid:
+        yield _crossing(at, points, polygon)
+
+
+def _wrong_size(extent: Array) -> str | None:
+    """Return what is wrong with the (2,) width and height of something."""
+    size = f"{extent[0]:g} x {extent[1]:g} m"
+    if extent.max() > LARGEST:
+        return f"{size}, but at most {LARGEST / 1000:g} km was wanted"
+    if extent.min() < SMALLEST:
+        return f"{size}, but at least {SMALLEST * 1000:g} mm each way was wanted"
+    return None
+
+
+def _crossing(at: Path, points: Array, polygon: Polygon) -> Mistake:
+    """Return the mistake of a ring that crosses or touches itself, with the two edges."""
+    reason = shapely.is_valid_reason(polygon)
+    spot = np.array([float(value) for value in reason[reason.index("[") + 1 : -1].split()])
+    ends = np.roll(points, -1, axis=0)
+    edges = shapely.linestrings(np.stack([points, ends], axis=1))
+    distance = shapely.distance(edges, shapely.Point(spot))
+    distance[(points == ends).all(axis=1)] = np.inf
+    nearest = [int(k) for k in np.argsort(distance, kind="stable")[:6]]
+    # neighbours in the ring always meet: name another edge if there is one at that spot
+    apart = (k for k in nearest if (k - nearest[0]) % len(points) not in (0, 1, len(points) - 1))
+    other = next((k for k in apart if distance[k] <= 1e-6), nearest[1])
+    first, second = sorted((nearest[0], other))
+    return Mistake.at(
+        (*at, first),
+        f"the edge from here meets the edge from {place((*at, second))} near "
+        f"[{spot[0]:g}, {spot[1]:g}], but a ring that does not meet itself was wanted",
+    )
+
+
+def _obstacle_mistakes(
+    at: Path, obstacle: PolygonObstacle | CircleObstacle | WallObstacle
+) -> Iterator[Mistake]:
+    if isinstance(obstacle, PolygonObstacle):
+        found = list(_ring_mistakes((*at, "vertices"), obstacle.vertices))
+        for k, hole in enumerate(obstacle.holes):
+            found += _ring_mistakes((*at, "holes", k), hole)
+        yield from found
+        if not found:
+            yield from _hole_mistakes(at, obstacle)
+    elif isinstance(obstacle, WallObstacle):
+        points = np.asarray(obstacle.points, dtype=float)
+        extent = np.ptp(points, axis=0)
+        if extent.max() < SMALLEST:
+            length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+            what = f"a wall {length:g} m long, but at least {SMALLEST * 1000:g} mm was wanted"
+            yield Mistake.at((*at, "points"), what)
+        elif extent.max() > LARGEST:
+            size = f"{extent[0]:g} x {extent[1]:g} m"
+            yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
+
+
+def _area_mistakes(at: Path, area: WeightedArea) -> Iterator[Mistake]:
+    """Yield what is wrong with the outline of a weighted area."""
+    yield from _obstacle_mistakes(at, PolygonObstacle(area.vertices, area.holes))
+
+
+def _path_mistakes(at: Path, path: ObstaclePath) -> Iterator[Mistake]:
+    """Yield what is wrong with the path of an obstacle."""
+    extent = np.ptp(np.asarray(path.points, dtype=float), axis=0)
+    if extent.max() > LARGEST:
+        size = f"{extent[0]:g} x {extent[1]:g} m"
+        yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
+    elif extent.max() < SMALLEST:
+        what = f"a path {extent.max():g} m wide, but at least {SMALLEST * 1000:g} mm was wanted"
+        yield Mistake.at((*at, "points"), what)
+
+
+def _hole_mistakes(at: Path, obstacle: PolygonObstacle) -> Iterator[Mistake]:
+    """Yield what is wrong with the holes of a polygon whose rings are good one by one."""
+    if obstacle.polygon.is_valid:
+        return
+    shell = Polygon(obstacle.vertices)
+    good: list[Ring] = []
+    for k, hole in enumerate(obstacle.holes):
+        path = (*at, "holes", k)
+        if not shell.covers(Polygon(hole)):
+            what = f"sticks out of {place((*at, 'vertices'))}, but a hole inside was wanted"
+            yield Mistake.at(path, what)
+        elif not Polygon(obstacle.vertices, [*good, hole]).is_valid:
+            yield Mistake.at(path, "meets the outline or another hole, but a hole apart from them was wanted")
+        else:
+            good.append(hole)
+
+
+def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
+    """Yield what is wrong with the map as a whole, once each part is good."""
+    if len(environment.region.vertices) < 3:
+        what = "its convex hull is a line, but a region with an area was wanted"
+        yield Mistake.at(("boundary",), what)
+        return
+    if environment.free.is_empty:
+        what = "no free space is left inside the boundary, but some was wanted"
+        yield Mistake.at(("obstacles",), what)
+        return
+    if environment.density is not None and not environment.free_masses.sum() > 0.0:
+        what = "all places in the free space count 0, but a weight above 0 was wanted"
+        yield Mistake.at(("density",), what)
+    for name in environment.starts:
+        yield from _start_mistakes(environment, name)
+
+
+def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
+    at = ("starts", name)
+    spec = environment.starts[name]
+    if isinstance(spec, PointsStart):
+        points = np.asarray(spec.positions, dtype=float)
+        inside = shapely.contains_properly(environment.free, shapely.points(points))
+        for k in np.flatnonzero(~inside):
+            yield Mistake.at(
+                (*at, "positions", int(k)),
+                f"[{points[k, 0]:g}, {points[k, 1]:g}] is inside an obstacle or outside the boundary, but a "
+                f"free place was wanted",
+            )
+        if len(np.unique(points, axis=0)) < len(points):
+            what = "one place is given twice, but one place a robot was wanted"
+            yield Mistake.at((*at, "positions"), what)
+        return
+    if _plainly_has_room(environment, spec):
+        return
+    try:
+        environment.start(name).sample(1, radius=DEFAULT_RADIUS)
+    except StartError:
+        what = "the free space"
+        if isinstance(spec, DiscStart):
+            what = f"the disc of radius {spec.radius:g} m at [{spec.center[0]:g}, {spec.center[1]:g}]"
+        wanted = f"room for a robot of radius {DEFAULT_RADIUS:g} m was wanted"
+        yield Mistake.at(at, f"{what} has no room, but {wanted}")
+
+
+def _plainly_has_room(environment: Environment, spec: DiscStart | UniformStart) -> bool:
+    """Return whether a robot fits with a centimetre to spare at the centre of a disc.
+
+    A draw says the same, but of a large map it takes seconds.
+    """
+    discs = [spec] if isinstance(spec, DiscStart) else environment.starts.values()
+    given = [disc.center for disc in discs if isinstance(disc, DiscStart)]
+    if not given:
+        return False
+    centres = shapely.points(given)
+    inside = shapely.contains_properly(environment.free, centres)
+    clearance = shapely.distance(environment.free.boundary, centres)
+    return bool((inside & (clearance > DEFAULT_RADIUS * (1 + GAP) + 0.01)).any())

@@ -1,0 +1,260 @@
+"""What the field measures of a run: coverage, sight, energy, ways, connectivity, clearance, by moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.errors import ParameterError, counted, shown
+from robocov.metrics.sight import Covered, Walls, covered
+from robocov.metrics.summary import clearances
+from robocov.observation.neighbours import Neighbours
+from robocov.record.moments import nearest_moments
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from robocov.metrics.summary import CostHistory
+    from robocov.record import Record
+
+RATE = 2.0
+"""Moments a second at which areas and graphs are looked at where nothing else is said."""
+
+NEAR_FINAL = 0.05
+"""A cost counts as that of the end when it is within this part of it."""
+
+_PAIRS = 1 << 18
+"""Pairs of robots looked at at once, over some moments, which bounds the memory."""
+
+COLUMNS = {
+    "time": "time_s",
+    "sensed_area": "sensed_area_m2",
+    "range_area": "range_area_m2",
+    "visible_area": "visible_area_m2",
+    "work": "work_J",
+    "effort": "effort_N2_s",
+    "path_length": "path_length_m",
+    "components": "components",
+    "algebraic_connectivity": "algebraic_connectivity",
+    "wall_clearance": "wall_clearance_m",
+    "robot_clearance": "robot_clearance_m",
+}
+"""The columns of ``metrics.csv``, in their order, by the attributes of `RunMetrics`."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunMetrics:
+    """Metrics along a run, at K of its moments. Only robots that work count.
+
+    Attributes
+    ----------
+    time : (K,) s
+    sensed_area : (K,) m²
+        Free area within the sensing range of a robot and in its line of sight.
+    range_area : (K,) m²
+        Free area within the sensing range of a robot, walls or not (blanket coverage by discs).
+    visible_area : (K,) m²
+        Free area in line of sight of a robot at any distance (an art gallery's guards).
+    work : (K,) J
+        Integral of |F v| over the time so far, summed over the robots. F is the force that the controller
+        asked for, before any limit.
+    effort : (K,) N² s
+        Integral of |F|² over the time so far, summed over the robots.
+    path_length : (K,) m
+        Way so far, mean over the robots.
+    components : (K,)
+        Into how many parts the team falls that hear each other, directly or by way of others.
+    algebraic_connectivity : (K,)
+        Second smallest eigenvalue of the Laplacian of the graph of who hears whom: 0 where it falls apart,
+        n where all n robots hear each other.
+    wall_clearance : (K,) m
+        Smallest gap between a robot's rim and a wall since the moment before, inf where there is none.
+    robot_clearance : (K,) m
+        Smallest gap between the rims of two robots since the moment before, inf where there are no two.
+    free_area : float, m²
+        Of which the areas are parts.
+    """
+
+    time: Array
+    sensed_area: Array
+    range_area: Array
+    visible_area: Array
+    work: Array
+    effort: Array
+    path_length: Array
+    components: IntArray
+    algebraic_connectivity: Array
+    wall_clearance: Array
+    robot_clearance: Array
+    free_area: float
+
+    def __repr__(self) -> str:
+        share = self.sensed_area[-1] / self.free_area
+        moments = counted(len(self.time), "moment")
+        return (
+            f"<RunMetrics {moments}, {self.time[-1]:.1f} s, {share:.0%} of the free area sensed at the end>"
+        )
+
+    def rows(self) -> list[tuple[float, ...]]:
+        """Return the rows of ``metrics.csv``, under `COLUMNS`."""
+        return list(zip(*(getattr(self, name).tolist() for name in COLUMNS), strict=True))
+
+    def final(self) -> dict[str, float | None]:
+        """Return the figures of the whole run by their names with units: those of the end.
+
+        Clearances are the smallest of the run, None where there is none.
+        """
+        found: dict[str, float | None] = {}
+        for name, column in COLUMNS.items():
+            if name == "time":
+                continue
+            values = getattr(self, name)
+            value = float(values.min() if name.endswith("clearance") else values[-1])
+            found[column] = value if np.isfinite(value) else None
+        return found
+
+
+def run_metrics(
+    record: Record, rate: float = RATE, on_sample: Callable[[], None] | None = None
+) -> RunMetrics:
+    """Measure a run.
+
+    Parameters
+    ----------
+    record : Record
+        Energy and ways are integrated over all of its moments.
+    rate : float, Hz
+        How often the rest is measured; the last moment is always one.
+    on_sample : callable
+        Called after every moment, for progress.
+
+    Raises
+    ------
+    ParameterError
+        When the rate is negative or not finite.
+    """
+    if not 0.0 <= rate < np.inf:
+        raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+    moments = nearest_moments(record.time, rate)
+    team, working = record.team, record.working
+    since = np.concatenate([[0], moments[:-1] + 1])
+    work, effort, way = _integrals(record, working)
+    areas, parts, connectivity = [], [], []
+    walls: Walls | None = None
+    for k in moments.tolist():
+        some = np.flatnonzero(working[k])
+        places = record.positions[k, some]
+        if walls is None or record.environment.moves:
+            walls = Walls.of(record.environment.at(float(record.time[k])).free)
+        areas.append(covered(walls, places, team.sensing_range[some]))
+        found = connections(places, team.communication_range[some])
+        parts.append(found[0])
+        connectivity.append(found[1])
+        if on_sample is not None:
+            on_sample()
+    sensed, within, visible = np.array(areas).reshape(-1, len(Covered._fields)).T
+    return RunMetrics(
+        time=record.time[moments],
+        sensed_area=sensed,
+        range_area=within,
+        visible_area=visible,
+        work=work[moments],
+        effort=effort[moments],
+        path_length=way[moments],
+        components=np.array(parts, dtype=np.intp),
+        algebraic_connectivity=np.array(connectivity),
+        wall_clearance=np.minimum.reduceat(clearances(record).min(axis=1), since),
+        robot_clearance=np.minimum.reduceat(_closest(record, working), since),
+        free_area=float(record.environment.free_area),
+    )
+
+
+def connections(places: Array, ranges: Array) -> tuple[int, float]:
+    """Return the number of components of the graph of who hears whom, and its algebraic connectivity.
+
+    Two robots hear each other when they are in range of each other. The graph of one robot has the algebraic
+    connectivity 0, that of none no component.
+
+    Source: M. Fiedler, *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
+
+    >>> connections(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.full(3, 1.0))
+    (1, 1.0)
+    """
+    n = len(places)
+    if n == 0:
+        return 0, 0.0
+    neighbours = Neighbours.within(places, ranges)
+    if neighbours.complete:
+        return 1, float(n) if n > 1 else 0.0
+    one, other, _ = neighbours.closer_than(places, np.inf)
+    laplacian = np.zeros((n, n))
+    laplacian[one, other] = -1.0
+    laplacian[np.arange(n), np.arange(n)] = -laplacian.sum(axis=1)
+    parts = _components(n, one, other)
+    if n == 1 or parts > 1:
+        return parts, 0.0
+    # whole numbers in the matrix: what is less than this is rounding
+    return parts, round(float(np.linalg.eigvalsh(laplacian)[1]), 12)
+
+
+def time_near_final(history: CostHistory, part: float = NEAR_FINAL) -> float:
+    """Return from when on the mean distance stays within `part` of what it is at the end, s.
+
+    Both ways: also a cost that was lower before counts as being away from its end.
+    """
+    cost = history.mean_distance
+    away = np.flatnonzero(~(np.abs(cost - cost[-1]) <= part * cost[-1]))
+    return float(history.time[0] if not len(away) else history.time[min(away[-1] + 1, len(cost) - 1)])
+
+
+def figures_of(record: Record, history: CostHistory) -> Mapping[str, float | None]:
+    """Return the metrics of the end of a run, with that from when on its cost was that of the end."""
+    return {**run_metrics(record, 0.0).final(), "near_final_s": time_near_final(history)}
+
+
+def _integrals(record: Record, working: BoolArray) -> tuple[Array, Array, Array]:
+    """Return work, effort and mean way from the first moment to each one, (T,)."""
+    forces = np.where(working[:, :, None], record.forces, 0.0)
+    power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
+    square = (forces**2).sum(axis=(1, 2))
+    step = np.diff(record.time)
+    moved = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1)).mean(axis=1)
+    # the force holds until the next moment; what it does meanwhile, by the trapezoidal rule
+    return (
+        _running(0.5 * (power[1:] + power[:-1]) * step),
+        _running(square[:-1] * step),
+        _running(moved),
+    )
+
+
+def _running(parts: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(parts)])
+
+
+def _components(n: int, one: IntArray, other: IntArray) -> int:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(n, n))
+    count, _ = connected_components(graph, directed=False)
+    return int(count)
+
+
+def _closest(record: Record, working: BoolArray) -> Array:
+    """Return the smallest gap between the rims of two robots at each moment, (T,) m; inf without two."""
+    radius = record.team.radius
+    one, other = np.triu_indices(len(radius), 1)
+    found = np.full(len(record), np.inf)
+    if not len(one):
+        return found
+    both = radius[one] + radius[other]
+    size = max(1, _PAIRS // len(one))
+    for k in range(0, len(record), size):
+        part = slice(k, k + size)
+        x, y = np.moveaxis(np.where(working[part, :, None], record.positions[part], np.nan), -1, 0)
+        gap = np.sqrt((x[:, one] - x[:, other]) ** 2 + (y[:, one] - y[:, other]) ** 2) - both
+        found[part] = np.where(np.isnan(gap), np.inf, gap).min(axis=1)
+    return found

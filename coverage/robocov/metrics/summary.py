@@ -1,0 +1,341 @@
+"""What is said of a whole run in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.cost import CoverageCost
+from robocov.cost.momentary_cost import MomentaryCost
+from robocov.drawing import drawing_backend
+from robocov.errors import counted
+from robocov.observation.neighbours import close_pairs
+from robocov.record import Record
+from robocov.record.moments import nearest_moments
+from robocov.sensor import RangeSensor
+from robocov.world.solid import movers, solid_pieces
+
+SETTLED_WINDOW = 4.0
+"""Seconds over which a robot at rest must not get anywhere."""
+
+SETTLED_DISTANCE = 0.05
+"""Metres that a robot at rest may get in `SETTLED_WINDOW`."""
+
+TOUCHING = 1e-3
+"""Gap in metres below which two bodies are in contact."""
+
+_FEW = 100
+"""Robots up to which it is faster to look at every pair than to look for the close ones."""
+
+_AT_ONCE = 1 << 18
+"""Pairs of robots that are looked at at once, over some moments."""
+
+MOVING_RATE = 1.0
+"""Samples of the coverage cost per simulated second, at most, where obstacles move."""
+
+STUCK_WINDOW = 5.0
+"""Seconds at the end over which a stuck robot gets nowhere."""
+
+STUCK_DISTANCE = 0.05
+"""Metres that a stuck robot may get in `STUCK_WINDOW`."""
+
+STUCK_AWAY = 0.5
+"""Metres that a stuck robot is away from its goal, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class CostHistory:
+    """The coverage cost (22) along a run.
+
+    Attributes
+    ----------
+    time : (K,) s
+    mean_distance : (K,) m
+    cost : (K,) m³
+    uncovered_area : (K,) m²
+    mean_time : (K,) s or None
+        Mean time until the first robot is at a place, each at its own largest speed; None where all are
+        equally fast.
+    """
+
+    time: Array
+    mean_distance: Array
+    cost: Array
+    uncovered_area: Array
+    mean_time: Array | None = None
+
+    def __repr__(self) -> str:
+        first, last = self.mean_distance[[0, -1]].tolist()
+        moments = counted(len(self.time), "moment")
+        return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
+
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the mean distance against time.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw; the curve's name stands to the right of them. None makes a page.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        label, controller : str
+            The curve's name, and whose it is: the paper's controllers have colours of their own.
+        theme : {"light", "dark"}
+        size : (width, height), px
+            Of the page.
+        title : str
+            Of the page.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or those on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_history(self, axes, **options)
+
+
+def cost_history(
+    record: Record, cost: CoverageCost, rate: float = 10.0, on_sample: Callable[[], None] | None = None
+) -> CostHistory:
+    """Evaluate the coverage cost along a record.
+
+    Robots count while they work, and obstacles that move stand where they are at each moment.
+
+    Parameters
+    ----------
+    record : Record
+    cost : CoverageCost
+        Of the record's environment.
+    rate : float, Hz
+        Samples per simulated second; the last moment is always one. At most `MOVING_RATE` where obstacles
+        move, for each moment then has a map of its own.
+    on_sample : callable
+        Called after every evaluation, for progress.
+    """
+    moments = sample_moments(record, rate)
+    rows = np.empty((len(moments), 3))
+    speeds = record.team.max_speed if record.team.mixed_speeds else None
+    times = None if speeds is None else np.full(len(moments), np.nan)
+    momentary = MomentaryCost(cost)
+    for row, k in enumerate(moments):
+        working = None if record.conditions is None else record.working[k]
+        now = float(record.time[k]), record.positions[k], working
+        rows[row] = momentary.figures(*now)
+        if times is not None and (first := momentary(*now, speeds)) is not None:
+            times[row] = first.mean_time
+        if on_sample is not None:
+            on_sample()
+    return CostHistory(record.time[moments], rows[:, 0], rows[:, 1], rows[:, 2], times)
+
+
+def sample_moments(record: Record, rate: float) -> list[int]:
+    """Return the numbers of the moments nearest to multiples of 1/rate seconds, and of the last.
+
+    Where obstacles move, the rate is `MOVING_RATE` at most.
+    """
+    if record.environment.moves:
+        rate = min(rate, MOVING_RATE)
+    return [int(k) for k in nearest_moments(record.time, rate)]
+
+
+def settled_at(
+    time: Array, positions: Array, window: float = SETTLED_WINDOW, distance: float = SETTLED_DISTANCE
+) -> float | None:
+    """Return when the team came to rest, in seconds; None when it had not by the end.
+
+    That is the first moment from which on no robot's net displacement over any `window` seconds
+    reaches `distance` metres. Speed is no test: a robot may tremble in one place for ever.
+
+    Parameters
+    ----------
+    time : (T,) s
+    positions : (T, n, 2) m
+    """
+    dt = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    span = round(window / dt) if dt > 0 else 0
+    if span == 0 or len(time) <= span:
+        return None
+    moved = positions[span:] - positions[:-span]
+    far = (np.sqrt((moved**2).sum(axis=-1)) >= distance).any(axis=1)
+    restless = np.flatnonzero(far)
+    if len(restless) == 0:
+        return float(time[0])
+    first = int(restless[-1]) + 1
+    return float(time[first]) if first < len(far) else None
+
+
+def path_lengths(positions: Array) -> Array:
+    """Return how far each robot travelled, (n,) m, from its positions, (T, n, 2) m."""
+    moved = np.diff(positions, axis=0)
+    return np.asarray(np.sqrt((moved**2).sum(axis=-1)).sum(axis=0))
+
+
+def mean_over_run(time: Array, values: Array) -> float:
+    """Return the mean over time of what was sampled along a run, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time : (K,) s
+        Ascending.
+    values : (K,)
+
+    Examples
+    --------
+    >>> mean_over_run(np.array([0.0, 1.0, 3.0]), np.array([4.0, 2.0, 2.0]))
+    2.3333333333333335
+    """
+    duration = float(time[-1] - time[0])
+    if duration == 0.0:
+        return float(values[-1])
+    return float(np.trapezoid(values, time)) / duration
+
+
+def stuck_robots(
+    time: Array,
+    positions: Array,
+    goals: Array,
+    window: float = STUCK_WINDOW,
+    distance: float = STUCK_DISTANCE,
+    away: float = STUCK_AWAY,
+) -> int | None:
+    """Return how many robots are stuck at the end: far from their goals, and no longer on the way there.
+
+    A robot is stuck when it is more than `away` metres from its goal and its net displacement over the
+    last `window` seconds is below `distance` metres.
+
+    Parameters
+    ----------
+    time : (T,) s
+        Ascending.
+    positions : (T, n, 2) m
+    goals : (T, n, 2) m
+        nan where none.
+
+    Returns
+    -------
+    int or None
+        None where no robot has a goal, or the run is shorter than the window.
+    """
+    before = float(time[-1]) - window
+    # half a microsecond forgives the rounding of sums of steps
+    if np.isnan(goals[-1]).any(axis=1).all() or before < float(time[0]) - 5e-7:
+        return None
+    k = int(np.searchsorted(time, before + 5e-7, side="right")) - 1
+    moved = np.sqrt(((positions[-1] - positions[k]) ** 2).sum(axis=-1))
+    left = np.sqrt(((goals[-1] - positions[-1]) ** 2).sum(axis=-1))
+    return int(((moved < distance) & (left > away)).sum())
+
+
+def clearances(record: Record) -> Array:
+    """Return the gap between each robot's rim and the nearest wall at each moment, (T, n) m.
+
+    What the robots sensed is used where they sensed something, and that was right; the rest is asked for
+    here. Of robots that do not work there is none: inf.
+    """
+    if record.conditions is not None or record.environment.moves:
+        return _clearances_asked_for(record)
+    positions = record.positions.reshape(-1, 2)
+    nearest = record.obstacle_points.reshape(-1, 2).copy()
+    left = np.flatnonzero(np.isnan(nearest[:, 0]))
+    if len(left):
+        sensor = RangeSensor(solid_pieces(record.environment))
+        reach = 1.0  # a query costs the more the farther it reaches
+        while len(left):
+            nearest[left] = sensor.nearest(positions[left], np.full(len(left), reach))
+            left = left[np.isnan(nearest[left, 0])]
+            reach *= 4.0
+    gap = np.sqrt(((positions - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
+    return np.asarray(gap - record.team.radius)
+
+
+def _clearances_asked_for(record: Record) -> Array:
+    """Return the same where the robots sensed what was not there, or what is there changes."""
+    environment, working, radius = record.environment, record.working, record.team.radius
+    sensor = RangeSensor(solid_pieces(environment), movers(environment))
+    failed = record.present & ~working
+    reach = np.full(len(radius), float(np.hypot(*np.ptp(environment.region.vertices, axis=0))))
+    gap = np.full(working.shape, np.inf)
+    for k, places in enumerate(record.positions):
+        sensor.show(float(record.time[k]), np.column_stack([places, radius])[failed[k]])
+        rows = np.flatnonzero(working[k])
+        nearest = sensor.nearest(places[rows], reach[rows])
+        gap[k, rows] = np.sqrt(((places[rows] - nearest) ** 2).sum(axis=1)) - radius[rows]
+    return gap
+
+
+def contacts(record: Record, clearance: Array) -> int:
+    """Return how many times a robot began to touch a wall or another robot.
+
+    Parameters
+    ----------
+    record : Record
+    clearance : (T, n) m
+        What `clearances` returns. A robot that has failed is a wall.
+    """
+    touching = clearance <= TOUCHING
+    walls = int(touching[0].sum() + (touching[1:] & ~touching[:-1]).sum())
+    radius = record.team.radius
+    count = _meetings if len(radius) <= _FEW else _meetings_of_many
+    positions = record.positions
+    if record.conditions is not None:
+        # who works may touch who does; what failed counts as a wall
+        positions = np.where(record.working[:, :, None], positions, np.nan)
+    return walls + count(positions, radius)
+
+
+def _meetings(positions: Array, radius: Array) -> int:
+    """Return how many times two of a few robots began to touch, all pairs of many moments at once."""
+    first, second = np.triu_indices(len(radius), 1)
+    reach = radius[first] + radius[second] + TOUCHING
+    began = 0
+    before = np.zeros((1, len(first)), dtype=bool)
+    step = max(1, _AT_ONCE // max(1, len(first)))
+    for k in range(0, len(positions), step):
+        x, y = np.moveaxis(positions[k : k + step], -1, 0)
+        gap = np.sqrt((x[:, first] - x[:, second]) ** 2 + (y[:, first] - y[:, second]) ** 2)
+        touching = np.concatenate([before, gap <= reach])
+        began += int((touching[1:] & ~touching[:-1]).sum())
+        before = touching[-1:]
+    return began
+
+
+def _meetings_of_many(positions: Array, radius: Array) -> int:
+    """Return the same for many robots, of which only those that are close are looked at."""
+    reach = 2.0 * float(radius.max()) + TOUCHING
+    began = 0
+    before: set[tuple[int, int]] = set()
+    for now in positions:
+        rows = np.flatnonzero(~np.isnan(now[:, 0]))
+        first, second, distance = close_pairs(now[rows], reach)
+        first, second = rows[first], rows[second]
+        near = (first < second) & (distance <= radius[first] + radius[second] + TOUCHING)
+        pairs = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
+        began += len(pairs - before)
+        before = pairs
+    return began
+
+
+def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
+    """Return the summary that ``run.json`` holds; units are in the key names."""
+    clearance = clearances(record)
+    return {
+        "mean_distance_m": float(history.mean_distance[-1]),
+        "mean_distance_over_run_m": mean_over_run(history.time, history.mean_distance),
+        **({} if history.mean_time is None else {"mean_time_s": float(history.mean_time[-1])}),
+        "cost_m3": float(history.cost[-1]),
+        "uncovered_area_m2": float(history.uncovered_area[-1]),
+        "settled_at_s": settled_at(record.time, record.positions),
+        "contacts": contacts(record, clearance),
+        "min_clearance_m": float(clearance.min()),
+        "path_length_m": [float(x) for x in path_lengths(record.positions)],
+        "stuck_robots": stuck_robots(record.time, record.positions, record.goals),
+    }

@@ -1,0 +1,236 @@
+"""Descent of the coverage cost (22): where discs that keep clear of walls and of each other rest."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from robocov.arrays import Array, IntArray
+from robocov.environment.starts import GAP
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from shapely import MultiPolygon
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.cost import CoverageCost, CoverageResult
+
+_SEGMENTS = 32
+"""Edges of a quarter circle around corners of walls: they cut 3e-4 of the radius off it, less than `GAP`."""
+
+_PUSHES = 60
+"""Times that overlapping robots are pushed apart before the place counts as too narrow for them."""
+
+_FARTHER = 1.005
+"""They are pushed a little too far, else they would never quite arrive."""
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""The golden angle: its multiples are spread evenly."""
+
+_MEMORY = 8
+"""Steps from which the curvature is learnt."""
+
+_ARMIJO = 1e-4
+"""Part of the fall that the slope promises which is good enough."""
+
+_HALVINGS = 4, 14
+"""Times that a step along the learnt direction, and along the slope, is halved before it counts as none."""
+
+_SLOW = 5, 1e-7
+"""So many steps that together lower the cost by less than this part of it are the last ones."""
+
+_STEPS = 300
+"""Most steps; some tens are usual."""
+
+
+class Room:
+    """Where the centres of robots may be, by component of the free space.
+
+    Robots keep from walls, and from each other, the distance that starts leave as well: their radius
+    (their diameter), and `robocov.environment.starts.GAP` of it.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+    radius : float, m
+
+    Attributes
+    ----------
+    clearance, spacing : float, m
+        Least distance of a centre from a wall, and from another centre.
+    parts : tuple of shapely geometries
+        One for each component, empty where no robot fits.
+    """
+
+    def __init__(self, free: MultiPolygon, radius: float) -> None:
+        self.clearance, self.spacing = radius * (1.0 + GAP), 2.0 * radius * (1.0 + GAP)
+        self.parts: tuple[BaseGeometry, ...] = tuple(
+            part.buffer(-self.clearance, quad_segs=_SEGMENTS) for part in free.geoms
+        )
+        shapely.prepare(list(self.parts))
+
+    def nearest(self, positions: Array, component: IntArray) -> Array | None:
+        """Return (n, 2) positions near the given ones where all robots fit, each in its component.
+
+        None where pushing them apart does not make them fit.
+        """
+        positions = self._inside(positions, component)
+        for _ in range(_PUSHES):
+            pairs = cKDTree(positions).query_pairs(self.spacing * (1.0 - 1e-9), output_type="ndarray")
+            if not len(pairs):
+                return positions
+            positions = self._inside(self._apart(positions, pairs[np.lexsort(pairs.T)]), component)
+        return None
+
+    def _apart(self, positions: Array, pairs: IntArray) -> Array:
+        """Return positions with each of (p, 2) pairs pushed to its distance, half by each."""
+        one, other = pairs.T
+        between = positions[other] - positions[one]
+        apart = np.hypot(between[:, 0], between[:, 1])
+        # two robots in one place have no direction apart: a fixed one, another for each pair
+        same = apart == 0.0
+        angle = _GOLDEN * (one[same] + other[same] * len(positions))
+        between[same] = np.column_stack([np.cos(angle), np.sin(angle)])
+        part = (_FARTHER * self.spacing - apart) / 2.0 / np.where(same, 1.0, apart)
+        push = between * part[:, None]
+        positions = positions.copy()
+        np.subtract.at(positions, one, push)
+        np.add.at(positions, other, push)
+        return positions
+
+    def _inside(self, positions: Array, component: IntArray) -> Array:
+        """Return the nearest place in the part of its component for each position."""
+        part = np.array(self.parts, dtype=object)[component]
+        point = shapely.points(positions)
+        away = np.nonzero(~shapely.covers(part, point))[0]
+        if not len(away):
+            return positions
+        positions = positions.copy()
+        positions[away] = shapely.get_coordinates(shapely.shortest_line(part[away], point[away]))[::2]
+        return positions
+
+
+def descended(
+    cost: CoverageCost,
+    room: Room,
+    positions: Array,
+    component: IntArray,
+    beat: Callable[[], None] | None = None,
+) -> CoverageResult:
+    """Return the coverage cost of a local minimum near the given positions, which is never higher.
+
+    Projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm 7.4),
+    scaled by the curvature that Weiszfeld's iteration for the geometric median uses, from `Room.nearest`
+    back into the room, halved until the cost falls enough (Armijo). The cost is only piecewise smooth,
+    as sites change owners and ways, and a wall may stop a robot: where the learnt direction does not lead
+    down, the scaled slope alone is followed and the curvature learnt anew.
+
+    Parameters
+    ----------
+    cost : CoverageCost
+    room : Room
+    positions : (n, 2) m
+        In the room.
+    component : (n,)
+        Which component of the free space holds which robot; none leaves its own.
+    beat : callable
+        Called once a step. It may raise, to give up.
+    """
+    result = cost(positions)
+    slope = _slope(result)
+    learnt: deque[tuple[Array, Array, float]] = deque(maxlen=_MEMORY)
+    falls: deque[float] = deque(maxlen=_SLOW[0])
+    for _ in range(_STEPS):
+        if beat is not None:
+            beat()
+        scale = _curvature(result, cost.spacing / 2.0)[:, None]
+        after = None
+        if learnt:
+            way = _direction(slope, scale, learnt)
+            after = _shorter(cost, room, component, result, slope, way, _HALVINGS[0])
+        if after is None:
+            learnt.clear()
+            after = _shorter(cost, room, component, result, slope, -slope / scale, _HALVINGS[1])
+        if after is None:
+            break
+        slope_after = _slope(after)
+        step, bend = after.positions - result.positions, slope_after - slope
+        along = float(np.vdot(step, bend))
+        # only where it curves upwards the direction stays one of descent
+        if along > 1e-10 * float(np.vdot(bend, bend)):
+            learnt.append((step, bend, 1.0 / along))
+        falls.append(result.mean_distance - after.mean_distance)
+        result, slope = after, slope_after
+        if len(falls) == falls.maxlen and sum(falls) < _SLOW[1] * result.mean_distance:
+            break
+    return result
+
+
+def _slope(result: CoverageResult) -> Array:
+    """Return the derivative of the mean distance by the positions, (n, 2)."""
+    if not result.value > 0.0:
+        return np.zeros_like(result.positions)
+    return result.gradient * (result.mean_distance / result.value)
+
+
+def _curvature(result: CoverageResult, least: float) -> Array:
+    """Return the sum of the inverse distances to the first way-points over the number of sites, (n,) 1/m.
+
+    Where sites have weights, these are summed in place of ones.
+    """
+    site = np.nonzero(result.owner >= 0)[0]
+    owner = result.owner[site]
+    toward = result.first[site] - result.positions[owner]
+    # a site under the robot would hold it fast
+    length = np.maximum(np.hypot(toward[:, 0], toward[:, 1]), least)
+    pull, total = 1.0 / length, float(max(len(site), 1))
+    if result.weights is not None:
+        pull *= result.weights[site]
+        total = float(result.weights[site].sum()) or 1.0
+    curvature = np.bincount(owner, pull, minlength=len(result.positions)) / total
+    return np.where(curvature > 0.0, curvature, 1.0)
+
+
+def _direction(slope: Array, scale: Array, learnt: deque[tuple[Array, Array, float]]) -> Array:
+    """Return the quasi-Newton direction (n, 2) m, by the two loops over the steps that were learnt from."""
+    way = slope.copy()
+    parts = []
+    for step, bend, inverse in reversed(learnt):
+        part = inverse * float(np.vdot(step, way))
+        parts.append(part)
+        way -= part * bend
+    _, bend, inverse = learnt[-1]
+    way /= scale * (inverse * float(np.vdot(bend, bend / scale)))
+    for (step, bend, inverse), part in zip(learnt, reversed(parts), strict=True):
+        way += step * (part - inverse * float(np.vdot(bend, way)))
+    return -way
+
+
+def _shorter(
+    cost: CoverageCost,
+    room: Room,
+    component: IntArray,
+    result: CoverageResult,
+    slope: Array,
+    way: Array,
+    halvings: int,
+) -> CoverageResult | None:
+    """Return the cost after the first of ever shorter steps that lowers it enough, None for none."""
+    length = 1.0
+    for _ in range(halvings):
+        positions = room.nearest(result.positions + length * way, component)
+        length /= 2.0
+        if positions is None:
+            continue
+        promised = float(np.vdot(slope, positions - result.positions))
+        if not promised < 0.0:
+            continue
+        after = cost(positions)
+        if after.mean_distance <= result.mean_distance + _ARMIJO * promised:
+            return after
+    return None

@@ -1,0 +1,330 @@
+"""Ways among known walls: a lattice of nodes over a window of a raster, with distances and routes.
+
+A node is joined to those one step away, diagonally, and a knight's move away: 16 directions, so that a way
+on the lattice is at most 2.8 % longer than the shortest one. Two nodes are joined when no cell lies on the
+straight line between them that is too close to a wall; nodes close to walls can be reached, and not passed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.planning.discovered import grown
+
+if TYPE_CHECKING:
+    from robocov.planning.discovered import Raster
+
+Cell = TypeVar("Cell", bound=np.generic)
+
+_MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
+"""Rows and columns of half the directions; the others are their opposites."""
+
+_NEAREST = 12
+"""So many nodes are tried for the first, and the last, of a route."""
+
+_FINE = 0.5
+"""A straight line is looked at after every so many cells."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a raster that carries nodes, one for each block of cells.
+
+    Attributes
+    ----------
+    row, column : int
+        The first of its cells.
+    rows, columns : int
+        Of nodes.
+    stride : int
+        Cells along the side of a block.
+    """
+
+    row: int
+    column: int
+    rows: int
+    columns: int
+    stride: int
+
+    @classmethod
+    def around(cls, raster: Raster, middle: Array, reach: float, most: int) -> Window:
+        """Return the window of at most `most` nodes that holds what is at most `reach` metres away.
+
+        It has the finest blocks with which that goes, and moves on in steps of a quarter of the reach: it
+        stays the same while the middle hardly moves.
+        """
+        rows, columns = raster.shape
+        row, column = (int(k) for k in raster.cells(np.asarray(middle, dtype=float)))
+        half = rows + columns if math.isinf(reach) else max(4, math.ceil(reach / raster.cell))
+        low_row, high_row = _stepped(row, half, rows)
+        low_column, high_column = _stepped(column, half, columns)
+        high, wide = high_row - low_row, high_column - low_column
+        stride = max(1, math.floor(math.sqrt(high * wide / most)))
+        while math.ceil(high / stride) * math.ceil(wide / stride) > most:
+            stride += 1
+        return cls(low_row, low_column, math.ceil(high / stride), math.ceil(wide / stride), stride)
+
+    def cut(self, cells: NDArray[Cell], fill: Cell | bool) -> NDArray[Cell]:
+        """Return the window's part of (rows, columns) cells; beyond their last ones there is `fill`."""
+        high, wide = self.rows * self.stride, self.columns * self.stride
+        part = cells[self.row : self.row + high, self.column : self.column + wide]
+        missing = high - part.shape[0], wide - part.shape[1]
+        if missing == (0, 0):
+            return part
+        return np.pad(part, ((0, missing[0]), (0, missing[1])), constant_values=fill)
+
+
+def _stepped(middle: int, half: int, most: int) -> tuple[int, int]:
+    step = max(1, half // 4)
+    low = (middle - half) // step * step
+    high = -((-middle - half - 1) // step) * step
+    return max(0, low), min(most, high)
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Distances and routes among the blocked cells of a window.
+
+    Attributes
+    ----------
+    raster : Raster
+    window : Window
+    blocked : (h, w)
+        The window's cells that are walls.
+    clearance : float, m
+        How far ways keep from walls, but for the last step to a node.
+    """
+
+    raster: Raster
+    window: Window
+    blocked: BoolArray
+    clearance: float
+    _known: dict[int, Array] = field(default_factory=dict)
+
+    def __deepcopy__(self, memo: object) -> Ways:
+        return self
+
+    @property
+    def spacing(self) -> float:
+        """Between nodes, m."""
+        return self.window.stride * self.raster.cell
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Places of the nodes, (m, 2) m, row by row."""
+        window, half = self.window, self.window.stride // 2
+        row = window.row + half + window.stride * np.arange(window.rows)
+        column = window.column + half + window.stride * np.arange(window.columns)
+        return self.raster.middles(*(part.ravel() for part in np.meshgrid(row, column, indexing="ij")))
+
+    @cached_property
+    def tight(self) -> BoolArray:
+        """The cells that are too close to walls, (h, w)."""
+        return grown(self.blocked, self.clearance / self.raster.cell)
+
+    @cached_property
+    def roomy(self) -> BoolArray:
+        """The nodes that keep the clearance, (m,)."""
+        return self._at_nodes(~self.tight)
+
+    def _at_nodes(self, cells: BoolArray) -> BoolArray:
+        half, stride = self.window.stride // 2, self.window.stride
+        return np.asarray(cells[half::stride, half::stride].ravel())
+
+    @cached_property
+    def _graph(self) -> csr_array:
+        return _joined(self.window, self.blocked, self.tight, self.spacing)
+
+    def cells(self, points: Array) -> tuple[IntArray, IntArray]:
+        """Return row and column, in the window, of the cells of (..., 2) points, the nearest for others."""
+        row, column = self.raster.cells(points)
+        high, wide = self.blocked.shape
+        return (row - self.window.row).clip(0, high - 1), (column - self.window.column).clip(0, wide - 1)
+
+    def distances(self, node: int) -> Array:
+        """Return the distances from a node to all nodes, (m,) m, infinite where there is no way."""
+        if node not in self._known:
+            self._known[node] = self.table(np.array([node]))[0]
+        return self._known[node]
+
+    def near(self, node: int, limit: float) -> Array:
+        """Return the same, infinite beyond a limit in metres; it is quicker the lower this is."""
+        if node in self._known:
+            return self._known[node]
+        return np.asarray(dijkstra(self._graph, directed=True, indices=np.array([node]), limit=limit)[0])
+
+    def table(self, nodes: IntArray) -> Array:
+        """Return the distances from some nodes to all, (k, m) m."""
+        return np.asarray(dijkstra(self._graph, directed=True, indices=nodes))
+
+    def from_places(self, places: Array) -> Array:
+        """Return the distances of all nodes from the nearest of (k, 2) places, (m,) m; without any, infinite.
+
+        The places need not be nodes: each is joined to the roomy nodes near it that it sees.
+        """
+        graph, size = self._graph, len(self.nodes)
+        ends: list[IntArray] = [graph.indices.astype(np.intp)]
+        lengths: list[Array] = [graph.data]
+        counts: list[int] = []
+        for place in places:
+            near = self._closest(place, self.roomy)
+            seen = near[self.clear(place, self.nodes[near], self.blocked)]
+            # who stands in what is taken for a wall is beside it
+            seen = seen if len(seen) else near[:1]
+            ends.append(seen)
+            lengths.append(np.sqrt(((self.nodes[seen] - place) ** 2).sum(axis=1)))
+            counts.append(len(seen))
+        if not sum(counts):
+            return np.full(size, np.inf)
+        begins = np.concatenate([graph.indptr, graph.indptr[-1] + np.cumsum(counts)])
+        parts = np.concatenate(lengths), np.concatenate(ends), begins
+        joined = csr_array(parts, shape=(size + len(counts),) * 2)
+        new = np.arange(size, size + len(counts))
+        return np.asarray(dijkstra(joined, directed=True, indices=new, min_only=True))[:size]
+
+    def standing(self, place: Array) -> int:
+        """Return the node where somebody stands: the nearest roomy one in sight, or at all; -1 for none."""
+        near = self._closest(place, self.roomy)
+        if not len(near):
+            return -1
+        return int(near[self.clear(place, self.nodes[near], self.blocked).argmax()])
+
+    def _closest(self, place: Array, among: BoolArray) -> IntArray:
+        """Return some nodes near a place, the nearest first."""
+        away = ((self.nodes - place) ** 2).sum(axis=1)
+        away[~among] = np.inf
+        few = min(_NEAREST, len(away) - 1)
+        near = np.argpartition(away, few)[: few + 1]
+        near = np.sort(near)
+        near = near[np.argsort(away[near], kind="stable")]
+        return np.asarray(near[np.isfinite(away[near])][:_NEAREST])
+
+    def clear(self, place: Array, ends: Array, cells: BoolArray, skip: float = 0.0) -> BoolArray:
+        """Return whether straight lines from a place to (k, 2) ends meet none of (h, w) cells.
+
+        What is closer to the place than `skip` metres does not count: somebody may stand where no route
+        leads, but away from there.
+        """
+        along = ends - place
+        length = np.sqrt((along**2).sum(axis=1))
+        steps = math.ceil(float(length.max(initial=0.0)) / (_FINE * self.raster.cell)) + 1
+        part = np.linspace(0.0, 1.0, steps + 1)
+        met = cells[self.cells(place + along[:, None, :] * part[:, None])]
+        if skip > 0.0:
+            met &= length[:, None] * part > skip
+        return np.asarray(~met.any(axis=1))
+
+    def route(self, place: Array, goal: Array) -> Array:
+        """Return the way-points from a place to a goal, (w, 2) m, each in sight of the one before it.
+
+        The last one is the goal, or the nearest place to it that a way leads to. Between way-points no
+        tight cell is crossed; only a place that is tight itself is left straight.
+        """
+        if self.clear(place, goal[None], self.tight, self.clearance)[0]:
+            return np.array(goal[None])
+        begin = self._entrance(place)
+        if begin < 0:
+            return np.array(place[None])
+        distance, before = (
+            part[0]
+            for part in dijkstra(
+                self._graph, directed=True, indices=np.array([begin]), return_predecessors=True
+            )
+        )
+        near = self._closest(goal, np.isfinite(distance) & self.roomy)
+        if not len(near):
+            return np.array(place[None])
+        seen = self.clear(goal, self.nodes[near], self.tight)
+        chain = [int(near[seen.argmax()])]
+        while before[chain[-1]] >= 0:
+            chain.append(int(before[chain[-1]]))
+        points = self.nodes[chain[::-1]]
+        return self._pulled(place, np.vstack([points, goal]) if seen.any() else points)
+
+    def _entrance(self, place: Array) -> int:
+        """Return the node with which a route begins: near, roomy, and in sight."""
+        near = self._closest(place, self.roomy)
+        for cells, skip in ((self.tight, 2.0 * self.clearance), (self.blocked, 0.0)):
+            seen = self.clear(place, self.nodes[near], cells, skip)
+            if seen.any():
+                return int(near[seen.argmax()])
+        return -1
+
+    def _pulled(self, place: Array, points: Array) -> Array:
+        """Return way-points without those that are passed in sight of later ones."""
+        kept: list[Array] = []
+        at, k = place, 0
+        while k < len(points):
+            seen = self.clear(at, points[k:], self.tight, 0.0 if kept else self.clearance).nonzero()[0]
+            k += int(seen[-1]) if len(seen) else 0
+            at = points[k]
+            kept.append(at)
+            k += 1
+        return np.array(kept)
+
+
+@lru_cache(maxsize=256)
+def _edges(rows: int, columns: int) -> tuple[IntArray, IntArray, Array, IntArray]:
+    """Return the ends, lengths in strides and moves of all edges of an empty lattice."""
+    number = np.arange(rows * columns).reshape(rows, columns)
+    ends, others = [], []
+    for down, right in _MOVES:
+        ends.append(number[: max(0, rows - down), max(0, -right) : max(0, columns - max(0, right))].ravel())
+        others.append(number[down:, max(0, right) : max(0, columns + min(0, right))].ravel())
+    counts = [len(each) for each in ends]
+    length = np.repeat([math.hypot(*move) for move in _MOVES], counts)
+    move = np.repeat(np.arange(len(_MOVES)), counts)
+    return np.concatenate(ends), np.concatenate(others), length, move
+
+
+@lru_cache(maxsize=64)
+def _crossed(stride: int) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """Return the cells, from that of a node, that the line to its neighbour crosses, for each move."""
+    lines = []
+    for down, right in _MOVES:
+        part = np.linspace(0.0, 1.0, 2 * max(abs(down), abs(right)) * stride + 1)
+        row, column = np.rint(part * down * stride).astype(int), np.rint(part * right * stride).astype(int)
+        lines.append(tuple(dict.fromkeys(zip(row.tolist(), column.tolist(), strict=True))))
+    return tuple(lines)
+
+
+def _joined(window: Window, blocked: BoolArray, tight: BoolArray, spacing: float) -> csr_array:
+    """Return the graph of the nodes, its edges as long as they are.
+
+    Those in tight cells are the ends of ways and nothing more: no way leads on from there, be it through a
+    hole in a wall that has not been seen as a whole.
+    """
+    end, other, length, move = _edges(window.rows, window.columns)
+    half, stride = window.stride // 2, window.stride
+    roomy = ~tight[half::stride, half::stride].ravel()
+    way = _unmet(window, tight)[move, end]
+    last = _unmet(window, blocked)[move, end] & ~way
+    onto, back = last & roomy[end] & ~roomy[other], last & roomy[other] & ~roomy[end]
+    begins = np.concatenate([end[way], other[way], end[onto], other[back]])
+    ends = np.concatenate([other[way], end[way], other[onto], end[back]])
+    lengths = np.concatenate([length[way], length[way], length[onto], length[back]]) * spacing
+    size = window.rows * window.columns
+    return csr_array((lengths, (begins, ends)), shape=(size, size))
+
+
+def _unmet(window: Window, cells: BoolArray) -> BoolArray:
+    """Return for each move which nodes it leads from without meeting some cells, (moves, m)."""
+    stride, half = window.stride, window.stride // 2
+    margin = 2 * stride
+    padded = np.pad(cells, margin, constant_values=True)
+    high, wide = window.rows * stride, window.columns * stride
+    met = np.zeros((len(_MOVES), window.rows, window.columns), dtype=bool)
+    for k, line in enumerate(_crossed(stride)):
+        for down, right in line:
+            row, column = margin + half + down, margin + half + right
+            met[k] |= padded[row : row + high - half : stride, column : column + wide - half : stride]
+    return np.asarray(~met.reshape(len(_MOVES), -1))

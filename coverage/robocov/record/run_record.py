@@ -1,0 +1,390 @@
+"""The record of a run: all of it as arrays, saved in one folder."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS
+from robocov.drawing import displaying_backend, drawing_backend
+from robocov.environment import Environment
+from robocov.errors import InputError, ParameterError, counted, shown
+from robocov.extras import extra
+from robocov.files.atomic import written
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.record.moments import nearest_moments
+from robocov.robots import Team
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from robocov.controllers.gains import Value
+
+_COLUMNS = {
+    "positions": ("x_m", "y_m"),
+    "velocities": ("vx_m_s", "vy_m_s"),
+    "forces": ("fx_N", "fy_N"),
+    "goals": ("goal_x_m", "goal_y_m"),
+    "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
+}
+"""What the columns of data frames are called; `Record.to_pandas` explains them."""
+
+ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A whole run.
+
+    Attributes
+    ----------
+    environment : Environment
+    team : Team
+    controller : str
+        Name of the controller, as `make_controller` takes it.
+    label : str
+        Its name as shown to people.
+    gains : dict of name to value
+    start : str or None
+        Name of the start, None where positions were given.
+    seed : int or None
+    dt : float, s
+        The control period. Moments lie that far apart, and farther where the record was thinned.
+    time : (T,) s
+    positions : (T, n, 2) m
+    velocities : (T, n, 2) m/s
+    forces : (T, n, 2) N
+        The controller's force at that state, before any limit, viscosity apart.
+    goals : (T, n, 2) m
+        nan where none.
+    obstacle_points : (T, n, 2) m
+        The nearest obstacle point that each robot sensed, nan where none.
+    session : dict
+        Where the run comes from, if it is a part of a session in the window and was not simply begun and
+        left alone; see `robocov_app.demo.kept`. Empty otherwise.
+    conditions : Conditions or None
+        Under which it went; None: ideal ones.
+    """
+
+    environment: Environment
+    team: Team
+    controller: str
+    label: str
+    gains: Mapping[str, Value]
+    start: str | None
+    seed: int | None
+    dt: float
+    time: Array
+    positions: Array
+    velocities: Array
+    forces: Array
+    goals: Array
+    obstacle_points: Array
+    session: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Conditions | None = None
+
+    @cached_property
+    def working(self) -> BoolArray:
+        """Which robots were there and had not failed, (T, n) bool."""
+        if self.conditions is None:
+            return np.ones(self.positions.shape[:2], dtype=bool)
+        return self.conditions.working(self.time, len(self.team))
+
+    @cached_property
+    def present(self) -> BoolArray:
+        """Which robots were there, whether they worked or had failed, (T, n) bool."""
+        if self.conditions is None:
+            return np.ones(self.positions.shape[:2], dtype=bool)
+        return self.conditions.present(self.time, len(self.team))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        robots = counted(len(self.team), "robot")
+        return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
+
+    @property
+    def by_time(self) -> bool:
+        """Whether the law divided the region by the time to a place, and that differs from by distance."""
+        return self.gains.get("cells") == "time" and self.team.mixed_speeds
+
+    def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
+        """Return the cells of moment number `k` as the law divided the region, with everybody heard.
+
+        Only robots that worked then have cells, and are counted.
+        By the time to a place where the law's gain ``cells`` says so, else by distance.
+        """
+        working = slice(None) if self.conditions is None else self.working[k]
+        positions, environment = self.positions[k][working], self.environment
+        if self.by_time:
+            speeds = self.team.max_speed[working]
+            return weighted_partition(positions, speeds, environment.region, density=environment.density)
+        return partition(positions, environment.region, density=environment.density)
+
+    def snapshot(self, k: int) -> Snapshot:
+        """Return the moment number `k` as far as it was recorded: without force terms and cells."""
+        positions = self.positions[k]
+        working = None if self.conditions is None else self.working[k]
+        neighbours = Neighbours.within(positions, self.team.communication_range)
+        seen = Observations(
+            positions=positions,
+            velocities=self.velocities[k],
+            neighbours=neighbours if working is None else neighbours.among(working),
+            obstacle_points=self.obstacle_points[k],
+            region=self.environment.region,
+            time=float(self.time[k]),
+            max_speeds=self.team.max_speed,
+            density=self.environment.density,
+        )
+        goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
+        cells = self.cells(k) if self.by_time else None
+        return Snapshot(seen, Decision(forces=self.forces[k], goals=goals, cells=cells), working=working)
+
+    def at(self, time: float) -> Snapshot:
+        """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
+
+        Raises
+        ------
+        ParameterError
+            When the time is before the first moment or after the last by more than a control period.
+        """
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first - self.dt <= time <= last + self.dt:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {first:g} to {last:g} s was wanted"
+            )
+        return self.snapshot(int(np.abs(self.time - time).argmin()))
+
+    def until(self, time: float) -> Record:
+        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then.
+
+        Raises
+        ------
+        ParameterError
+            When that is before the first moment.
+        """
+        # half a microsecond forgives the rounding of sums of steps
+        if not time >= float(self.time[0]) - 5e-7:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {float(self.time[0]):g} s was wanted"
+            )
+        return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
+
+    def thinned(self, rate: float) -> Record:
+        """Return the record at `rate` moments a second, with all else as it is.
+
+        Those moments stay that are nearest to multiples of 1/rate seconds from the first, of two as near
+        the earlier; and so does the last. None is made up: where the record is sparser than that, it stays
+        as it is.
+
+        Parameters
+        ----------
+        rate : float, Hz
+            0 leaves the first moment and the last.
+
+        Raises
+        ------
+        ParameterError
+            When the rate is negative or not finite.
+        """
+        if not 0.0 <= rate < np.inf:
+            raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+        return self._only(nearest_moments(self.time, rate))
+
+    def _only(self, moments: slice | IntArray) -> Record:
+        """Return the record of some of the moments; its arrays are copies."""
+        return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
+
+    def to_pandas(self) -> DataFrame:
+        """Return the run as a tidy data frame: one row for each moment and robot, by time, then robot.
+
+        Returns
+        -------
+        DataFrame with the columns
+
+        time_s : float
+        robot : int
+            The robot's row in the arrays; pictures number robots from 1.
+        x_m, y_m : float
+        vx_m_s, vy_m_s : float
+        fx_N, fy_N : float
+            The controller's force, before any limit.
+        goal_x_m, goal_y_m : float
+            nan where none.
+        obstacle_x_m, obstacle_y_m : float
+            The nearest obstacle point that the robot sensed, nan where none.
+
+        Raises
+        ------
+        RobocovError
+            When pandas is not installed: it comes with ``robocov[pandas]``.
+        """
+        pandas = extra("pandas", "pandas")
+        moments, robots = self.positions.shape[:2]
+        columns: dict[str, Array | IntArray] = {
+            "time_s": np.repeat(self.time, robots),
+            "robot": np.tile(np.arange(robots), moments),
+        }
+        for array, names in _COLUMNS.items():
+            columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
+        frame: DataFrame = pandas.DataFrame(columns)
+        return frame
+
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot the whole run: the map, where the robots began, went and ended, and the final Voronoi cells.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw. None makes a page with title, scale bar and legend.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        theme : {"light", "dark"}
+        colours : {"paper", "robots"}
+            Green starts, red trajectories, blue final positions, or a hue for each robot.
+        size : (width, height), px
+            Of the page.
+        mean_distance : float, m
+            Of the final positions, for the page's title.
+        mean_time : float, s
+            The mean time until the first is there, likewise, where robots are not equally fast.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return drawing_backend(backend).plot_record(self, axes, **options)
+
+    def _repr_html_(self) -> str | None:
+        """Show the run in notebooks: it can be played."""
+        backend = displaying_backend()
+        return None if backend is None else backend.record_html(self)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the run where there is no HTML."""
+        backend = displaying_backend()
+        return None if backend is None else backend.record_png(self)
+
+    def to_json(
+        self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> dict[str, Any]:
+        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary.
+
+        `lattice` is the one on which the summary's cost was evaluated.
+        """
+        from robocov.mapfile import to_json
+
+        return {
+            "format": "robocov-run",
+            "version": 1,
+            "map": to_json(self.environment),
+            "controller": {"name": self.controller, "gains": dict(self.gains)},
+            "team": self.team.to_dict(),
+            "start": self.start,
+            "starts_m": self.positions[0].tolist(),
+            "seed": self.seed,
+            "dt_s": self.dt,
+            "duration_s": float(self.time[-1]),
+            "lattice": lattice,
+            **({"conditions": self.conditions.to_dict()} if self.conditions else {}),
+            **({"session": dict(self.session)} if self.session else {}),
+            "versions": versions(),
+            "summary": dict(summary or {}),
+        }
+
+    def save(
+        self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> None:
+        """Write ``record.npz`` and ``run.json`` to `folder`; each appears whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            When they cannot be written.
+        """
+        folder = Path(folder)
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        with written(folder / "record.npz") as part, part.open("wb") as file:
+            np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
+        with written(folder / "run.json") as part:
+            text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
+            part.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Record:
+        """Return the record that `save` wrote to `folder`.
+
+        Raises
+        ------
+        InputError
+            When the folder holds no run, or one that cannot be read; the message names the file.
+        """
+        from robocov.mapfile import from_json
+
+        folder = Path(folder)
+        path = folder / "run.json"
+        try:
+            run = json.loads(path.read_text(encoding="utf-8"))
+            # opened here: numpy leaves a file that is no archive open
+            with (folder / "record.npz").open("rb") as file, np.load(file, allow_pickle=False) as saved:
+                arrays = {name: np.asarray(saved[name], dtype=float) for name in ARRAYS}
+            name = run["controller"]["name"]
+            record = cls(
+                environment=from_json(run["map"], f"{path}: map"),
+                team=Team.from_dict(run["team"]),
+                controller=name,
+                label=str(getattr(CONTROLLERS.get(name), "label", name.rpartition(":")[2])),
+                gains=run["controller"]["gains"],
+                start=run["start"],
+                seed=run["seed"],
+                dt=float(run["dt_s"]),
+                session=dict(run.get("session", {})),
+                conditions=Conditions.from_dict(run["conditions"]) if run.get("conditions") else None,
+                **arrays,
+            )
+        except FileNotFoundError as error:
+            raise InputError(
+                f"{folder}: not the folder of a run (there is no {Path(error.filename).name})"
+            ) from error
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{folder}: the run cannot be read: {type(error).__name__}: {error}") from error
+        shape = (len(record.time), len(record.team), 2)
+        for name in ARRAYS[1:]:
+            if arrays[name].shape != shape:
+                raise InputError(
+                    f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted"
+                )
+        return record
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    found = {"python": platform.python_version()}
+    for name in ("robocov", "numpy", "scipy", "shapely", "pymunk"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found

@@ -1,0 +1,7 @@
+"""The physical world: robots and moving obstacles as pymunk bodies among solid pieces."""
+
+from __future__ import annotations
+
+from robocov.world.bodies import LONGEST_SUBSTEP, SINK, World
+
+__all__ = ["LONGEST_SUBSTEP", "SINK", "World"]

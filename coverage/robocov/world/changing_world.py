@@ -1,0 +1,168 @@
+"""A world whose robots fail and join: that of those that are there, made anew whenever that changes.
+
+A world goes on the same from its positions and velocities alone, so that to make it anew changes nothing
+for the others. A robot that failed is an obstacle from then on; one that has not joined yet is nowhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.errors import StartError
+from robocov.robots import Team
+from robocov.world.bodies import World
+from robocov.world.relocation import nearest_free
+
+if TYPE_CHECKING:
+    from robocov.conditions import Conditions
+    from robocov.environment import Environment
+    from robocov.world.solid import Mover
+
+
+class ChangingWorld:
+    """As `World`, with a row for every robot that ever is.
+
+    Parameters
+    ----------
+    conditions : Conditions
+    environment : Environment
+    pieces : convex polygons, (k, 2) m each
+        The walls of it.
+    movers : tuple of Mover
+    team : Team
+    positions : (n, 2) m
+        Of a robot that has not joined yet: where it would start.
+    velocities : (n, 2) m/s or None
+    time : float, s
+    """
+
+    def __init__(
+        self,
+        conditions: Conditions,
+        environment: Environment,
+        pieces: tuple[Array, ...],
+        movers: tuple[Mover, ...],
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        time: float = 0.0,
+    ) -> None:
+        self._conditions, self._environment = conditions, environment
+        self._pieces, self._movers, self.team = pieces, movers, team
+        self._positions = np.array(positions, dtype=float)
+        self._velocities = np.zeros_like(self._positions)
+        if velocities is not None:
+            self._velocities[:] = velocities
+        self._working = conditions.working(time, len(team))
+        self._failed = conditions.failed(time, len(team))
+        for join in conditions.joins:
+            if join.place is not None and not (self._working | self._failed)[join.robot - 1]:
+                self._positions[join.robot - 1] = join.place
+        self._begin()
+
+    @property
+    def positions(self) -> Array:
+        """Centres of the robots, (n, 2) m; of one that has not joined, where it is to; read-only."""
+        return self._positions
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, (n, 2) m/s, zero of those that do not work; read-only."""
+        return self._velocities
+
+    @property
+    def working(self) -> BoolArray:
+        """Which robots are there and have not failed, (n,) bool."""
+        return self._working
+
+    @property
+    def wrecks(self) -> Array:
+        """x, y and radius of the robots that have failed, (w, 3) m."""
+        return np.column_stack([self._positions, self.team.radius])[self._failed]
+
+    def copy(self) -> ChangingWorld:
+        """Return an independent world in the same state, which goes on identically."""
+        twin = object.__new__(ChangingWorld)
+        twin.__dict__.update(self.__dict__)
+        twin._world = None if self._world is None else self._world.copy()
+        return twin
+
+    def step(self, forces: Array, dt: float, pushes: Array | None = None, *, time: float = 0.0) -> None:
+        """Move on by `dt` seconds, as `World.step`; then robots fail and join whose time has come.
+
+        Raises
+        ------
+        StartError
+            When there is no room for a robot that joins.
+        """
+        rows = self._rows
+        if self._world is not None:
+            self._world.step(forces[rows], dt, None if pushes is None else pushes[rows], time=time)
+            self._positions, self._velocities = self._positions.copy(), np.zeros_like(self._velocities)
+            self._positions[rows], self._velocities[rows] = self._world.positions, self._world.velocities
+            self._protect()
+        self._turn_to(time + dt)
+
+    def _turn_to(self, time: float) -> None:
+        """Let robots fail and join whose time has come."""
+        count = len(self.team)
+        working, failed = self._conditions.working(time, count), self._conditions.failed(time, count)
+        if (working == self._working).all() and (failed == self._failed).all():
+            return
+        self._positions, self._velocities = self._positions.copy(), self._velocities.copy()
+        there = self._working | self._failed
+        self._failed = failed & there
+        for robot in np.flatnonzero(working & ~there).tolist():
+            self._positions[robot] = self._place(robot, there, time)
+            there[robot] = True
+        self._working = working
+        self._velocities[~working] = 0.0
+        self._begin()
+
+    def _place(self, robot: int, there: BoolArray, time: float) -> tuple[float, float]:
+        """Return where a robot joins, as near as it fits beside those that are there."""
+        radius = self.team.radius
+        x, y = self._positions[robot].tolist()
+        try:
+            return nearest_free(
+                self._environment.at(time),
+                float(radius[robot]),
+                self._positions[there],
+                (x, y),
+                radius[there],
+            )
+        except StartError:
+            raise StartError(
+                f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], but there is no room for it in "
+                f"map {self._environment.name!r}"
+            ) from None
+
+    def _begin(self) -> None:
+        """Make the world of the robots that work."""
+        self._protect()
+        rows = self._rows = np.flatnonzero(self._working)
+        # a team of none is no team
+        self._world: World | None = None
+        if len(rows):
+            self._world = World(
+                self._pieces,
+                only(self.team, rows),
+                self._positions[rows],
+                self._velocities[rows],
+                movers=self._movers,
+                wrecks=self.wrecks,
+            )
+
+    def _protect(self) -> None:
+        self._positions.setflags(write=False)
+        self._velocities.setflags(write=False)
+
+
+def only(team: Team, rows: IntArray) -> Team:
+    """Return the team of some robots of a team."""
+    return Team(*(getattr(team, each.name)[rows] for each in fields(Team)))

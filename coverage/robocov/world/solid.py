@@ -1,0 +1,132 @@
+"""The solid part of the world as convex pieces, which is what the physics engine can hold.
+
+pymunk silently replaces a concave polygon by its hull; therefore everything that is not free is
+triangulated and the triangles are merged to larger convex pieces as long as they stay convex
+(Hertel and Mehlhorn 1983: at most four times as many pieces as an optimal decomposition).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array, frozen
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.environment import Environment
+    from robocov.environment.obstacle_path import ObstaclePath
+
+Corner: TypeAlias = tuple[float, float]
+Loop: TypeAlias = list[Corner]
+
+FRAME = 2.0
+"""Thickness in metres of the wall that stands around the region."""
+
+
+def solid_pieces(environment: Environment) -> tuple[Array, ...]:
+    """Return convex counter-clockwise polygons, (k, 2) m each, that fill all that is not free.
+
+    They cover the obstacles, the region outside a non-convex boundary, and a frame of thickness
+    `FRAME` around the region; they do not overlap. Obstacles that move are not among them: see `movers`.
+    """
+    environment = environment.standing
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
+    return convex_pieces(shapely.difference(frame, environment.free))
+
+
+class Mover(NamedTuple):
+    """An obstacle that moves.
+
+    Attributes
+    ----------
+    pieces : tuple of convex polygons, (k, 2) m each
+        Where it is at time zero.
+    path : ObstaclePath
+    """
+
+    pieces: tuple[Array, ...]
+    path: ObstaclePath
+
+
+def movers(environment: Environment) -> tuple[Mover, ...]:
+    """Return the obstacles that move."""
+    return tuple(
+        Mover(convex_pieces(shape.polygon), shape.path)
+        for shape in environment.obstacles
+        if shape.path is not None
+    )
+
+
+def convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
+    """Return convex counter-clockwise polygons, (k, 2) m each, that tile the polygons of `geometry`."""
+    pieces: list[Array] = []
+    for part in shapely.get_parts(geometry):
+        if part.geom_type == "Polygon" and part.area > 0.0:
+            pieces.extend(frozen(loop) for loop in _merged(_triangles(part)))
+    return tuple(pieces)
+
+
+def _triangles(polygon: BaseGeometry) -> list[Loop]:
+    triangles: list[Loop] = []
+    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
+        a, b, c, _ = (tuple(corner) for corner in triangle.exterior.coords)
+        turn = _turn(a, b, c)
+        if turn != 0.0:
+            triangles.append([a, b, c] if turn > 0 else [a, c, b])
+    return triangles
+
+
+def _merged(loops: list[Loop]) -> list[Loop]:
+    """Remove the diagonals between convex loops as long as what remains is convex."""
+    pieces: dict[int, Loop] = dict(enumerate(loops))
+    owner = {
+        (loop[k], loop[(k + 1) % len(loop)]): number
+        for number, loop in pieces.items()
+        for k in range(len(loop))
+    }
+    for a, b in list(owner):
+        first, second = owner.get((a, b)), owner.get((b, a))
+        if first is None or second is None or first == second:
+            continue
+        joined = _joined(pieces[first], pieces[second], a, b)
+        if joined is None:
+            continue
+        for k, corner in enumerate(pieces[second]):
+            owner[corner, pieces[second][(k + 1) % len(pieces[second])]] = first
+        del pieces[second], owner[a, b], owner[b, a]
+        pieces[first] = joined
+    return list(pieces.values())
+
+
+def _joined(first: Loop, second: Loop, a: Corner, b: Corner) -> Loop | None:
+    """Return the union of two loops across the edge a→b of `first`, or None when it is not convex."""
+    start = first.index(b)
+    around = [first[(start + k) % len(first)] for k in range(len(first))]  # b … a
+    other = second.index(a)
+    beyond = [second[(other + k) % len(second)] for k in range(len(second))]  # a … b
+    joined = around + beyond[1:-1]
+    size = len(joined)
+    at_a, at_b = len(around) - 1, 0
+    for k in (at_a, at_b):
+        if _turn(joined[k - 1], joined[k], joined[(k + 1) % size]) <= 0.0:
+            return None
+    return joined
+
+
+def _turn(a: Corner, b: Corner, c: Corner) -> float:
+    """Return twice the signed area of the triangle; positive when counter-clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def pieces_area(pieces: tuple[Array, ...]) -> float:
+    """Return the total area of the pieces, m²."""
+    total = 0.0
+    for ring in pieces:
+        ahead = np.roll(ring, -1, axis=0)
+        total += 0.5 * float((ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum())
+    return total

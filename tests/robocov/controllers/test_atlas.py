@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robocov.controllers import Atlas, AtlasShared, Rapf, information_of, make_controller
+from robocov.controllers.atlas import CREW
+from robocov.controllers.atlas_memory import AtlasMemory
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, WallObstacle
+from robocov.errors import ParameterError
+from robocov.metrics import clearances, contacts
+from robocov.planning.discovered import UNKNOWN
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
+ROOMS = Environment(
+    "two rooms",
+    SQUARE,
+    (
+        WallObstacle(((4.0, 0.0), (4.0, 5.0)), 0.2),
+        WallObstacle(((4.0, 6.2), (4.0, 8.0)), 0.2),
+        WallObstacle(((0.0, 4.0), (2.5, 4.0)), 0.2),
+    ),
+)
+CORNER = [[0.8, 0.8], [1.3, 0.8], [0.8, 1.3], [1.3, 1.3]]
+
+
+def simulation(kind: type[Atlas] = Atlas, n: int = 4, **gains: float) -> Simulation:
+    return Simulation(ROOMS, kind(**gains), CORNER[:n], Team.homogeneous(n), dt=0.05)
+
+
+@pytest.fixture(scope="module")
+def finished() -> Simulation:
+    some = simulation()
+    for _ in range(1000):
+        some.step()
+    return some
+
+
+def test_it_leaves_the_first_room_and_ends_far_below_rapf(finished: Simulation) -> None:
+    cost = CoverageCost(ROOMS, lattice=32)
+    other = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
+    for _ in range(1000):
+        other.step()
+    ours, theirs = (cost(each.positions).mean_distance for each in (finished, other))
+    assert ours < 0.9 * theirs
+    assert (finished.positions[:, 0] > 4.1).sum() == 2
+
+
+def test_it_comes_to_rest(finished: Simulation) -> None:
+    before = finished.positions
+    twin = finished.copy()
+    for _ in range(80):
+        twin.step()
+    assert np.abs(twin.positions - before).max() < 0.05
+
+
+def test_nothing_is_touched_on_the_way() -> None:
+    record = simulation().run(25.0)
+    clearance = clearances(record)
+    assert contacts(record, clearance) == 0
+    assert clearance.min() > 0.005
+
+
+@pytest.mark.parametrize("kind", [Atlas, AtlasShared])
+def test_copies_and_repeated_runs_go_on_identically(kind: type[Atlas]) -> None:
+    one, other = simulation(kind), simulation(kind)
+    for _ in range(60):
+        one.step()
+        other.step()
+    twin = one.copy()
+    for each in (one, other, twin):
+        for _ in range(60):
+            each.step()
+    assert one.positions.tobytes() == other.positions.tobytes() == twin.positions.tobytes()
+
+
+def test_what_was_remembered_stays_as_it_was() -> None:
+    some = simulation()
+    for _ in range(40):
+        some.step()
+    memory: AtlasMemory = some.memory
+    legs, walls, states = memory.legs.copy(), memory.walls.copy(), [each.state.copy() for each in memory.maps]
+    again = some.remembering(memory)
+    for _ in range(40):
+        some.step()
+        again.step()
+    assert np.array_equal(memory.legs, legs)
+    assert np.array_equal(memory.walls, walls, equal_nan=True)
+    assert all(np.array_equal(each.state, was) for each, was in zip(memory.maps, states, strict=True))
+    assert some.positions.tobytes() == again.positions.tobytes()
+
+
+def test_maps_are_shared_where_it_says_so() -> None:
+    unknown = {}
+    for kind in (Atlas, AtlasShared):
+        some = simulation(kind)
+        for _ in range(200):
+            some.step()
+        maps = some.memory.maps
+        unknown[kind] = [np.count_nonzero(each.state == UNKNOWN) for each in maps]
+        assert all(each.raster is maps[0].raster for each in maps)
+    # all know what all have seen
+    assert len(set(unknown[AtlasShared])) == 1
+    assert len(set(unknown[Atlas])) > 1
+    assert max(unknown[AtlasShared]) < min(unknown[Atlas])
+    assert information_of(Atlas()) == "own"
+    assert information_of(AtlasShared()) == "shared map"
+
+
+def test_a_robot_alone_and_a_crowd() -> None:
+    alone = simulation(n=1)
+    for _ in range(300):
+        alone.step()
+    assert np.isfinite(alone.snapshot.decision.forces).all()
+    assert np.hypot(*(alone.positions[0] - CORNER[0])) > 1.0
+    empty = Environment("empty", SQUARE)
+    x, y = np.meshgrid(np.linspace(0.6, 2.4, 4), np.linspace(0.6, 2.4, 4))
+    starts = np.column_stack([x.ravel(), y.ravel()])
+    assert len(starts) > CREW
+    crowd = Simulation(empty, Atlas(), starts, dt=0.05)
+    cost = CoverageCost(empty, lattice=16)
+    for _ in range(400):
+        crowd.step()
+    assert cost(crowd.positions).mean_distance < 0.5 * cost(starts).mean_distance
+
+
+def test_it_plans_now_and_then() -> None:
+    """Not all robots at the same moment, and less often where nodes are far apart."""
+    some = simulation()
+    some.step()
+    due = [mind.due for mind in some.memory.minds]
+    assert len(set(due)) == 4
+    assert min(due) > 1.0
+    assert max(due) < 2.0 + 1e-9
+
+
+def test_gains_are_checked() -> None:
+    assert make_controller("atlas", {"period": 2}) == replace(Atlas(), period=2.0)
+    with pytest.raises(ParameterError, match=r"atlas-shared.threshold: -1"):
+        make_controller("atlas-shared", {"threshold": -1})

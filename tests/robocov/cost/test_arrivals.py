@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cost_cases import OFFICE, environment
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.cost import CoverageCost
+from robocov.errors import InputError
+
+COST = CoverageCost(OFFICE, lattice=24)
+ROOM = CoverageCost(environment(), lattice=32)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def somewhere(n: int, rng: np.random.Generator) -> np.ndarray:
+    return COST.points[rng.choice(len(COST.points), n, replace=False)] + rng.uniform(-1e-3, 1e-3, (n, 2))
+
+
+@settings(max_examples=25)
+@given(seeds, st.integers(1, 7), st.sampled_from([(1.0, 0.4), (1.0,), (0.3, 0.5, 0.9, 1.1)]))
+def test_times_are_the_least_over_all_robots_of_way_over_speed(seed: int, n: int, speeds: tuple) -> None:
+    """The ways come from the point-to-point search here, which shares no code with the sites' one."""
+    rng = np.random.default_rng(seed)
+    robots, speed = somewhere(n, rng), rng.choice(speeds, n)
+    result = COST(robots, speeds=speed)
+    some = rng.choice(len(COST.points), 30, replace=False)
+    ways = COST.geodesics.distances(COST.points[some], robots)
+    times = ways / speed
+    np.testing.assert_allclose(result.times[some], times.min(axis=1), rtol=1e-6)
+    owner = result.owner[some]
+    np.testing.assert_allclose(times[np.arange(30), owner], times.min(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(result.distances[some], ways[np.arange(30), owner], rtol=1e-6)
+    assert result.mean_time == pytest.approx(result.times.mean(), rel=1e-12)
+    assert result.value == pytest.approx(result.mean_time * OFFICE.free.area, rel=1e-12)
+
+
+@given(seeds, st.integers(1, 6), st.floats(0.1, 5.0))
+def test_equal_speeds_only_change_the_unit(seed: int, n: int, speed: float) -> None:
+    robots = somewhere(n, np.random.default_rng(seed))
+    plain, timed = COST(robots), COST(robots, speeds=np.full(n, speed))
+    np.testing.assert_array_equal(timed.owner, plain.owner)
+    np.testing.assert_array_equal(timed.distances, plain.distances)
+    assert timed.mean_distance == plain.mean_distance
+    assert timed.mean_time == pytest.approx(plain.mean_distance / speed, rel=1e-12)
+    np.testing.assert_allclose(timed.gradient, plain.gradient / speed, rtol=1e-10, atol=1e-12)
+
+
+@settings(max_examples=15)
+@given(seeds)
+def test_the_gradient_is_that_of_the_value(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robots, speeds = somewhere(4, rng), np.array([1.0, 0.4, 1.0, 0.7])
+    result, step = COST(robots, speeds=speeds), 1e-6
+    i, axis = int(rng.integers(4)), int(rng.integers(2))
+    shift = np.zeros((4, 2))
+    shift[i, axis] = step
+    low, high = (COST(robots + sign * shift, speeds=speeds) for sign in (-1, 1))
+    if (low.owner == high.owner).all() and (low.corner == high.corner).all():
+        slope = (high.value - low.value) / (2 * step)
+        assert slope == pytest.approx(result.gradient[i, axis], abs=1e-4)
+
+
+def test_a_fast_robot_takes_over_what_is_nearer_to_a_slow_one() -> None:
+    robots = np.array([[0.4, 0.5], [0.6, 0.5]])
+    result = ROOM(robots, speeds=np.array([0.1, 1.0]))
+    assert (result.owner == 0).mean() < 0.05
+    assert result.mean_time is not None
+    assert result.mean_time < ROOM(robots[1:], speeds=np.ones(1)).mean_time
+    assert result.mean_distance > ROOM(robots).mean_distance
+    assert "mean time" in repr(result)
+
+
+def test_rooms_without_a_robot_are_uncovered_whatever_the_speed() -> None:
+    halves = CoverageCost(environment(((0.45, 0.0), (0.55, 0.0), (0.55, 1.0), (0.45, 1.0))), lattice=20)
+    result = halves([[0.2, 0.5], [0.3, 0.5]], speeds=[1.0, 2.0])
+    assert np.isinf(result.times[result.owner < 0]).all()
+    assert result.uncovered_area == pytest.approx(0.45)
+    assert result.value == pytest.approx(result.mean_time * 0.45)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "message"),
+    [
+        ([1.0], "a number for each of 2 robots was wanted"),
+        ([1.0, 0.0], r"speeds\[1\]: 0.0 m/s, but a number above 0 was wanted"),
+        ([np.nan, 1.0], r"speeds\[0\]: nan"),
+        (["fast", 1.0], "a number for each of 2 robots"),
+    ],
+)
+def test_what_are_no_speeds_is_told(speeds: list, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        ROOM([[0.2, 0.5], [0.3, 0.5]], speeds=speeds)

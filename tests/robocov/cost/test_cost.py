@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, box, environment
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.cost import CoverageCost, corner_views, robot_views
+from robocov.cost import coverage as cost_module
+from robocov.cost.corner_views import CornerViews
+from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.errors import InputError, ParameterError
+from robocov.files.array_cache import ArrayCache
+from robocov.geodesic import distances, visibility
+
+
+@pytest.mark.parametrize(
+    ("where", "positions", "expected"),
+    [
+        (PILLAR, [[1 / 8, 1 / 2]], 0.485117942024),
+        (PILLAR, [[1 / 8, 1 / 2], [7 / 8, 1 / 2]], 0.298875152962),
+        (CUP, [[1 / 2, 1 / 2]], 0.576781074789),
+    ],
+)
+def test_plain_sums_over_the_sites(where, positions, expected):
+    cost = CoverageCost(where, lattice=64)
+    assert cost(positions).distances.sum() * cost.spacing**2 == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("where", "position", "expected"),
+    [
+        (environment(), [1 / 2, 1 / 2], 0.382597858232),
+        (L_ROOM, [1 / 2, 1 / 2], 0.286948393674),
+        (L_ROOM, [1 / 2, 1], 0.517266172593),
+    ],
+)
+def test_the_value_tends_to_the_integral_with_the_square_of_the_spacing(where, position, expected):
+    errors = [abs(CoverageCost(where, lattice=n)([position]).value - expected) for n in (32, 64, 128)]
+    assert errors[-1] < 1e-5
+    assert errors[0] > 3 * errors[1] > 9 * errors[2]
+
+
+def test_sites_are_the_free_cell_centres_of_the_square_over_the_bounding_box():
+    where = environment(box(2, 1, 4, 2), boundary=((1, 1), (5, 1), (5, 3), (1, 3)))
+    cost = CoverageCost(where, lattice=8)
+    assert cost.spacing == 0.5
+    expected = [
+        (x, y)
+        for y in np.arange(1.25, 5, 0.5)
+        for x in np.arange(1.25, 5, 0.5)
+        if y < 3 and not (2 < x < 4 and y < 2)
+    ]
+    np.testing.assert_array_equal(cost.points, expected)
+    np.testing.assert_array_equal(cost.cells, [round((x - 1.25) * 2 + (y - 1.25) * 16) for x, y in expected])
+
+
+def test_sites_on_walls_are_left_out():
+    where = environment(box(1, 0, 3, 2), boundary=box(0, 0, 4, 4))
+    assert CoverageCost(where, lattice=4).points.tolist() == [
+        *([0.5, 0.5], [3.5, 0.5], [0.5, 1.5], [3.5, 1.5]),
+        *([x, y] for y in (2.5, 3.5) for x in (0.5, 1.5, 2.5, 3.5)),
+    ]
+    shifted = environment(box(0.5, 0, 3, 2.5), boundary=box(0, 0, 4, 4))
+    assert CoverageCost(shifted, lattice=4).points.tolist() == [
+        *([3.5, 0.5], [3.5, 1.5], [3.5, 2.5]),
+        *([x, 3.5] for x in (0.5, 1.5, 2.5, 3.5)),
+    ]
+
+
+def test_rooms_without_a_robot_are_reported_beside_the_cost():
+    where = environment(box(3, 0, 4, 8), boundary=box(0, 0, 8, 8))
+    cost = CoverageCost(where, lattice=16)
+    left, both = cost([[1.0, 1.0]]), cost([[1.0, 1.0], [6.0, 6.0]])
+    assert left.uncovered_area == pytest.approx(32.0)
+    assert both.uncovered_area == 0.0
+    in_left = cost.points[:, 0] < 3.0
+    np.testing.assert_array_equal(np.isfinite(left.distances), in_left)
+    np.testing.assert_array_equal(left.owner, np.where(in_left, 0, -1))
+    assert (left.corner[~in_left] == -1).all()
+    assert left.mean_distance == left.distances[in_left].mean()
+    assert left.value == pytest.approx(left.mean_distance * 24.0)
+    assert both.value == pytest.approx(both.distances.mean() * 56.0)
+
+
+def test_a_room_too_small_for_a_site_has_no_mean():
+    where = environment(box(0.5, 0.5, 3, 8), box(0, 0.5, 1, 1), boundary=box(0, 0, 8, 8))
+    tiny = Environment("tiny", where.boundary, (*where.obstacles, PolygonObstacle(box(0.125, 0, 1, 1))))
+    cost = CoverageCost(tiny, lattice=4)
+    result = cost([[0.05, 0.05]])
+    assert np.isnan(result.mean_distance)
+    assert np.isnan(result.value)
+    assert (result.owner == -1).all()
+    assert result.gradient.tolist() == [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize("few", [0, 1 << 13])
+@pytest.mark.parametrize("n", [1, 2, 7, 40])
+def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n, few, monkeypatch):
+    # the walls in reach first, or all at once; everything in one piece, or in many
+    monkeypatch.setattr(robot_views, "_FEW", few)
+    if not few:
+        for module in (visibility, corner_views, distances, robot_views):
+            monkeypatch.setattr(module, "_PAIRS", 100)
+        monkeypatch.setattr(visibility, "_REST", 0)
+    cost = CoverageCost(OFFICE, lattice=24)
+    robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
+    result = cost(robots)
+    everything = cost.geodesics.distances(robots, cost.points)
+    np.testing.assert_allclose(result.distances, everything.min(axis=0), rtol=0, atol=1e-12)
+    own = everything[result.owner, np.arange(len(cost.points))]
+    np.testing.assert_allclose(own, result.distances, rtol=0, atol=1e-12)
+
+
+def test_the_first_way_point_is_that_of_the_shortest_path():
+    cost = CoverageCost(OFFICE, lattice=12)
+    robots = np.array([[1.0, 1.0], [11.0, 1.0]])
+    result = cost(robots)
+    for site in range(len(cost.points)):
+        way = cost.path(robots, cost.points[site])
+        np.testing.assert_allclose(way[-1], robots[result.owner[site]], atol=1e-12)
+        np.testing.assert_allclose(way[-2], result.first[site], atol=1e-12)
+
+
+def test_the_gradient_is_that_of_the_value():
+    cost = CoverageCost(OFFICE, lattice=40)
+    rng = np.random.default_rng(8)
+    room = OFFICE.free.buffer(-0.05)
+    robots = rng.uniform((0, 0), (12, 8), (60, 2))
+    robots = robots[shapely.contains_xy(room, *robots.T)][:6]
+    gradient = cost(robots).gradient
+    step = 1e-6
+    for i in range(len(robots)):
+        for k in range(2):
+            ahead, behind = robots.copy(), robots.copy()
+            ahead[i, k] += step
+            behind[i, k] -= step
+            slope = (cost(ahead).value - cost(behind).value) / (2 * step)
+            assert slope == pytest.approx(gradient[i, k], abs=1e-5 * cost(robots).value)
+    assert np.abs(gradient).max() > 1.0
+
+
+positions = st.lists(
+    st.tuples(st.integers(0, 48), st.integers(0, 32)).map(lambda p: (p[0] / 4, p[1] / 4)),
+    min_size=1,
+    max_size=8,
+).map(lambda points: [p for p in points if shapely.intersects_xy(OFFICE.free, *p)])
+
+
+@settings(max_examples=40, deadline=None)
+@given(positions.filter(bool), st.randoms(use_true_random=False))
+def test_order_and_repetition_of_robots_do_not_matter(robots, random):
+    cost = CoverageCost(OFFICE, lattice=10)
+    result = cost(robots)
+    shuffled = [*robots, *robots]
+    random.shuffle(shuffled)
+    again = cost(shuffled)
+    np.testing.assert_array_equal(again.distances, result.distances)
+    if len(robots) > 1:
+        assert (cost(robots[1:]).distances >= result.distances - 1e-12).all()
+
+
+def test_results_do_not_depend_on_earlier_calls():
+    rng = np.random.default_rng(0)
+    one, other = CoverageCost(OFFICE, lattice=32), CoverageCost(OFFICE, lattice=32)
+    runs = [one.points[rng.choice(len(one.points), 5)] for _ in range(6)]
+    first = [one(robots) for robots in runs]
+    second = [other(robots) for robots in reversed(runs)][::-1]
+    for a, b in zip(first, second, strict=True):
+        assert a.value == b.value
+        for name in ("distances", "owner", "first", "gradient"):
+            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1e-2, (0, 0)), (1e3, (5e5, -4e6)), (1.0, (-77.7, 31.1))])
+def test_the_cost_scales_and_moves_with_the_map(scale, shift):
+    rings = [box(2, 0, 3, 5), ((4.03, 8), (5.01, 3), (6.1, 8))]
+    robots = np.array([[1.0, 1.0], [7.0, 7.0], [3.5, 2.0]])
+    whole = CoverageCost(environment(*rings, boundary=box(0, 0, 8, 8)), lattice=32)(robots)
+
+    def moved(ring):
+        return tuple(map(tuple, (np.array(ring) * scale + shift).tolist()))
+
+    there = environment(*map(moved, rings), boundary=moved(box(0, 0, 8, 8)))
+    result = CoverageCost(there, lattice=32)(robots * scale + shift)
+    # the map is laid on a grid of a micrometre
+    assert result.mean_distance == pytest.approx(whole.mean_distance * scale, rel=1e-4 if scale < 1 else 1e-7)
+
+
+def test_coincident_robots_give_the_site_to_the_first():
+    result = CoverageCost(PILLAR, lattice=16)([[0.1, 0.1], [0.9, 0.9], [0.1, 0.1], [0.9, 0.9]])
+    assert set(result.owner.tolist()) == {0, 1}
+
+
+def test_robots_outside_are_named():
+    cost = CoverageCost(PILLAR, lattice=8)
+    with pytest.raises(InputError, match=r"positions\[1\] = \[0.5, 0.5\] is 0.125 m outside the free space"):
+        cost([[0.1, 0.1], [0.5, 0.5]])
+    with pytest.raises(InputError, match="positions: none"):
+        cost([])
+
+
+@pytest.mark.parametrize("lattice", [0, -3, 1.5, True, 5000, "64", None])
+def test_the_lattice_must_be_a_whole_number_in_range(lattice):
+    with pytest.raises(ParameterError, match=r"lattice: .* whole number from 1 to 4096"):
+        CoverageCost(PILLAR, lattice=lattice)
+
+
+def test_a_lattice_without_a_free_site_is_refused():
+    with pytest.raises(ParameterError, match="lattice: 1, but none of its sites is free"):
+        CoverageCost(PILLAR, lattice=1)
+
+
+def test_building_tells_how_far_it_is_and_can_be_given_up():
+    told = []
+    CoverageCost(OFFICE, lattice=64, progress=told.append)
+    assert told == sorted(told)
+    assert 0.0 <= told[0] <= told[-1] < 1.0
+
+    class UnwantedError(Exception):
+        pass
+
+    def refuse(done):
+        raise UnwantedError
+
+    with pytest.raises(UnwantedError):
+        CoverageCost(OFFICE, lattice=64, progress=refuse)
+
+
+def test_the_cache_changes_nothing_but_the_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(cost_module, "_WORTH_KEEPING", 0.0)
+    positions = [[1.0, 1.0], [8.0, 4.0], [5.0, 6.8]]
+    cache = ArrayCache(tmp_path)
+    fresh = CoverageCost(OFFICE, 48, cache=cache)
+    assert len(list(tmp_path.iterdir())) == 1
+
+    def never(*args):
+        raise AssertionError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CornerViews, "looked_for", never)
+        kept = CoverageCost(OFFICE, 48, cache=cache)
+        # whatever the result depends on makes another entry
+        moved = Environment("office", tuple((x + 1.0, y) for x, y in OFFICE.boundary), OFFICE.obstacles)
+        for other, lattice in ((OFFICE, 47), (PILLAR, 48), (moved, 48)):
+            with pytest.raises(AssertionError):
+                CoverageCost(other, lattice, cache=cache)
+    one, two = fresh(positions), kept(positions)
+    for name in ("distances", "owner", "corner", "gradient"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+    assert one.value == two.value
+
+
+def test_quick_builds_are_not_kept(tmp_path):
+    CoverageCost(PILLAR, 8, cache=ArrayCache(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_sealed_rooms_without_a_corner():
+    # the nearest robot is behind the wall, and no way bends anywhere
+    where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    cost = CoverageCost(where, lattice=16)
+    assert len(cost.corners) == 0
+    robots = np.array([[2.9, 4.0], [7.0, 7.0]])
+    result = cost(robots)
+    left = cost.points[:, 0] < 4.0
+    np.testing.assert_array_equal(result.owner, np.where(left, 0, 1))
+    expected = np.hypot(*(cost.points - robots[result.owner]).T)
+    np.testing.assert_allclose(result.distances, expected, rtol=0, atol=1e-12)
+    alone = cost(robots[:1])
+    assert alone.uncovered_area == pytest.approx(24.0)
+    assert (alone.owner == np.where(left, 0, -1)).all()
+
+
+def test_a_result_is_short_in_words(empty: Environment) -> None:
+    result = CoverageCost(empty, 16)([[5.0, 5.0]])
+    assert repr(result) == f"<CoverageResult 1 robot, mean distance {result.mean_distance:.3f} m>"
+    split = replace(empty, obstacles=(WallObstacle(((5.0, -1.0), (5.0, 11.0)), 0.1),))
+    result = CoverageCost(split, 16)([[1.0, 5.0]])
+    assert repr(result).endswith(f" m, {result.uncovered_area:.3f} m² uncovered>")

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robocov.cost import CoverageCost
+from robocov.cost.momentary_cost import MomentaryCost
+from robocov.environment import CircleObstacle, Environment
+from robocov.environment.obstacle_path import ObstaclePath
+
+SQUARE = ((0, 0), (6, 0), (6, 4), (0, 4))
+STANDING = Environment("standing", SQUARE, (CircleObstacle((4.5, 2.0), 0.5),))
+CROSSED = Environment(
+    "crossed",
+    SQUARE,
+    (CircleObstacle((1.0, 1.0), 0.4, path=ObstaclePath(((1.0, 1.0), (5.0, 1.0)), 1.0, "back-and-forth")),),
+)
+ROBOTS = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 1.0]])
+
+
+def test_where_nothing_moves_it_is_the_given_cost() -> None:
+    cost = CoverageCost(STANDING, 24)
+    momentary = MomentaryCost(cost)
+    assert momentary.at(7.0) is cost
+    result = momentary.of_all(7.0, ROBOTS)
+    assert result is not None
+    assert result.value == cost(ROBOTS).value
+    assert momentary.of_all(0.0, ROBOTS[:0]) is None
+
+
+def test_every_robot_has_a_row_whether_it_counts_or_not() -> None:
+    cost = CoverageCost(CROSSED, 24)
+    momentary = MomentaryCost(cost)
+    working = np.array([True, True, False])
+    result = momentary.of_all(0.0, ROBOTS, working)
+    assert result is not None
+    np.testing.assert_array_equal(result.positions, ROBOTS)
+    # the first is run over at the time, the last has failed
+    assert set(result.owner.tolist()) == {1}
+    assert (
+        result.mean_distance == momentary.figures(0.0, ROBOTS, working)[0] == cost(ROBOTS[1:2]).mean_distance
+    )
+    later = momentary.of_all(2.0, ROBOTS)
+    assert later is not None
+    assert set(later.owner.tolist()) == {0, 1}
+    assert momentary.of_all(0.0, ROBOTS[:1]) is None
+
+
+def test_a_map_of_a_moment_can_be_given_up() -> None:
+    def stop(done: float) -> None:
+        raise InterruptedError
+
+    momentary = MomentaryCost(CoverageCost(CROSSED, 24), progress=stop)
+    with pytest.raises(InterruptedError):
+        momentary.at(1.0)

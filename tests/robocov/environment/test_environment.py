@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.errors import InputError, StartError
+from robocov.observation.region import Region
+
+SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+
+
+@pytest.mark.parametrize("radius", [0.005, 0.05, 0.5, 5.0, 50.0])
+def test_a_circle_is_a_polygon_of_at_most_a_millimetre_of_sagitta(radius: float) -> None:
+    polygon = CircleObstacle((1.0, 2.0), radius).polygon
+    center = shapely.Point(1.0, 2.0)
+    assert radius - center.distance(polygon.exterior) <= 1e-3 + 1e-12
+    assert center.hausdorff_distance(polygon) <= radius * (1 + 1e-12)
+
+
+def test_a_wall_ends_flat_and_has_mitred_corners() -> None:
+    wall = WallObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 3.0)), 0.2).polygon
+    assert wall.area == pytest.approx(2 * 0.2 + 3 * 0.2)
+    assert wall.bounds == pytest.approx((0.0, -0.1, 2.1, 3.0))
+
+
+def test_a_closed_wall_has_no_notch() -> None:
+    ring = WallObstacle((*SQUARE, SQUARE[0]), 0.2).polygon
+    assert ring.area == pytest.approx(10.2**2 - 9.8**2)
+
+
+def test_the_boundary_may_run_either_way_round() -> None:
+    forward, backward = Environment("a", SQUARE), Environment("a", SQUARE[::-1])
+    assert forward.free_area == backward.free_area == 100.0
+    assert backward.free.geoms[0].exterior.is_ccw
+
+
+def test_free_space_of_overlapping_and_protruding_obstacles() -> None:
+    environment = Environment(
+        "x",
+        SQUARE,
+        (
+            PolygonObstacle(((-1.0, 4.0), (5.0, 4.0), (5.0, 6.0), (-1.0, 6.0))),
+            PolygonObstacle(((4.0, 3.0), (6.0, 3.0), (6.0, 7.0), (4.0, 7.0))),
+            PolygonObstacle(
+                ((7.0, 7.0), (9.0, 7.0), (9.0, 9.0), (7.0, 9.0)), (((7.5, 7.5), (8.5, 7.5), (8.5, 8.5)),)
+            ),
+        ),
+    )
+    assert environment.free_area == pytest.approx(100 - (10 + 8 - 2) - (4 - 0.5))
+    assert len(environment.free.geoms) == 2, "the hole of the last obstacle is a room of its own"
+    areas = [part.area for part in environment.free.geoms]
+    assert areas == sorted(areas, reverse=True)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.floats(-1, 11), st.floats(-1, 11), st.floats(0.05, 3)), max_size=6))
+def test_free_and_blocked_tile_the_region(discs: list[tuple[float, float, float]]) -> None:
+    environment = Environment("x", SQUARE, tuple(CircleObstacle((x, y), r) for x, y, r in discs))
+    assert environment.free_area + environment.blocked.area == pytest.approx(100.0, rel=1e-6)
+    assert shapely.intersection(environment.free, environment.blocked).area < 1e-6
+
+
+def test_outside_a_non_convex_boundary_counts_as_an_obstacle(cluttered: Environment) -> None:
+    assert cluttered.region.area == pytest.approx(87.5)
+    assert cluttered.blocked.contains(shapely.Point(2.0, 6.0))
+
+
+def test_starts_are_found_by_name(cluttered: Environment) -> None:
+    assert cluttered.start().name == "corner"
+    with pytest.raises(StartError, match=r"unknown start 'corner2': did you mean 'corner'\?"):
+        cluttered.start("corner2")
+    assert Environment("bare", SQUARE).start().name == "uniform"
+    assert cluttered.start("uniform").sample(3).shape == (3, 2)
+
+
+def test_environments_are_equal_by_content() -> None:
+    one = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
+    other = Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.5),), extra={"k": [1]})
+    assert one == other
+    assert hash(one) == hash(other)
+    assert one != Environment("a", SQUARE, (CircleObstacle((1.0, 1.0), 0.6),))
+
+
+def test_region_is_the_convex_hull_without_collinear_vertices() -> None:
+    region = Region(np.array([[0, 0], [4, 0], [8, 0], [8, 6], [4, 3], [0, 6], [0, 3]], dtype=float))
+    np.testing.assert_allclose(region.vertices, [[0, 0], [8, 0], [8, 6], [0, 6]])
+    assert region.area == 48.0
+    np.testing.assert_allclose(region.centroid, [4, 3])
+    np.testing.assert_allclose(region.normals @ region.centroid < region.offsets, True)
+    assert region.contains(np.array([[4.0, 5.0], [9.0, 1.0], [8.0, 6.0]])).tolist() == [True, False, True]
+    with pytest.raises(InputError, match="no area"):
+        Region(np.array([[0, 0], [1, 1], [2, 2]], dtype=float))
+    with pytest.raises(ValueError, match="read-only"):
+        region.vertices[0, 0] = 1.0
+
+
+def test_it_is_short_in_words(cluttered: Environment, empty: Environment) -> None:
+    assert repr(cluttered) == "<Environment cluttered, 10 x 10 m, 3 obstacles>"
+    assert repr(empty) == "<Environment empty, 10 x 10 m, 0 obstacles>"

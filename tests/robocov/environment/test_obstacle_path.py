@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import ObstaclePath, Repeat
+from robocov.errors import MapError
+from robocov.mapfile import dump_map, from_json, map_schema, parse_map, to_json
+
+HALL = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
+places = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
+lines = st.lists(places, min_size=2, max_size=6, unique=True).filter(
+    lambda points: np.ptp(np.array(points), axis=0).max() > 0.1
+)
+repeats = st.sampled_from(["loop", "back-and-forth"])
+
+
+def test_a_loop_closes_and_a_line_turns_back() -> None:
+    square = ObstaclePath(((0, 0), (2, 0), (2, 1), (0, 1)), 0.5)
+    assert square.period == 12.0
+    assert square.shift(0.0).tolist() == [0, 0]
+    assert square.shift(5.0).tolist() == [2, 0.5]
+    assert square.shift(11.0).tolist() == [0, 0.5]
+    assert square.shift(12.0).tolist() == [0, 0]
+    line = ObstaclePath(((1, 1), (4, 5)), 1.0, "back-and-forth")
+    assert line.period == 10.0
+    assert line.shift(5.0).tolist() == [3, 4]
+    np.testing.assert_allclose(line.shift(7.5), [1.5, 2.0])
+
+
+@given(lines, st.floats(0.01, 5), repeats, st.floats(0, 1e4), st.floats(0, 10))
+def test_it_never_goes_faster_than_its_speed_and_comes_back(
+    points: list[tuple[float, float]], speed: float, repeat: Repeat, time: float, later: float
+) -> None:
+    path = ObstaclePath(tuple(points), speed, repeat)
+    moved = path.shift(time + later) - path.shift(time)
+    assert math.hypot(*moved) <= speed * later + 1e-8
+    np.testing.assert_allclose(path.shift(time + path.period), path.shift(time), atol=1e-6)
+    # it is on its line
+    at = path.shift(time) + points[0]
+    ends = [*points, points[0]] if repeat == "loop" else points
+    nearest = min(_distance(at, np.array(a), np.array(b)) for a, b in pairwise(ends))
+    assert nearest < 1e-8
+
+
+def _distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    along = b - a
+    part = np.clip(((point - a) @ along) / max(float(along @ along), 1e-300), 0, 1)
+    return float(np.hypot(*(point - a - part * along)))
+
+
+def moving() -> Environment:
+    path = ObstaclePath(((2, 1), (8, 1)), 0.5, "back-and-forth")
+    return Environment(
+        "hall",
+        HALL,
+        (
+            WallObstacle(((5, 2), (5, 6)), 0.1),
+            CircleObstacle((2, 1), 0.5, "cart", path),
+            PolygonObstacle(((1, 4), (2, 4), (2, 5)), (), None, ObstaclePath(((0, 0), (1, 0)), 1.0)),
+            WallObstacle(((8, 4), (9, 4)), 0.2, None, ObstaclePath(((0, 0), (0, 1)), 0.25)),
+        ),
+    )
+
+
+def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
+    environment = moving()
+    assert environment.moves
+    now = environment.at(4.0)
+    assert not now.moves
+    assert now.obstacles[0] == environment.obstacles[0]
+    cart = now.obstacles[1]
+    assert isinstance(cart, CircleObstacle)
+    assert (cart.center, cart.name) == ((4.0, 1.0), "cart")
+    desk, wall = now.obstacles[2:]
+    assert isinstance(desk, PolygonObstacle)
+    assert isinstance(wall, WallObstacle)
+    assert desk.vertices == ((1, 4), (2, 4), (2, 5))  # after two turns
+    assert wall.points == ((8, 5), (9, 5))
+    for time in (0.0, 1.3, 4.0):
+        assert environment.at(time).free_area == pytest.approx(environment.free_area, abs=1e-4)
+    assert environment.at(3.0).free.wkb == environment.at(3.0 + 24.0).free.wkb
+    assert environment.standing.obstacles == environment.obstacles[:1]
+
+
+def test_where_nothing_moves_the_map_is_always_itself() -> None:
+    hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
+    assert not hall.moves
+    assert hall.at(7.0) is hall
+    assert hall.standing is hall
+
+
+def test_a_file_keeps_it() -> None:
+    environment = moving()
+    assert parse_map(dump_map(environment), "m.json") == environment
+    assert to_json(environment)["obstacles"][1]["path"] == {
+        "points": [[2, 1], [8, 1]],
+        "speed": 0.5,
+        "repeat": "back-and-forth",
+    }
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        (3, r"obstacles\[0\].path: 3, but an object with points and speed was wanted"),
+        (
+            {"points": [[0, 0], [1, 0]]},
+            r"path.speed: missing, but a number from 0.001 to 10 \(m/s\)",
+        ),
+        ({"points": [[0, 0], [1, 0]], "speed": 0}, r"path.speed: 0, but"),
+        ({"points": [[0, 0], [1, 0]], "speed": 11}, r"path.speed: 11, but"),
+        ({"points": [[0, 0], [1, 0]], "speed": "1"}, r'path.speed: "1", but'),
+        ({"points": [[0, 0]], "speed": 1}, r"path.points: .*, but a list of at least 2 points"),
+        ({"points": [[0, 0], [1]], "speed": 1}, r"path.points\[1\]: \[1\], but a point \[x, y\] in metres"),
+        ({"points": [[0, 0], [1, 1e9]], "speed": 1}, r"path.points\[1\]\[1\]: 1e\+09|1000000000"),
+        ({"points": [[0, 0], [0, 0]], "speed": 1}, r"path.points: a path 0 m wide, but at least 1 mm"),
+        ({"points": [[0, 0], [20000, 0]], "speed": 1}, r"path.points: 20000 x 0 m, but at most 10 km"),
+        ({"points": [[0, 0], [1, 0]], "speed": 1, "repeat": "twice"}, r'path.repeat: "twice", but "loop" or'),
+        ({"points": [[0, 0], [1, 0]], "spede": 1}, r"path: unknown key 'spede': did you mean 'speed'\?"),
+    ],
+)
+def test_what_is_wrong_with_a_path_is_named(path: object, message: str) -> None:
+    obstacle = {"kind": "circle", "center": [5, 3], "radius": 0.5, "path": path}
+    document = {"format": "robocov-map", "version": 1, "name": "m", "boundary": [*map(list, HALL)]}
+    with pytest.raises(MapError, match=message) as caught:
+        from_json({**document, "obstacles": [obstacle]}, "m.json")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_schema_knows_paths() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = jsonschema.Draft202012Validator(map_schema())
+    document = to_json(moving())
+    schema.validate(document)
+    document["obstacles"][1]["path"]["speed"] = 0
+    assert not schema.is_valid(document)

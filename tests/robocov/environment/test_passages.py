@@ -1,0 +1,188 @@
+"""The narrowest gap: exact cases, symmetry, and erosion as an independent judge."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import MultiPolygon, Point, Polygon, box
+from shapely.affinity import affine_transform
+from shapely.geometry.base import BaseGeometry
+
+from robocov.environment.passages import gaps_narrower, narrowest_gap
+
+
+def free(*parts: BaseGeometry) -> MultiPolygon:
+    polygons = [polygon for part in parts for polygon in shapely.get_parts(part)]
+    return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])
+
+
+ROOM = box(0, 0, 10, 6)
+TWO_ROOMS = ROOM - box(4.9, 0, 5.1, 2) - box(4.9, 2.7, 5.1, 6)
+SLANTED_SLIT = Polygon([(0, 0), (10, 0), (10, 6), (0, 6)]) - Polygon([(3, 0), (4, 0), (6, 3), (5, 3)])
+
+
+@pytest.mark.parametrize(
+    ("space", "width"),
+    [
+        (TWO_ROOMS, 0.7),
+        (ROOM - box(4, 2, 6, 5), 1.0),  # a block, 1 m from the north wall
+        (ROOM - box(2, 2, 3, 3) - box(3.5, 3.5, 5, 5), math.hypot(0.5, 0.5)),  # corner to corner
+        (ROOM - Polygon([(2, 2), (4, 3), (2, 4)]) - box(4.5, 1, 5, 5), 0.5),  # corner to side
+        (box(0, 0, 3, 3) | box(3, 1, 8, 1.8), 0.8),  # a long way to nowhere
+        (box(0, 0, 3, 3) | box(3, 1, 8, 1.8) | box(8, 0, 11, 3), 0.8),
+        (box(0, 0, 9, 2) | box(7, 0, 9, 9), 2.0),  # an L: both arms are long
+        (
+            ROOM - box(3, 0, 4, 3) - box(6, 3, 7, 6),
+            2.0,
+        ),  # a bend between two walls
+        (SLANTED_SLIT, 3.0),
+    ],
+)
+def test_exact_widths(space: BaseGeometry, width: float) -> None:
+    gap = narrowest_gap(free(space))
+    assert gap is not None
+    assert gap.width == pytest.approx(width, abs=2e-6)
+    first, second = gap.between
+    assert math.dist(first, second) == pytest.approx(width, abs=2e-6)
+    for end in gap.between:
+        assert shapely.distance(space.boundary, Point(end)) < 2e-6
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        ROOM,
+        Polygon([(0, 0), (10, 0), (0.2, 1)]),  # acute corners
+        Point(0, 0).buffer(5),
+        ROOM | box(10, 2, 10.5, 3),  # a niche wider than deep
+        ROOM | box(10, 2, 10.15, 2.1),  # a niche too small for a robot
+        ROOM - Polygon([(0, 0), (5, 0), (0, 0.5)]),
+        ROOM - box(0, 0, 3, 3) - box(3, 3, 10, 6),  # two rooms that touch in a point
+        ROOM - Point(1, 3).buffer(1.0),  # a polygon of a circle that all but touches the wall
+    ],
+)
+def test_no_passage(space: BaseGeometry) -> None:
+    assert narrowest_gap(free(space)) is None
+
+
+def test_no_free_space() -> None:
+    assert narrowest_gap(MultiPolygon()) is None
+
+
+def test_many_vertices_along_a_wall_are_no_passage() -> None:
+    angle = np.linspace(0, 2 * np.pi, 40_001)[:-1]
+    round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]).round(9) * 50)
+    assert narrowest_gap(free(round_room)) is None
+
+
+def test_the_narrowest_of_several_components() -> None:
+    elsewhere = affine_transform(ROOM - box(4, 2, 6, 5.8), [1, 0, 0, 1, 20, 0])
+    gap = narrowest_gap(free(TWO_ROOMS, elsewhere))
+    assert gap is not None
+    assert gap.width == pytest.approx(0.2)
+    assert min(x for x, _ in gap.between) >= 20
+
+
+@st.composite
+def rooms_with_blocks(draw: st.DrawFn) -> Polygon:
+    """Draw a rectangular room with discs and boxes in it that touch neither each other nor a wall."""
+    space: BaseGeometry = box(0, 0, 10, 8)
+    used: list[BaseGeometry] = []
+    for _ in range(draw(st.integers(1, 5))):
+        x, y, size = draw(st.floats(1, 9)), draw(st.floats(1, 7)), draw(st.floats(0.1, 0.8))
+        if draw(st.booleans()):
+            block = Point(x, y).buffer(size, quad_segs=draw(st.integers(2, 12)))
+        else:
+            turn = draw(st.floats(0, math.pi))
+            c, s = math.cos(turn), math.sin(turn)
+            block = affine_transform(box(-size, -0.4, size, 0.4), [c, -s, s, c, x, y])
+        apart = all(block.distance(other) > 0.05 for other in used)
+        if apart and block.distance(space.exterior) > 0.05 and space.contains(block):
+            used.append(block)
+    return box(0, 0, 10, 8) - shapely.union_all(used)
+
+
+def topology(space: BaseGeometry, radius: float) -> tuple[int, int]:
+    """Return the numbers of parts and holes of the places for the centre of a disc of some radius."""
+    parts = shapely.get_parts(space.buffer(-radius, quad_segs=64))
+    parts = parts[shapely.area(parts) > 0]
+    return len(parts), int(sum(len(part.interiors) for part in parts))
+
+
+@settings(deadline=None, max_examples=150)
+@given(rooms_with_blocks())
+def test_erosion_changes_at_the_gap_and_not_before(space: Polygon) -> None:
+    gap = narrowest_gap(free(space))
+    untouched = (1, len(space.interiors))
+    if gap is None:
+        assert untouched == (1, 0)
+        return
+    for part in (0.2, 0.6, 0.998):
+        assert topology(space, part * gap.width / 2) == untouched
+    assert topology(space, 1.002 * gap.width / 2) != untouched
+
+
+@settings(deadline=None, max_examples=60)
+@given(rooms_with_blocks(), st.integers(0, 30), st.floats(0, 6.3), st.booleans())
+def test_the_gap_moves_with_the_map(space: Polygon, first: int, turn: float, mirrored: bool) -> None:
+    gap = narrowest_gap(free(space))
+    c, s = math.cos(turn), math.sin(turn)
+    flip = -1 if mirrored else 1
+    moved = affine_transform(space, [c * flip, -s, s * flip, c, 3.0, -7.0])
+    rings = [
+        np.roll(np.asarray(ring.coords)[:-1], first, axis=0) for ring in (moved.exterior, *moved.interiors)
+    ]
+    again = narrowest_gap(free(Polygon(rings[0], rings[1:])))
+    assert (gap is None) == (again is None)
+    if gap is not None and again is not None:
+        assert again.width == pytest.approx(gap.width, abs=2e-6)
+
+
+@pytest.mark.parametrize("first", range(12))
+@pytest.mark.parametrize("depth", [0.5, 1.5])
+def test_a_niche_counts_when_deeper_than_wide_wherever_its_ring_begins(first: int, depth: float) -> None:
+    ring = np.asarray((ROOM | box(10, 2, 10 + depth, 3)).exterior.coords)[:-1]
+    gap = narrowest_gap(free(Polygon(np.roll(ring, first % len(ring), axis=0))))
+    if depth < 1.0:
+        assert gap is None
+    else:
+        assert gap is not None
+        assert gap.width == pytest.approx(1.0)
+
+
+# all that are too narrow
+
+
+def test_all_gaps_below_a_width_are_found() -> None:
+    walls = ROOM - box(2, 0, 2.2, 2) - box(2, 2.5, 2.2, 6) - box(7, 0, 7.2, 4) - box(7, 4.9, 7.2, 6)
+    for width, doors in [(0.4, set()), (0.6, {0.5}), (1.0, {0.5, 0.9})]:
+        found = gaps_narrower(free(walls), width)
+        assert {gap.width for gap in found} == doors
+        assert [gap.width for gap in found] == sorted(gap.width for gap in found)
+        for gap in found:
+            x = (gap.between[0][0] + gap.between[1][0]) / 2
+            assert abs(x - (2.1 if gap.width == 0.5 else 7.1)) <= 0.1 + 1e-9
+    assert gaps_narrower(free(ROOM), 100.0) == ()
+    assert gaps_narrower(MultiPolygon(), 1.0) == ()
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 9), st.integers(0, 5), st.integers(1, 3), st.integers(1, 3)), max_size=6
+    )
+)
+def test_the_narrowest_of_all_is_the_narrowest(blocks: list[tuple[int, int, int, int]]) -> None:
+    room = ROOM - shapely.union_all([box(x, y, x + u - 0.35, y + v - 0.2) for x, y, u, v in blocks])
+    space = free(room)
+    gap = narrowest_gap(space)
+    if gap is None:
+        assert gaps_narrower(space, 20.0) == ()
+    else:
+        assert gaps_narrower(space, gap.width + 1e-3)[0].width == gap.width
+        assert gaps_narrower(space, gap.width - 1e-5) == ()

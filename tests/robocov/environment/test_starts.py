@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import Environment
+from robocov.environment.starts import DiscStart, PointsStart, Start
+from robocov.errors import StartError
+
+SQUARE = shapely.box(0, 0, 10, 10)
+
+
+@settings(max_examples=40)
+@given(
+    n=st.integers(1, 60),
+    seed=st.integers(0, 2**32),
+    radius=st.floats(0.02, 0.3),
+    name=st.sampled_from(["corner", "uniform"]),
+)
+def test_robots_start_clear_of_walls_and_of_each_other(
+    cluttered: Environment, n: int, seed: int, radius: float, name: str
+) -> None:
+    try:
+        points = cluttered.start(name).sample(n, seed, radius)
+    except StartError as error:
+        assert f"but {n} were asked for" in str(error)
+        assert np.pi * radius**2 * n > 0.5 * np.pi * 0.8**2, "refused though there is room"
+        return
+    assert points.shape == (n, 2)
+    shape = shapely.points(points)
+    assert shapely.contains(cluttered.free, shape).all()
+    assert shapely.distance(cluttered.free.boundary, shape).min() >= radius
+    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(n)
+    assert n == 1 or apart.min() >= 2 * radius
+    if name == "corner":
+        assert np.hypot(*(points - [1.0, 1.0]).T).max() <= 0.8 + 1e-9
+
+
+def test_the_same_seed_gives_the_same_positions(cluttered: Environment) -> None:
+    start = cluttered.start("uniform")
+    np.testing.assert_array_equal(start.sample(6, 3), start.sample(6, 3))
+    assert not np.array_equal(start.sample(6, 3), start.sample(6, 4))
+
+
+def test_a_tight_start_is_filled_by_a_lattice() -> None:
+    """75 discs of radius 0.1 m fill 75 % of a disc of radius 1 m: far more than darts can place."""
+    start = Start("tight", DiscStart((5.0, 5.0), 0.9), SQUARE)
+    points = start.sample(62, seed=0)
+    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
+    assert apart.min() >= 0.2
+    with pytest.raises(
+        StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were asked for"
+    ):
+        start.sample(200, seed=0)
+
+
+def test_uniform_starts_cover_the_free_space(cluttered: Environment) -> None:
+    points = np.concatenate([cluttered.start("uniform").sample(40, seed) for seed in range(20)])
+    quarter = shapely.box(5, 5, 10, 10)
+    share = shapely.contains_xy(quarter, points[:, 0], points[:, 1]).mean()
+    expected = cluttered.free.intersection(quarter).area / cluttered.free_area
+    assert share == pytest.approx(expected, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("positions", "n", "message"),
+    [
+        (((1.0, 1.0),), 2, "has 1 positions, but 2 robots were asked for"),
+        (((1.0, 1.0), (1.1, 1.0)), 2, r"positions\[0\] and positions\[1\] are 0.1 m apart"),
+        (((0.05, 1.0),), 1, r"positions\[0\] = \[0.05, 1\] is 0.05 m from a wall"),
+        (((11.0, 1.0),), 1, "inside an obstacle or outside the boundary"),
+    ],
+)
+def test_given_positions_are_checked(positions, n: int, message: str) -> None:
+    with pytest.raises(StartError, match=message):
+        Start("given", PointsStart(positions), SQUARE).sample(n)
+
+
+def test_given_positions_are_taken_in_their_order() -> None:
+    start = Start("given", PointsStart(((1.0, 1.0), (2.0, 1.0), (3.0, 1.0))), SQUARE)
+    np.testing.assert_array_equal(start.sample(2, seed=9), [[1.0, 1.0], [2.0, 1.0]])
+
+
+def test_a_start_without_room_says_so() -> None:
+    with pytest.raises(StartError, match=r"start 'slit': no room for a robot of radius 0.1 m"):
+        Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)

@@ -1,0 +1,139 @@
+"""Mazes: what their walls say against the free space that they leave."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Point
+
+from robocov.environment import Environment, WallObstacle
+from robocov.environment.passages import narrowest_gap
+from robocov.generator import generated_map
+from robocov.generator.mazes import _trails, _tree, _walls
+
+
+def components(count: int, pairs: list[tuple[int, int]]) -> int:
+    group = list(range(count))
+    for i, j in pairs:
+        group = [group[i] if number == group[j] else number for number in group]
+    return len(set(group))
+
+
+@settings(max_examples=60)
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32))
+def test_a_tree_leads_to_every_cell_in_one_way(columns: int, rows: int, seed: int) -> None:
+    passages = _tree((columns, rows), np.random.default_rng(seed))
+    walls = _walls((columns, rows), passages)
+    # inner edges of the grid
+    assert len(passages) + len(walls) == 2 * columns * rows - columns - rows
+    assert len(passages) == columns * rows - 1
+    number = {cell: k for k, cell in enumerate(itertools.product(range(columns), range(rows)))}
+    pairs = []
+    for (i, k), (_, above) in passages:
+        # an upright piece is between a cell and the one to its left
+        other = (i - 1, k) if above > k else (i, k - 1)
+        pairs.append((number[i, k], number[other]))
+    assert components(columns * rows, pairs) == 1
+
+
+@settings(max_examples=60)
+@given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
+def test_trails_have_every_piece_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
+    pieces = {((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn}
+    posts = sorted({post for piece in pieces for post in piece})
+    # closed rings would lock something in: no maze has them
+    forest: set = set()
+    for piece in sorted(pieces):
+        pairs = [(posts.index(a), posts.index(b)) for a, b in (*forest, piece)]
+        if components(len(posts), pairs) == len(posts) - len(pairs):
+            forest.add(piece)
+    found = []
+    for trail in _trails(forest):
+        for (x, y), (u, v) in itertools.pairwise(trail):
+            assert (x == u) != (y == v)
+            steps = max(abs(u - x), abs(v - y))
+            line = [(x + (u - x) * k // steps, y + (v - y) * k // steps) for k in range(steps + 1)]
+            found += [tuple(sorted(pair)) for pair in itertools.pairwise(line)]
+        # a bend at every point between the ends
+        for a, b, c in zip(trail, trail[1:], trail[2:], strict=False):
+            assert (b[0] - a[0]) * (c[1] - b[1]) != (b[1] - a[1]) * (c[0] - b[0])
+    assert len(found) == len(set(found))
+    assert set(found) == forest
+
+
+def corridors(environment: Environment) -> tuple[float, set[float]]:
+    walls = [wall for wall in environment.obstacles if isinstance(wall, WallObstacle)]
+    assert len(walls) == len(environment.obstacles)
+    return len(walls), {wall.width for wall in walls}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> None:
+    environment = generated_map(seed, kind="mazes", obstacles=64, area=0.15)
+    count, (thickness,) = corridors(environment)
+    gap = narrowest_gap(environment.free)
+    assert gap is not None
+    # eight corridors and seven walls side by side, on whole centimetres
+    assert gap.width == pytest.approx((10.0 - 7 * thickness) / 8, abs=0.011)
+    assert 10 < count < 49
+    assert sum(len(wall.points) for wall in environment.obstacles) < 3 * count + 10  # type: ignore[union-attr]
+
+
+def test_there_are_dead_ends_and_ways_round() -> None:
+    for seed in range(20):
+        environment = generated_map(seed, kind="mazes")
+        (free,) = environment.free.geoms
+        # a hole for each way round
+        assert 1 <= len(free.interiors) <= 8
+        (thickness,) = {wall.width for wall in environment.obstacles}  # type: ignore[union-attr]
+        lines = [(10.0 + thickness) / 6 * k - thickness / 2.0 for k in range(7)]
+        middle = (np.array(lines[1:]) + lines[:-1]) / 2.0
+        solid = shapely.union_all([wall.polygon for wall in environment.obstacles])
+        pitch, inside = (10.0 + thickness) / 6, shapely.box(0, 0, 10, 10)
+        sides = pitch / 2.0 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+        walls_around = [
+            sum(
+                solid.buffer(0.02).contains(Point(side)) or not inside.contains(Point(side))
+                for side in at + sides
+            )
+            for at in map(np.array, itertools.product(middle, middle))
+        ]
+        assert walls_around.count(4) == 0
+        assert walls_around.count(3) >= 1
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "width", "height", "cells"),
+    [(36, 10.0, 10.0, (6, 6)), (12, 20.0, 15.0, (4, 3)), (30, 20.0, 8.0, (10, 3)), (37, 10.0, 10.0, (6, 6))],
+)
+def test_the_grid_has_about_as_many_cells_as_are_wanted(
+    obstacles: int, width: float, height: float, cells: tuple[int, int]
+) -> None:
+    found: tuple[set[int], set[int]] = (set(), set())
+    for seed in range(6):
+        environment = generated_map(
+            seed, kind="mazes", obstacles=obstacles, area=0.1, width=width, height=height
+        )
+        assert f"about {obstacles} cells" in environment.description
+        for wall in environment.obstacles:
+            for a, b in itertools.pairwise(wall.points):  # type: ignore[union-attr]
+                axis = int(a[1] == b[1])
+                pitch = ((width, height)[axis] + wall.width) / cells[axis]  # type: ignore[union-attr]
+                line = (a[axis] + wall.width / 2.0) / pitch  # type: ignore[union-attr]
+                assert line == pytest.approx(round(line), abs=0.01)
+                found[axis].add(round(line))
+    assert found == (set(range(1, cells[0])), set(range(1, cells[1])))
+
+
+def test_no_wall_stands_in_the_start() -> None:
+    for seed in range(12):
+        # corridors are narrower than the disc
+        environment = generated_map(seed, kind="mazes", obstacles=144, area=0.15)
+        start = environment.starts["corner"]
+        assert start.radius == 0.6  # type: ignore[union-attr]
+        assert environment.free.contains(Point(start.center).buffer(0.6))  # type: ignore[union-attr]

@@ -1,0 +1,125 @@
+"""The map check: measures against exact values, and a warning for each likely mistake."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from robocov.environment import Environment
+from robocov.errors import StartError
+from robocov.mapfile import from_json
+from robocov.mapfile.check import MapReport, check_map
+
+
+def room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -> Environment:
+    return from_json(
+        {
+            "format": "robocov-map",
+            "version": 1,
+            "name": "room",
+            "boundary": boundary or [[0, 0], [10, 0], [10, 6], [0, 6]],
+            "obstacles": list(obstacles),
+            "starts": starts or {},
+        }
+    )
+
+
+def block(x: float, y: float, width: float, height: float) -> dict[str, Any]:
+    ring = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+    return {"kind": "polygon", "vertices": ring}
+
+
+def test_measures() -> None:
+    environment = room(
+        block(4, 2, 2, 2) | {"holes": [[[4.5, 2.5], [5.5, 2.5], [5.5, 3.5], [4.5, 3.5]]]},
+        {"kind": "wall", "points": [[8, 0], [8, 2]], "width": 0.5},
+        {"kind": "circle", "center": [2, 1], "radius": 0.2},
+    )
+    report = check_map(environment)
+    assert report.area == 60.0
+    assert report.vertices == 4 + 4 + 4 + 2
+    assert report.obstacles == 3
+    assert report.components == pytest.approx((60 - 4 - 1 - 0.1253, 1.0), abs=1e-3)
+    assert report.free_area == pytest.approx(sum(report.components))
+    assert report.free_fraction == pytest.approx(report.free_area / 60)
+    assert report.narrowest_gap is not None
+    assert report.narrowest_gap.width == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_clean_map_has_no_warnings() -> None:
+    assert check_map(room(block(4, 2, 2, 2))).warnings == ()
+
+
+def warned(environment: Environment) -> list[str]:
+    return list(check_map(environment).warnings)
+
+
+def test_a_gap_that_no_robot_passes() -> None:
+    environment = room(block(4, 0, 1, 2.9), block(4, 3.05, 1, 3))
+    assert warned(environment) == [
+        "the gap between [4, 2.9] and [4, 3.05] is 0.15 m wide: a robot of radius 0.1 m does not pass"
+    ]
+    assert check_map(environment, radius=0.07).warnings == ()
+
+
+def test_sealed_rooms_and_pockets() -> None:
+    # the wall leaves 24 m² in the west and 30 m² in the east; the pocket is 0.05 m by 1 m, half of it filled
+    environment = room(block(4, 0, 1, 6), block(0.05, 0, 1, 1), block(0, 1, 1.05, 1), block(0, 0, 0.05, 0.5))
+    first, second = warned(environment)
+    assert first.startswith("sealed room of 21.9 m² around [")
+    assert second == "1 sealed pocket smaller than a robot, 0.025 m² together"
+
+
+def test_an_obstacle_outside() -> None:
+    outside = {"kind": "circle", "center": [20, 2], "radius": 0.5, "name": "tree"}
+    assert warned(room(block(4, 2, 1, 1), outside)) == [
+        "obstacles[1] (tree) is entirely outside the boundary"
+    ]
+    assert warned(room(block(10, 2, 1, 1))) == ["obstacles[0] is entirely outside the boundary"]
+    assert warned(room(block(9.5, 2, 1, 1))) == []
+
+
+def test_vertices_given_twice() -> None:
+    twice = block(4, 2, 1, 1)
+    twice["vertices"].insert(2, list(twice["vertices"][2]))
+    closed = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]
+    assert warned(room(twice, boundary=closed)) == [
+        "boundary[4] and the next vertex are the same place",
+        "obstacles[0].vertices[2] and the next vertex are the same place",
+    ]
+    loop = {"kind": "wall", "points": [[4, 2], [5, 2], [5, 3], [4, 2]], "width": 0.1}
+    assert not any("same place" in line for line in warned(room(loop)))
+
+
+def test_given_positions_without_room() -> None:
+    starts = {"tight": {"kind": "points", "positions": [[1, 1], [1.1, 1]]}}
+    (line,) = warned(room(starts=starts))
+    assert "start 'tight': positions[0] and positions[1] are 0.1 m apart" in line
+
+
+def test_capacity_is_about_what_fits() -> None:
+    starts = {
+        "disc": {"kind": "disc", "center": [2, 2], "radius": 0.8},
+        "half": {"kind": "disc", "center": [0, 2], "radius": 0.8},
+        "given": {"kind": "points", "positions": [[1, 1], [2, 1], [3, 1]]},
+    }
+    environment = room(starts=starts)
+    capacity = {start.name: start.capacity for start in check_map(environment).starts}
+    assert capacity["given"] == 3
+    assert capacity["half"] < 0.6 * capacity["disc"]
+    for name in ("disc", "half"):
+        environment.start(name).sample(int(0.8 * capacity[name]))
+        with pytest.raises(StartError):
+            environment.start(name).sample(int(1.5 * capacity[name]) + 2)
+
+
+def test_the_report_is_json() -> None:
+    report = check_map(room(block(4, 1, 2, 2), starts={"all": {"kind": "uniform"}}))
+    document = json.loads(json.dumps(report.to_dict()))
+    assert document["free_area_m2"] == 56.0
+    assert document["narrowest_gap_m"] == 1.0
+    assert document["starts"]["all"]["kind"] == "uniform"
+    assert isinstance(report, MapReport)
+    assert json.loads(json.dumps(check_map(room()).to_dict()))["narrowest_gap_m"] is None

@@ -1,0 +1,243 @@
+"""Densities in maps: read, refused with their place, written and read again; pictures beside a map."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from density_cases import KINDS
+from example_map import SCHEMA
+from PIL import Image
+
+from robocov.density import FINEST, Gaussians, Raster, Uniform, WeightedPolygons
+from robocov.environment import Environment
+from robocov.errors import MapError
+from robocov.mapfile import dump_map, from_json, load_map, parse_map, save_map, to_json
+from robocov.mapfile.density import MOST_BYTES
+
+RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
+PLAIN = to_json(Environment("plain", RING))
+
+
+def with_density(density) -> dict:
+    return PLAIN | {"density": density}
+
+
+@pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
+def test_round_trip(density, tmp_path):
+    environment = Environment("weighed", RING, density=density)
+    document = to_json(environment)
+    SCHEMA.validate(document)
+    assert from_json(document) == environment
+    assert parse_map(dump_map(environment), "again").density == density
+    save_map(environment, tmp_path / "weighed.json")
+    assert load_map(tmp_path / "weighed.json") == environment
+    assert "density" not in to_json(Environment("plain", RING))
+
+
+def test_what_can_be_left_out():
+    assert from_json(with_density({"kind": "uniform"})).density == Uniform(1.0)
+    peaks = [{"center": [1, 2], "sigma": 0.5, "weight": 3}]
+    density = from_json(with_density({"kind": "gaussians", "peaks": peaks})).density
+    assert isinstance(density, Gaussians) and density.floor == 0.0
+    density = from_json(with_density({"kind": "polygons", "areas": []})).density
+    assert isinstance(density, WeightedPolygons) and density.background == 1.0
+    density = from_json(with_density({"kind": "raster", "rows": [[1, 2], [3, 4]]})).density
+    assert isinstance(density, Raster) and density.extent == (0.0, 0.0, 10.0, 6.0)
+    assert density.values.tolist() == [[3.0, 4.0], [1.0, 2.0]]  # the file has the top row first
+    assert density.interpolation == "bilinear"
+    assert from_json(with_density(None)).density is None
+
+
+def test_each_row_of_a_raster_stands_on_a_line_of_its_own():
+    text = dump_map(Environment("weighed", RING, density=Raster(np.eye(2), (0.0, 0.0, 10.0, 6.0), "cells")))
+    assert '    "rows": [\n      [0, 1],\n      [1, 0]\n    ]' in text
+
+
+PEAK = {"center": [1, 2], "sigma": 0.5, "weight": 3}
+AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
+
+
+@pytest.mark.parametrize(
+    ("density", "words"),
+    [
+        (3, "density: 3, but an object whose kind is one of uniform, gaussians, polygons, raster was"),
+        ({}, "density.kind: missing"),
+        ({"kind": "gaussian"}, "density.kind: \"gaussian\", but one of .* (did you mean 'gaussians'?)"),
+        ({"kind": "uniform", "weight": 0}, "density.weight: all places count 0"),
+        ({"kind": "uniform", "weight": -1}, "density.weight: -1, but a number from 0 to 1000000 was"),
+        ({"kind": "uniform", "weight": True}, "density.weight: true, but a number"),
+        ({"kind": "gaussians"}, "density.peaks: missing"),
+        ({"kind": "gaussians", "peaks": [3]}, "density.peaks[0]: 3, but an object was"),
+        ({"kind": "gaussians", "peaks": []}, "density: all places count 0"),
+        (
+            {"kind": "gaussians", "peaks": [PEAK, {**PEAK, "wight": 1}]},
+            "density.peaks[1]: unknown key 'wight': did you mean 'weight'?",
+        ),
+        ({"kind": "gaussians", "floor": "x", "peaks": [PEAK]}, 'density.floor: "x", but a number from 0'),
+        ({"kind": "gaussians", "peaks": [{**PEAK, "center": [1]}]}, "density.peaks[0].center: [1], but a"),
+        ({"kind": "gaussians", "peaks": [{**PEAK, "sigma": 0}]}, "density.peaks[0].sigma: 0, but a number"),
+        (
+            {"kind": "gaussians", "peaks": [{"center": [1, 2], "weight": 1}]},
+            "density.peaks[0]: neither of sigma and covariance",
+        ),
+        (
+            {"kind": "gaussians", "peaks": [{**PEAK, "covariance": [[1, 0], [0, 1]]}]},
+            "density.peaks[0]: both of sigma and covariance",
+        ),
+        (
+            {"kind": "gaussians", "peaks": [{"center": [1, 2], "weight": 1, "covariance": [[1, 2], [2, 1]]}]},
+            "density.peaks[0].covariance: [[1.0, 2.0], [2.0, 1.0]], but a symmetric, positive definite",
+        ),
+        ({"kind": "polygons", "background": 0, "areas": []}, "density: all places count 0"),
+        (
+            {"kind": "polygons", "areas": [{**AREA, "vertices": [[1, 1], [2, 1]]}]},
+            "density.areas[0].vertices: [[1, 1], [2, 1]], but a list of at least 3 points",
+        ),
+        (
+            {"kind": "polygons", "areas": [{**AREA, "vertices": [[1, 1], [3, 3], [3, 1], [1, 3]]}]},
+            "density.areas[0].vertices[",
+        ),
+        (
+            {"kind": "polygons", "areas": [{**AREA, "holes": [[[5, 5], [6, 5], [6, 6]]]}]},
+            "density.areas[0].holes[0]: sticks out of density.areas[0].vertices",
+        ),
+        (
+            {
+                "kind": "polygons",
+                "background": 0,
+                "areas": [{**AREA, "vertices": [[90, 1], [92, 1], [92, 3]]}],
+            },
+            "density: all places in the free space count 0",
+        ),
+        ({"kind": "raster"}, "density: neither of rows and picture"),
+        ({"kind": "raster", "rows": [[1]], "picture": "a.png"}, "density: both of rows and picture"),
+        ({"kind": "raster", "rows": []}, f"density.rows: [], but a list of 1 to {FINEST} rows"),
+        ({"kind": "raster", "rows": [[1] * (FINEST + 1)]}, f"but a list of 1 to {FINEST} numbers was"),
+        ({"kind": "raster", "rows": [[1, 2], [1]]}, "density.rows[1]: 1 numbers, but 2, as in the first"),
+        ({"kind": "raster", "rows": [[1, -1]]}, "density.rows[0][1]: -1, but a number from 0"),
+        ({"kind": "raster", "rows": [[0, 0]]}, "density.rows: all places count 0"),
+        ({"kind": "raster", "rows": [[1]], "extent": [0, 0, 0, 1]}, "density.extent: [0.0, 0.0, 0.0, 1.0]"),
+        ({"kind": "raster", "rows": [[1]], "interpolation": "cubic"}, 'density.interpolation: "cubic"'),
+        ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: is for a picture"),
+        ({"kind": "raster", "picture": "a.png"}, 'density.picture: "a.png": a map that is no file'),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_what_is_wrong_is_told_with_its_place(density, words):
+    with pytest.raises(MapError) as caught:
+        from_json(with_density(density), "mine.json")
+    start, _, end = words.partition(".* ")
+    message = str(caught.value)
+    assert message.startswith("mine.json: ") and start in message and end in message
+    assert "\n" not in message
+
+
+def test_in_a_file_with_line_and_column():
+    text = json.dumps(with_density({"kind": "gaussians", "peaks": [{**PEAK, "sigma": -1}]}), indent=1)
+    with pytest.raises(MapError) as caught:
+        parse_map(text, "mine.json")
+    line = text.splitlines()[caught.value.line - 1]
+    assert '"sigma": -1' in line and str(caught.value).startswith(f"mine.json:{caught.value.line}:")
+
+
+def test_what_is_nearly_nothing_is_nothing():
+    """Else it would be nothing once it has been written and read again."""
+    for density in (
+        {"kind": "uniform", "weight": 1e-16},
+        {"kind": "raster", "rows": [[1e-12, 0]]},
+        {"kind": "gaussians", "floor": 1e-300, "peaks": []},
+    ):
+        with pytest.raises(MapError, match="all places count 0"):
+            from_json(with_density(density))
+    tiny = from_json(with_density({"kind": "raster", "rows": [[1e-12, 1]]}))
+    assert tiny.density.lowest == 0.0 and parse_map(dump_map(tiny), "again") == tiny
+    flat = {"kind": "polygons", "areas": [{**AREA, "vertices": [[0, 0], [9, 0], [9, 5], [0, 1e-320]]}]}
+    assert from_json(with_density(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)
+
+
+# pictures
+
+
+def map_with(folder: Path, picture: str, **more) -> Path:
+    path = folder / "mine.json"
+    path.write_text(json.dumps(with_density({"kind": "raster", "picture": picture, **more})))
+    return path
+
+
+def grey(path: Path, rows, mode: str = "L") -> None:
+    kind = np.uint16 if mode == "I;16" else np.uint8
+    Image.fromarray(np.array(rows, dtype=kind)).save(path)
+
+
+def test_a_picture_beside_the_map(tmp_path):
+    grey(tmp_path / "phi.png", [[0, 255], [51, 102]])
+    density = load_map(map_with(tmp_path, "phi.png", black=1, white=6)).density
+    assert isinstance(density, Raster)
+    assert density.values.tolist() == [[2.0, 3.0], [1.0, 6.0]]
+    (tmp_path / "more").mkdir()
+    grey(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
+    density = load_map(map_with(tmp_path, "more/deep.png", extent=[0, 0, 10, 6])).density
+    assert isinstance(density, Raster) and density.values.tolist() == [[0.0, 1.0]]
+    Image.fromarray(np.full((2, 2, 3), 255, dtype=np.uint8)).save(tmp_path / "colour.png")
+    assert load_map(map_with(tmp_path, "colour.png")).density.values.min() == 1.0
+    (tmp_path / "phi.pgm").write_bytes(b"P5 2 1 255\n\x00\xff")
+    assert load_map(map_with(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
+
+
+def test_what_was_a_picture_is_written_as_rows(tmp_path):
+    grey(tmp_path / "phi.png", [[0, 200], [7, 102]])
+    environment = load_map(map_with(tmp_path, "phi.png", black=0.1, white=5))
+    document = to_json(environment)
+    assert "picture" not in document["density"] and from_json(document) == environment
+    save_map(environment, tmp_path / "again.json")
+    (tmp_path / "phi.png").unlink()
+    assert load_map(tmp_path / "again.json") == environment
+
+
+@pytest.mark.parametrize(
+    "name", ["../phi.png", "/etc/passwd", "C:\\phi.png", "\\\\host\\phi.png", "a/../../phi.png", "C:phi.png"]
+)
+def test_a_picture_stays_in_the_folder(tmp_path, name):
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    grey(tmp_path / "phi.png", [[1, 2]])
+    with pytest.raises(MapError, match="leaves the folder of the map"):
+        load_map(map_with(folder, name))
+
+
+def test_nor_does_a_link_lead_out_of_it(tmp_path):
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    grey(tmp_path / "phi.png", [[1, 2]])
+    (folder / "link.png").symlink_to(tmp_path / "phi.png")
+    with pytest.raises(MapError, match="leaves the folder of the map"):
+        load_map(map_with(folder, "link.png"))
+
+
+def test_pictures_that_cannot_be_used(tmp_path):
+    def refused(name: str, **more) -> str:
+        with pytest.raises(MapError) as caught:
+            load_map(map_with(tmp_path, name, **more))
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    assert 'density.picture: "none.png": no such file' in refused("none.png")
+    (tmp_path / "text.png").write_text("not a picture")
+    assert "cannot be read as PNG or PGM" in refused("text.png")
+    grey(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
+    (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:-2000])
+    assert "cannot be read as PNG or PGM" in refused("cut.png")
+    (tmp_path / "wide.pgm").write_bytes(b"P5 1025 1 255\n" + bytes(1025))
+    assert f"1025 x 1 pixels, but at most {FINEST} each way" in refused("wide.pgm")
+    (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
+    assert "100000 x 100000 pixels" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
+    with (tmp_path / "heavy.png").open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    assert "larger than 8 MB" in refused("heavy.png")
+    grey(tmp_path / "black.png", [[0, 0]])
+    assert "density.picture: all places count 0" in refused("black.png")
+    (tmp_path / "folder.png").mkdir()
+    assert "no such file" in refused("folder.png")

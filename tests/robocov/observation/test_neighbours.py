@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.observation.neighbours import Neighbours, close_pairs
+
+
+@given(n=st.integers(1, 120), reach=st.floats(0.0, 8.0), seed=st.integers(0, 2**32))
+def test_close_pairs_agree_with_all_distances(n: int, reach: float, seed: int) -> None:
+    positions = np.random.default_rng(seed).uniform(0, 10, size=(n, 2))
+    first, second, distance = close_pairs(positions, reach)
+    expected = [
+        (i, j)
+        for i in range(n)
+        for j in range(n)
+        if i != j and np.hypot(*(positions[i] - positions[j])) <= reach
+    ]
+    assert list(zip(first.tolist(), second.tolist(), strict=True)) == expected
+    np.testing.assert_allclose(distance, np.hypot(*(positions[first] - positions[second]).T))
+
+
+@given(n=st.integers(1, 60), seed=st.integers(0, 2**32))
+def test_two_robots_are_neighbours_when_both_are_in_range(n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform(0, 10, size=(n, 2))
+    ranges = rng.uniform(0, 8, size=n)
+    neighbours = Neighbours.within(positions, ranges)
+    assert not neighbours.complete
+    for i in range(n):
+        expected = [
+            j
+            for j in range(n)
+            if j != i and np.hypot(*(positions[i] - positions[j])) <= min(ranges[i], ranges[j])
+        ]
+        assert neighbours.of(i).tolist() == expected
+
+
+def test_without_limits_everybody_hears_everybody() -> None:
+    positions = np.array([[0.0, 0.0], [1e5, 0.0], [0.0, 2.0]])
+    neighbours = Neighbours.within(positions, np.full(3, np.inf))
+    assert neighbours.complete
+    assert neighbours.of(1).tolist() == [0, 2]
+    first, second, _ = neighbours.closer_than(positions, 5.0)
+    assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
+
+
+def test_close_pairs_of_neighbours_only() -> None:
+    positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
+    neighbours = Neighbours.within(positions, np.array([0.5, 3.0, 3.0]))
+    first, second, distance = neighbours.closer_than(positions, 2.0)
+    assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
+    np.testing.assert_allclose(distance, 0.5)

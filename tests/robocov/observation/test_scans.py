@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robocov.environment import Environment
+from robocov.errors import ParameterError
+from robocov.observation import Decision, Observations
+from robocov.observation.scans import Scanning, headings
+from robocov.sensor import RangeSensor
+from robocov.simulation import Simulation
+from robocov.world.solid import solid_pieces
+
+
+class Looking:
+    """Stands still, and remembers when it was given scans."""
+
+    name, label, summary = "looking", "Looking", "stands still"
+    scanning = Scanning(rays=8, period=0.1)
+
+    def begin(self, region: object, team: object) -> tuple[float, ...]:
+        return ()
+
+    def decide(self, seen: Observations, memory: tuple[float, ...]) -> Decision:
+        if seen.scans is not None:
+            assert seen.scans.distances.shape == seen.scans.hit.shape == (len(seen.positions), 8)
+            assert not seen.scans.distances.flags.writeable
+            memory = (*memory, round(seen.time, 9))
+        return Decision(np.zeros_like(seen.positions), memory=memory)
+
+
+def test_scans_come_when_they_are_asked_for(cluttered: Environment) -> None:
+    simulation = Simulation(cluttered, Looking(), [[1.0, 2.0], [1.5, 2.0]], dt=0.02)
+    for _ in range(11):
+        simulation.step()
+    assert simulation.memory == (0.0, 0.1, 0.2)
+    twin = simulation.copy()
+    for each in (simulation, twin):
+        for _ in range(5):
+            each.step()
+        assert each.memory == (0.0, 0.1, 0.2, 0.3)
+
+
+def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None:
+    sensor = RangeSensor(solid_pieces(cluttered))
+    places = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
+    ranges = np.array([0.7, 2.0, np.inf])
+    distances, hit = sensor.scans(places, 36, ranges)
+    for i in range(3):
+        alone, points = sensor.scan(places[i], 36, float(ranges[i]))
+        assert np.array_equal(alone, distances[i])
+        ends = places[i] + distances[i][:, None] * headings(36)
+        np.testing.assert_allclose(points, ends, atol=1e-9)
+        assert np.array_equal(hit[i], distances[i] < min(ranges[i], 1e6))
+    assert hit[2].all()
+    assert not hit[0].all()
+
+
+def test_the_direct_ray_queries_are_the_public_ones(cluttered: Environment) -> None:
+    sensor, public = (RangeSensor(solid_pieces(cluttered)) for _ in range(2))
+    assert sensor._direct is not None
+    public._direct = None
+    places = np.random.default_rng(0).uniform(0.2, 4.8, size=(20, 2))
+    for one, other in zip(
+        *(each.scans(places, 30, np.full(20, 2.0)) for each in (sensor, public)), strict=True
+    ):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"rays": 0}, "scanning.rays: 0, but a whole number from 1 to 3600"),
+        ({"rays": 2.5}, "scanning.rays: 2.5"),
+        ({"rays": True}, "scanning.rays: True"),
+        ({"period": -1.0}, "scanning.period: -1"),
+        ({"period": float("nan")}, "scanning.period: nan"),
+    ],
+)
+def test_what_cannot_be_scanned_is_told(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        Scanning(**values)  # type: ignore[arg-type]
+
+
+def test_periods_are_whole_steps() -> None:
+    assert Scanning(period=0.5).every(1 / 60) == 30
+    assert Scanning(period=0.0).every(0.02) == 1
+    np.testing.assert_allclose(headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)

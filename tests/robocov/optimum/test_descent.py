@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import pdist
+
+from robocov.cost import CoverageCost
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.optimum.descent import Room, _direction, descended
+
+OFFICE = Environment(
+    "office",
+    ((0, 0), (12, 0), (12, 5), (9, 5), (9, 8), (0, 8)),
+    (
+        WallObstacle(((4, 0), (4, 3), (6.5, 3)), 0.2),
+        WallObstacle(((3, 8), (3, 5)), 0.2),
+        CircleObstacle((8.5, 2.5), 0.8),
+        PolygonObstacle(((5, 5), (7, 4.5), (6.5, 6.5))),
+    ),
+)
+COST = CoverageCost(OFFICE, 40)
+RADIUS = 0.15
+ROOM = Room(OFFICE.free, RADIUS)
+EMPTY = Environment("empty", ((0, 0), (6, 0), (6, 6), (0, 6)))
+
+
+def starts(seed, count):
+    """Return places in the room that are far enough apart."""
+    rng = np.random.default_rng(seed)
+    positions = ROOM.nearest(rng.uniform((0, 0), (12, 8), (count, 2)), np.zeros(count, dtype=int))
+    assert positions is not None
+    return positions
+
+
+def clear(positions, radius, free):
+    distance = shapely.distance(free.boundary, shapely.points(positions))
+    inside = shapely.contains_properly(free, shapely.points(positions))
+    return bool((distance >= radius).all() and inside.all() and (pdist(positions) >= 2 * radius).all())
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32), st.integers(1, 30))
+def test_robots_are_moved_to_where_they_fit(seed, count):
+    rng = np.random.default_rng(seed)
+    # half of them in heaps
+    wanted = np.where(rng.random((count, 1)) < 0.5, rng.uniform((-2, -2), (14, 10), (count, 2)), [5.0, 4.0])
+    positions = ROOM.nearest(wanted, np.zeros(count, dtype=int))
+    assert positions is not None
+    assert clear(positions, RADIUS, OFFICE.free)
+    # what fits stays
+    again = ROOM.nearest(positions, np.zeros(count, dtype=int))
+    np.testing.assert_array_equal(again, positions)
+
+
+def test_where_robots_do_not_fit_there_is_no_place():
+    closet = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)))
+    room = Room(closet.free, 0.2)
+    middle = np.full((5, 2), 0.5)
+    assert room.nearest(middle[:4], np.zeros(4, dtype=int)) is not None
+    assert room.nearest(middle, np.zeros(5, dtype=int)) is None
+
+
+def test_robots_stay_in_their_component():
+    halves = Environment("halves", EMPTY.boundary, (WallObstacle(((3.5, 0), (3.5, 6)), 0.1),))
+    room = Room(halves.free, 0.1)
+    assert [part.centroid.x < 3.5 for part in room.parts] == [True, False]
+    wanted = np.array([[5.0, 2.0], [1.0, 2.0]])
+    positions = room.nearest(wanted, np.array([0, 1]))
+    np.testing.assert_allclose(positions, [[3.348, 2.0], [3.652, 2.0]], atol=1e-9)
+    result = descended(CoverageCost(halves, 24), room, positions, np.array([0, 1]))
+    np.testing.assert_allclose(result.positions, [[1.725, 3.0], [4.775, 3.0]], atol=0.03)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32), st.integers(1, 12))
+def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
+    begin = starts(seed, count)
+    before = COST(begin)
+    result = descended(COST, ROOM, begin, np.zeros(count, dtype=int))
+    assert result.mean_distance <= before.mean_distance
+    assert clear(result.positions, RADIUS, OFFICE.free)
+    assert COST(result.positions).mean_distance == result.mean_distance
+    # steps around it gain next to nothing
+    rng = np.random.default_rng(seed)
+    for size in (0.2, 0.02, 0.002):
+        for _ in range(8):
+            moved = ROOM.nearest(
+                result.positions + size * rng.normal(size=(count, 2)), np.zeros(count, dtype=int)
+            )
+            assert moved is None or COST(moved).mean_distance >= result.mean_distance * (1.0 - 2e-5)
+
+
+def test_one_robot_ends_at_the_geometric_median_whatever_the_start():
+    triangle = Environment("triangle", ((0, 0), (6, 0), (0, 4)))
+    cost, room = CoverageCost(triangle, 48), Room(triangle.free, 0.1)
+    # Weiszfeld's iteration over the same sites
+    median = cost.points.mean(axis=0)
+    for _ in range(500):
+        weight = 1.0 / np.hypot(*(cost.points - median).T)
+        median = weight @ cost.points / weight.sum()
+    for begin in ([[0.2, 0.2]], [[5.0, 0.3]], [[1.0, 2.9]]):
+        result = descended(cost, room, np.array(begin), np.zeros(1, dtype=int))
+        np.testing.assert_allclose(result.positions[0], median, atol=2e-3)
+
+
+def test_giving_up():
+    steps = []
+
+    def beat():
+        steps.append(1)
+        if len(steps) == 3:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        descended(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), beat)
+    assert len(steps) == 3
+
+
+def test_where_nothing_can_be_gained_robots_stay():
+    # a component without a site: its robot has no slope
+    closet = Environment("closet", EMPTY.boundary, (WallObstacle(((0.25, 0), (0.25, 6)), 0.02),))
+    cost, room = CoverageCost(closet, 6), Room(closet.free, 0.1)
+    begin = np.array([[0.12, 1.0], [3.0, 3.0]])
+    result = descended(cost, room, begin, np.array([1, 0]))
+    np.testing.assert_array_equal(result.positions[0], begin[0])
+    only = descended(cost, room, begin[:1], np.array([1]))
+    assert np.isnan(only.mean_distance)
+
+
+def test_what_was_learnt_of_a_quadratic_leads_to_its_minimum():
+    rng = np.random.default_rng(4)
+    half = rng.normal(size=(4, 4))
+    bowl = half @ half.T + np.eye(4)
+    steps = np.linalg.eigh(bowl)[1].T.reshape(4, 2, 2)
+    learnt = deque()
+    for step in steps:
+        bend = (bowl @ step.ravel()).reshape(2, 2)
+        learnt.append((step, bend, 1.0 / np.vdot(step, bend)))
+    slope = rng.normal(size=(2, 2))
+    way = _direction(slope, np.ones((2, 1)), learnt)
+    np.testing.assert_allclose(bowl @ way.ravel(), -slope.ravel(), atol=1e-12)
+
+
+def test_some_tens_of_steps_are_enough():
+    steps = []
+    for seed in range(6):
+        before = len(steps)
+        descended(COST, ROOM, starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
+        assert len(steps) - before < 60
+    assert len(steps) / 6 < 35

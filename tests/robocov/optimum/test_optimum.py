@@ -1,0 +1,296 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from itertools import combinations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+from scipy.spatial.distance import pdist
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.errors import ParameterError
+from robocov.generator import generated_map
+from robocov.mapfile import load_map
+from robocov.optimum import optimum
+from robocov.optimum.interchange import seeded
+from robocov.optimum.search import _Search
+
+
+def room(width, height, *obstacles, name="room"):
+    return Environment(name, ((0, 0), (width, 0), (width, height), (0, height)), obstacles)
+
+
+def box(x0, y0, x1, y1):
+    return PolygonObstacle(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+
+
+L_ROOM = room(4, 4, box(2, 2, 4, 4), name="L")
+TRAP = room(5, 4, WallObstacle(((2.5, 0), (2.5, 2.8), (4, 2.8)), 0.1), box(0.8, 2.6, 1.6, 3.2), name="trap")
+
+
+def test_one_robot_stands_in_the_middle_of_a_square():
+    best = optimum(room(4, 4), 1, restarts=3)
+    np.testing.assert_allclose(best.positions, [[2, 2]], atol=1e-3)
+    # the mean distance in a square from its middle
+    assert best.mean_distance == pytest.approx(4 * 0.3825978582, rel=1e-4)
+    assert best.value == pytest.approx(best.mean_distance * 16.0)
+    assert best.uncovered_area == 0.0
+    assert best.agreement() == 1.0
+
+
+def test_four_robots_stand_in_the_middles_of_the_quarters():
+    best = optimum(room(4, 4), 4)
+    np.testing.assert_allclose(best.positions, [[1, 1], [1, 3], [3, 1], [3, 3]], atol=2e-3)
+
+
+def test_two_robots_halve_a_corridor():
+    best = optimum(room(20, 0.5), 2, lattice=200, restarts=4)
+    np.testing.assert_allclose(best.positions, [[5, 0.25], [15, 0.25]], atol=0.01)
+
+
+def test_one_robot_stands_where_a_search_of_the_whole_plane_finds_it():
+    arms = room(9, 5, box(0, 0, 4, 4), box(5, 0, 9, 4), name="T")
+    best = optimum(arms, 1, restarts=4)
+    cost = CoverageCost(arms, 64)
+    x, y = (part.ravel() for part in np.mgrid[0.1:8.95:0.1, 0.1:4.95:0.1])
+    inside = shapely.contains_xy(arms.free.buffer(-0.1), x, y)
+    places = np.column_stack([x, y])[inside]
+    means = np.array([cost(place[None]).mean_distance for place in places])
+    assert best.mean_distance <= means.min()
+    np.testing.assert_allclose(best.positions[0], places[means.argmin()], atol=0.1)
+
+
+@pytest.mark.parametrize("where", [L_ROOM, TRAP], ids=lambda where: where.name)
+def test_no_pair_of_sites_is_better_than_two_robots(where):
+    lattice = 20
+    cost = CoverageCost(where, lattice)
+    away = shapely.distance(where.free.boundary, shapely.points(cost.points))
+    places = np.nonzero(away >= 0.102)[0]
+    table = cost.geodesics.distances(cost.points[places], cost.points)
+    of_all = min(np.minimum(table[i], table[j]).mean() for i, j in combinations(range(len(places)), 2))
+    best = optimum(where, 2, lattice=lattice)
+    assert best.mean_distance <= of_all
+    # some site is at most half a diagonal away from each robot, and not much more where walls are near
+    assert best.mean_distance >= of_all - cost.spacing
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_no_descent_of_another_kind_ends_below(count):
+    cost = CoverageCost(TRAP, 24)
+    room = TRAP.free.buffer(-0.102)
+    shapely.prepare(room)
+
+    def penalised(flat):
+        positions = flat.reshape(-1, 2)
+        points = shapely.points(positions)
+        off = shapely.distance(room, points)
+        ends = shapely.get_coordinates(shapely.shortest_line(np.full(count, room), points))[::2]
+        return cost(np.where(off[:, None] > 0, ends, positions)).mean_distance + off.sum()
+
+    rng = np.random.default_rng(count)
+    ends = []
+    for _ in range(6):
+        begin = rng.uniform((0, 0), (5, 4), (count, 2))
+        found = minimize(penalised, begin.ravel(), method="Nelder-Mead", options={"maxfev": 300})
+        ends.append(found.fun)
+    best = optimum(TRAP, count, lattice=24)
+    assert best.mean_distance <= min(ends) * (1.0 + 1e-6)
+    # and the comparison means something
+    assert min(ends) < best.mean_distance * 1.05
+
+
+def lloyds(cost, positions):
+    """Return the cost of Lloyd's iteration with geodesic distances: each robot to its cell's best site."""
+    table = cost.geodesics.distances(cost.points, cost.points)
+    reached = cost(positions)
+    while True:
+        moved = reached.positions.copy()
+        for robot in range(len(moved)):
+            cell = np.nonzero(reached.owner == robot)[0]
+            if len(cell):
+                moved[robot] = cost.points[table[:, cell].sum(axis=1).argmin()]
+        after = cost(moved)
+        if not after.mean_distance < reached.mean_distance:
+            return reached.mean_distance
+        reached = after
+
+
+@pytest.mark.parametrize("name", ["rooms", "museum", "blocks-a", "trap"])
+def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name):
+    where, lattice, restarts = load_map(name), 16, 6
+    best = optimum(where, 5, lattice=lattice, restarts=restarts, seed=3)
+    search = _Search(where, CoverageCost(where, lattice), 5, 0.1)
+    ends = []
+    for restart in range(restarts):
+        drawn = seeded(search.table, 5, np.random.default_rng([3, restart]))
+        begin = search.places[drawn]
+        assert best.costs[restart] <= best.undescended[restart] <= search.cost(begin).mean_distance
+        ends.append(lloyds(search.cost, begin))
+    assert best.mean_distance <= min(ends)
+    assert best.costs.min() == best.mean_distance == best.costs[best.restart]
+    assert best.gap(min(ends)) == min(ends) / best.mean_distance - 1.0 >= 0.0
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 2**20), st.sampled_from(["polygons", "blocks", "rooms"]), st.integers(1, 9))
+def test_positions_are_clear_and_the_cost_is_theirs(seed, kind, robots):
+    where = generated_map(seed, kind=kind, side=8.0, gap=0.4)
+    best = optimum(where, robots, lattice=24, restarts=3, seed=seed)
+    assert best.positions.shape == (robots, 2)
+    points = shapely.points(best.positions)
+    assert shapely.contains_properly(where.free, points).all()
+    assert (shapely.distance(where.free.boundary, points) >= 0.1).all()
+    assert robots == 1 or (pdist(best.positions) >= 0.2).all()
+    assert (np.diff(best.positions[:, 0]) >= 0).all()
+    again = CoverageCost(where, 24)(best.positions)
+    assert again.mean_distance == pytest.approx(best.mean_distance, rel=1e-12)
+    assert again.value == pytest.approx(best.value, rel=1e-12)
+    assert again.uncovered_area == best.uncovered_area == 0.0
+
+
+def test_more_restarts_are_never_worse_and_begin_alike():
+    where = load_map("museum")
+    found = [optimum(where, 6, lattice=24, restarts=restarts, seed=1) for restarts in (1, 2, 5, 9)]
+    costs = [best.mean_distance for best in found]
+    assert costs == sorted(costs, reverse=True)
+    assert costs[0] > costs[-1]
+    for best in found:
+        np.testing.assert_array_equal(best.costs, found[-1].costs[: len(best.costs)])
+
+
+def test_the_same_seed_gives_the_same_bytes_also_in_another_process():
+    script = (
+        "import sys\nfrom robocov.mapfile import load_map\nfrom robocov.optimum import optimum\n"
+        "best = optimum(load_map('trap'), 4, lattice=32, restarts=4, seed=5)\n"
+        "sys.stdout.write(best.positions.tobytes().hex() + best.costs.tobytes().hex())"
+    )
+    best = optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=5)
+    here = best.positions.tobytes().hex() + best.costs.tobytes().hex()
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == here
+    other = optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=6)
+    assert other.costs.tobytes() != best.costs.tobytes()
+
+
+def test_the_largest_components_are_covered_first():
+    halves = room(12, 4, box(7, 0, 7.2, 4), box(9.4, 0, 9.6, 4), name="three")
+    areas = [28.0, 9.6, 8.8]
+    for robots in (1, 2, 3, 5):
+        best = optimum(halves, robots, lattice=48, restarts=4)
+        assert best.uncovered_area == pytest.approx(sum(areas[robots:]))
+        assert best.costs.min() == best.mean_distance
+    # of five the largest room gets three
+    assert (best.positions[:, 0] < 7).sum() == 3
+    one = optimum(halves, 1, lattice=48, restarts=2)
+    np.testing.assert_allclose(one.positions, [[3.5, 2.0]], atol=0.02)
+
+
+def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
+    halves = room(12, 4, box(9, 0, 9.2, 4), name="halves")
+
+    def all_in_the_small_one(table, count, rng):
+        # what is far from most is there
+        return np.argsort(table.sum(axis=1))[::-1][:count]
+
+    monkeypatch.setattr("robocov.optimum.search.seeded", all_in_the_small_one)
+    search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
+    drawn = search.places[all_in_the_small_one(search.table, 3, None)]
+    best = optimum(halves, 3, lattice=32, restarts=1)
+    assert (drawn[:, 0] > 9.2).all()
+    assert search.cost(drawn).mean_distance < best.mean_distance
+    assert best.uncovered_area == 0.0
+
+
+@pytest.mark.parametrize("name", ["museum", "trap"])
+def test_the_table_holds_about_the_exact_sums_over_all_sites(name):
+    where = load_map(name)
+    search = _Search(where, CoverageCost(where, 64), 6, 0.1)
+    assert 300 < search.table.shape[1] < 1100 < len(search.cost.points)
+    some = np.random.default_rng(0).choice(len(search.places), 40, replace=False)
+    exact = [search.cost(search.places[k][None]).mean_distance for k in some]
+    means = search.table[some].sum(axis=1) / len(search.cost.points)
+    np.testing.assert_allclose(means, exact, rtol=0.01)
+
+
+def test_places_for_robots_fill_the_room():
+    where = load_map("museum")
+    search = _Search(where, CoverageCost(where, 32), 6, 0.1)
+    assert 500 < len(search.places) < 900
+    (part,) = search.room.parts
+    assert shapely.covers(part, shapely.points(search.places)).all()
+    apart = pdist(search.places).min()
+    assert apart >= search.room.spacing
+    # no place of the room is farther from all of them than they are from each other
+    assert part.difference(shapely.MultiPoint(search.places).buffer(1.5 * apart)).area < 1e-6 * part.area
+
+
+def test_pockets_where_no_robot_fits_or_without_a_site_are_left_alone():
+    pocket = room(6, 4, box(0.15, 0, 0.25, 4), name="pocket")  # 0.15 m wide: no robot fits
+    best = optimum(pocket, 2, lattice=32, restarts=3)
+    assert best.uncovered_area == pytest.approx(0.6)
+    assert (best.positions[:, 0] > 0.25).all()
+    slot = room(6, 4, box(0.3, 0, 0.4, 4), name="slot")  # a robot fits, but no site of so coarse a lattice
+    best = optimum(slot, 2, lattice=6, restarts=3)
+    assert best.uncovered_area == pytest.approx(1.2)
+
+
+def test_a_crowded_room():
+    closet = room(1.2, 1.2, name="closet")
+    best = optimum(closet, 16, lattice=32, restarts=2)
+    assert (pdist(best.positions) >= 0.2).all()
+    with pytest.raises(
+        ParameterError, match=r"robots: 60 of radius 0\.1 m, but there is room for about \d\d in map"
+    ):
+        optimum(closet, 60, lattice=32)
+    with pytest.raises(ParameterError, match="there is no room for any in map 'closet'"):
+        optimum(closet, 1, radius=0.7)
+
+
+def test_larger_robots_keep_farther_away():
+    narrow = room(6, 6, box(0, 2.6, 5, 3.0), name="narrow")
+    for radius in (0.05, 0.3, 0.45):
+        best = optimum(narrow, 6, radius=radius, lattice=24, restarts=4)
+        distance = shapely.distance(narrow.free.boundary, shapely.points(best.positions))
+        assert distance.min() >= radius
+        assert pdist(best.positions).min() >= 2 * radius
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"robots": 0}, "robots: 0, but a whole number from 1 to 500 was wanted"),
+        ({"robots": 2.0}, "robots: 2.0, but"),
+        ({"restarts": 0}, "restarts: 0, but a whole number from 1 to 100000 was wanted"),
+        ({"restarts": True}, "restarts: True, but"),
+        ({"seed": -1}, "seed: -1, but a whole number of at least 0 was wanted"),
+        ({"radius": 0.0}, "radius: 0.0 m, but a number above 0 was wanted"),
+        ({"radius": float("nan")}, "radius: nan m, but"),
+        ({"lattice": 0}, "lattice: 0, but a whole number from 1 to 4096 was wanted"),
+    ],
+)
+def test_parameters_out_of_range_are_named(words, message):
+    with pytest.raises(ParameterError) as caught:
+        optimum(L_ROOM, **{"robots": 2, **words})
+    assert str(caught.value).startswith(message)
+
+
+def test_progress_goes_from_nothing_to_all_and_may_give_up():
+    parts = []
+    optimum(TRAP, 2, lattice=24, restarts=5, progress=parts.append)
+    assert parts == sorted(parts)
+    assert parts[0] < 0.3
+    assert parts[-1] == 1.0
+    assert len(set(parts)) > 5
+
+    def stop(part):
+        if part > 0.7:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        optimum(TRAP, 2, lattice=24, restarts=5, progress=stop)

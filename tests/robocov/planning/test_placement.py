@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robocov.density import Gaussian, Gaussians
+from robocov.observation.region import Region
+from robocov.planning.discovered import FREE, WALL, DiscoveredMap, Raster
+from robocov.planning.placement import Stock, Table, own_place, team_places
+from robocov.planning.wayfinding import Ways, Window
+
+REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0]]))
+RASTER = Raster(REGION, 0.1)
+WINDOW = Window.around(RASTER, np.array([4.0, 2.0]), math.inf, 250)
+
+
+def known(*walls: tuple[slice, slice]) -> DiscoveredMap:
+    state = np.full(RASTER.shape, FREE, dtype=np.uint8)
+    for wall in walls:
+        state[wall] = WALL
+    return DiscoveredMap(RASTER, state)
+
+
+def ways(on: DiscoveredMap) -> Ways:
+    return Ways(RASTER, WINDOW, WINDOW.cut(on.blocked, True), 0.15)
+
+
+HALVES = (slice(0, 28), slice(39, 41))
+"""A wall between a left and a right room, with a passage above."""
+
+
+def test_weights_are_areas() -> None:
+    stock = Stock(known(HALVES), WINDOW, 4.0)
+    assert stock.weights.sum() == np.count_nonzero(~known(HALVES).blocked)
+    every = np.ones(len(stock.weights))
+    assert stock.viewpoint(every, every, WINDOW.cut(known().blocked, True), 0.0, ()) is None
+
+
+def test_what_counts_more_weighs_more() -> None:
+    spot = Gaussians((Gaussian((6.0, 2.0), 3.0, 0.5),), floor=1.0)
+    plain, dense = Stock(known(), WINDOW, 4.0).weights, Stock(known(), WINDOW, 4.0, spot).weights
+    some = ways(known())
+    assert (dense >= plain).all()
+    near = some.standing(np.array([6.0, 2.0]))
+    np.testing.assert_allclose(dense[near] / plain[near], spot.value(some.nodes[[near]])[0])
+
+
+def test_unknown_insides_hardly_count_and_shadows_do() -> None:
+    state = np.full(RASTER.shape, FREE, dtype=np.uint8)
+    state[10:20, 10:20] = WALL
+    state[11:19, 11:19] = 0
+    state[10:20, 50:60] = 0
+    stock = Stock(DiscoveredMap(RASTER, state), WINDOW, 100.0)
+    full = np.count_nonzero(state == FREE)
+    inside = 0.6 * 64 * 0.64 / 100.0
+    np.testing.assert_allclose(stock.weights.sum(), full + inside + 100, rtol=1e-9)
+    # a look goes to the border of what is open, and not to where somebody has looked
+    mine = home = np.ones(len(stock.weights))
+    tight = np.zeros(WINDOW.cut(state, np.uint8(0)).shape, dtype=bool)
+    place = stock.viewpoint(mine, home, tight, 5.0, ())
+    assert place is not None
+    assert 4.9 < place[0] < 6.1
+    assert 0.9 < place[1] < 2.1
+    other = stock.viewpoint(mine, home, tight, 5.0, (place,))
+    assert other is not None
+    assert math.dist(place, other) > 0.5
+    assert stock.viewpoint(mine, home, tight, 101.0, ()) is None
+
+
+def cost(on: DiscoveredMap, places: np.ndarray) -> float:
+    some, weights = ways(on), Stock(on, WINDOW, 4.0).weights
+    away = some.from_places(places)
+    good = np.isfinite(away) & (weights > 0)
+    return float((weights[good] * away[good]).sum())
+
+
+def test_a_team_spreads_over_both_rooms() -> None:
+    on = known(HALVES)
+    some = ways(on)
+    now = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [1.5, 1.5]])
+    nobody = np.zeros(4, dtype=bool)
+    places = team_places(some, Table.of(some), Stock(on, WINDOW, 4.0).weights, now, now, nobody, 0.01)
+    assert (places[:, 0] > 4.1).any()
+    assert cost(on, places) < 0.5 * cost(on, now)
+    for by_hand in ([[1.5, 2], [2.5, 1], [5.5, 2], [7, 2]], [[1, 1], [3, 1], [1.5, 3], [6, 2]]):
+        assert cost(on, places) < 1.02 * cost(on, np.array(by_hand, dtype=float))
+    # the same plan, by whom ever it is made
+    order = np.array([2, 0, 3, 1])
+    other = team_places(
+        some, Table.of(some), Stock(on, WINDOW, 4.0).weights, now[order], now[order], nobody, 0.01
+    )
+    np.testing.assert_allclose(np.sort(places, axis=0), np.sort(other, axis=0))
+
+
+def test_who_rests_stays_in_the_plan() -> None:
+    on = known(HALVES)
+    some = ways(on)
+    now = np.array([[1.0, 1.0], [6.3, 1.9], [1.0, 1.5]])
+    given = np.array([False, True, False])
+    places = team_places(some, Table.of(some), Stock(on, WINDOW, 4.0).weights, now, now, given, 0.01)
+    np.testing.assert_array_equal(places[1], now[1])
+    assert (places[[0, 2], 0] < 4.1).sum() >= 1
+
+
+def test_ones_own_place_is_a_minimum_and_is_kept() -> None:
+    on = known()
+    some, weights = ways(on), Stock(on, WINDOW, 4.0).weights
+    others = np.array([[6.0, 2.0]])
+    begin = some.standing(np.array([0.7, 0.7]))
+    found = own_place(some, weights, others, begin, np.full(2, np.nan), 0.0)
+    found = own_place(some, weights, others, found.node, np.full(2, np.nan), 0.0)
+    best = cost(on, np.vstack([found.goal, others]))
+    for shift in ([0.3, 0], [-0.3, 0], [0, 0.3], [0, -0.3]):
+        assert cost(on, np.vstack([found.goal + shift, others])) > best
+    np.testing.assert_allclose(found.goal[1], 2.0, atol=0.1)
+    assert (found.mine[some.nodes[:, 0] > 5.5] == 0.0).all()
+    near = found.goal + [0.05, -0.02]
+    assert own_place(some, weights, others, found.node, near, 0.01).goal.tolist() == near.tolist()
+    moved = own_place(some, weights, others, found.node, near, 0.0).goal
+    np.testing.assert_allclose(moved, found.goal, atol=1e-9)

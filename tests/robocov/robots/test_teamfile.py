@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import InputError, RobocovError
+from robocov.robots import Team
+from robocov.robots.teamfile import groups_of, read_team, team_of_groups
+
+TEAM = """
+[[group]]
+count = 2
+max_speed = 1.5
+communication_range = "null"
+
+[[group]]          # slow ones
+count = 3
+max_speed = 0.5
+radius = 0.2
+communication_range = 4.0
+"""
+
+
+def written(folder: Path, text: str, name: str = "team.toml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
+    team = read_team(written(tmp_path, TEAM))
+    assert team.max_speed.tolist() == [1.5, 1.5, 0.5, 0.5, 0.5]
+    assert team.radius.tolist() == [0.1, 0.1, 0.2, 0.2, 0.2]
+    assert team.communication_range.tolist() == [np.inf, np.inf, 4.0, 4.0, 4.0]
+    assert team.mass.tolist() == [1.0] * 5
+    assert team.mixed_speeds
+    assert not Team.homogeneous(3).mixed_speeds
+
+
+def test_json_is_the_same(tmp_path: Path) -> None:
+    groups = [{"count": 1, "sensing_range": None}, {"count": 1, "mass": 2.5}]
+    team = read_team(written(tmp_path, json.dumps({"group": groups}), "team.json"))
+    assert team.sensing_range.tolist() == [np.inf, 3.0]
+    assert team.mass.tolist() == [1.0, 2.5]
+
+
+def test_what_a_group_leaves_open_is_as_said_for_all(tmp_path: Path) -> None:
+    team = read_team(written(tmp_path, TEAM), {"radius": 0.3, "viscosity": 1.0, "sensing_range": None})
+    assert team.radius.tolist() == [0.3, 0.3, 0.2, 0.2, 0.2]
+    assert team.viscosity.tolist() == [1.0] * 5
+    assert np.isinf(team.sensing_range).all()
+
+
+@settings(max_examples=20)
+@given(
+    st.lists(
+        st.fixed_dictionaries(
+            {
+                "count": st.integers(1, 4),
+                "max_speed": st.sampled_from([0.5, 1.0]),
+                "radius": st.floats(0.05, 0.5),
+            }
+        ),
+        min_size=1,
+        max_size=5,
+    )
+)
+def test_groups_survive_the_way_there_and_back(groups: list[dict[str, float]]) -> None:
+    team = team_of_groups(groups, ("group",))
+    again = team_of_groups(groups_of(team), ("group",))
+    assert again.to_dict() == team.to_dict()
+    assert Team.from_dict(team.to_dict()).to_dict() == team.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"team.toml: group: missing, but at least one table \[\[group\]\] was wanted"),
+        ("group = 3", r"group: 3, but at least one table"),
+        ("group = [4]", r"group\[0\]: 4, but a table was wanted"),
+        ("[[group]]\nmax_speed = 1", r"group\[0\].count: missing, but a whole number from 1 to 10000"),
+        ("[[group]]\ncount = 0", r"group\[0\].count: 0, but"),
+        ("[[group]]\ncount = true", r"group\[0\].count: True, but"),
+        (
+            "[[group]]\ncount = 1\n[[group]]\ncount = 2\nmax_sped = 1",
+            r"group\[1\]: unknown key 'max_sped': did",
+        ),
+        ("[[group]]\ncount = 1\nmax_speed = -1", r"group\[0\].max_speed: -1.* m/s, but a number from 1e-06"),
+        ("[[group]]\ncount = 1\nradius = 'big'", r"group\[0\].radius: 'big', but a number was wanted"),
+        ("[[group]]\ncount = 1\nradius = 'null'", r"group\[0\].radius: 'null', but a number was wanted"),
+        ("[[group]]\ncount = 9000\n[[group]]\ncount = 9000", "18000 robots, but at most 10000 were wanted"),
+        ("[[groups]]\ncount = 1", "unknown key 'groups': did you mean 'group'"),
+        ("[[group]\n", "team.toml: not TOML"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as told:
+        read_team(written(tmp_path, text))
+    assert "\n" not in str(told.value)
+    assert str(told.value).startswith(str(tmp_path / "team.toml"))
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(RobocovError, match="no such file"):
+        read_team(tmp_path / "none.toml")
+    with pytest.raises(RobocovError, match=r"bad.json"):
+        read_team(written(tmp_path, "[1,", "bad.json"))
+    with pytest.raises(InputError, match="an object with a list group was wanted"):
+        read_team(written(tmp_path, "[1]", "list.json"))
+    (tmp_path / "latin.toml").write_bytes(b"# \xff")
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_team(tmp_path / "latin.toml")

@@ -1,0 +1,279 @@
+"""The bounded Voronoi partition against exact arithmetic, itself, and its symmetries."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from voronoi_cases import (
+    FAMILIES,
+    PENTAGON,
+    REGIONS,
+    SQUARE,
+    Family,
+    assert_exact,
+    assert_same_ring,
+    clipped,
+    exact_cell,
+    families,
+    names,
+    scattered,
+    seeds,
+)
+
+from robocov.errors import InputError
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
+from robocov.voronoi import partition
+from robocov.voronoi.cell_edges import REGION
+
+
+@pytest.mark.parametrize("name", REGIONS)
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 6, 7, 12])
+def test_small_teams_are_exact(n: int, name: str) -> None:
+    rng = np.random.default_rng(n)
+    cells = partition(scattered(REGIONS[name], n, rng), REGIONS[name])
+    assert_exact(cells, REGIONS[name])
+    assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+
+
+@settings(deadline=None, max_examples=300)
+@given(seeds, names, families, st.integers(1, 14))
+def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> None:
+    region = REGIONS[name]
+    points = family(region, n, np.random.default_rng(seed))
+    assert_exact(partition(points, region), region)
+    assert_exact(clipped(points, region), region)
+
+
+def test_one_robot_has_the_region() -> None:
+    cells = partition(np.array([[1.0, 1.0]]), PENTAGON)
+    assert cells.mass == pytest.approx([PENTAGON.area])
+    assert cells.centroid == pytest.approx(PENTAGON.centroid[None])
+    assert cells.polygons[0] == pytest.approx(PENTAGON.vertices)
+    assert cells.adjacency.shape == (0, 2)
+
+
+def test_no_robots_no_cells() -> None:
+    cells = partition(np.empty((0, 2)), SQUARE)
+    assert cells.mass.shape == (0,)
+    assert cells.centroid.shape == (0, 2)
+    assert cells.polygons == []
+    assert cells.adjacency.shape == (0, 2)
+
+
+def test_nine_robots_on_a_lattice_have_the_ninths_of_a_square() -> None:
+    x, y = np.meshgrid([1.0, 3.0, 5.0], [1.0, 3.0, 5.0])
+    points = np.column_stack([x.ravel(), y.ravel()])
+    across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
+    for cells in (partition(points, SQUARE), clipped(points, SQUARE)):
+        assert cells.mass == pytest.approx(np.full(9, 4.0), rel=1e-13)
+        assert cells.centroid == pytest.approx(points, rel=1e-13)
+        assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
+        assert cells.adjacency.tolist() == [list(pair) for pair in across]
+        assert [len(polygon) for polygon in cells.polygons] == [4] * 9
+
+
+def test_three_cells_that_meet_on_the_boundary() -> None:
+    cells = partition(np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 0.0]]), SQUARE)
+    assert cells.mass == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
+    assert cells.adjacency.tolist() == [[0, 1], [1, 2]]
+    assert sorted(cells.edges.beyond[cells.edges.cell == 1].tolist()) == [REGION, REGION, REGION, 0, 2]
+    assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
+
+
+@settings(deadline=None, max_examples=200)
+@given(seeds, names, st.sampled_from(FAMILIES[:-1]), st.integers(1, 60))
+def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> None:
+    region = REGIONS[name]
+    rng = np.random.default_rng(seed)
+    points = family(region, n, rng)
+    cells = partition(points, region)
+    distinct = np.unique(points, axis=0, return_index=True)[1]
+    assert cells.mass[distinct].sum() == pytest.approx(region.area, rel=5e-12)
+    shapes = [shapely.Polygon(ring) if len(ring) > 2 else shapely.Point() for ring in cells.polygons]
+    assert [shape.area for shape in shapes] == pytest.approx(cells.mass, abs=1e-11 * region.diameter**2)
+    samples = rng.dirichlet(np.ones(len(region.vertices)), 200) @ region.vertices
+    distance = np.hypot(*(samples[:, None] - points).transpose(2, 0, 1))
+    inside = np.column_stack([shapely.contains_xy(shape, *samples.T) for shape in shapes])
+    best = distance.min(axis=1, keepdims=True)
+    blur = 1e-9 * region.diameter
+    # near a bisector rounding may decide: there both or neither may hold the sample
+    far = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))[distance.argmin(axis=1)]
+    doubtful = (distance**2 - best**2 <= 2 * blur * far) & (distance > best)
+    clear = ~doubtful.any(axis=1) & (np.abs(samples @ region.normals.T - region.offsets) > blur).all(axis=1)
+    assert (inside == (distance == best))[clear].all()
+
+
+@settings(deadline=None, max_examples=200)
+@given(seeds, names, families, st.integers(1, 40))
+def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family: Family, n: int) -> None:
+    region = REGIONS[name]
+    cells = partition(family(region, n, np.random.default_rng(seed)), region)
+    for ring, mass, centroid in zip(cells.polygons, cells.mass, cells.centroid, strict=True):
+        if mass < 1e-9 * region.area:
+            continue
+        local = ring - centroid
+        x, y = local.T
+        u, v = np.roll(local, -1, axis=0).T
+        cross = x * v - u * y
+        assert (cross > -1e-9 * region.diameter**2).all()
+        assert cross.sum() / 2 == pytest.approx(mass, rel=1e-6)
+        assert region.contains(ring, 1e-9 * region.diameter).all()
+
+
+@settings(deadline=None, max_examples=120)
+@given(seeds, st.integers(1, 30))
+def test_parallel_axis(seed: int, n: int) -> None:
+    """Equation (3), with the moment about the centroid from triangles that have it for a corner."""
+    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+    for cells in (partition(points, PENTAGON), clipped(points, PENTAGON)):
+        direct = []
+        for ring, centroid in zip(cells.polygons, cells.centroid, strict=True):
+            (x, y), (u, v) = (ring - centroid).T, (np.roll(ring, -1, axis=0) - centroid).T
+            edges = (x * v - u * y) * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
+            direct.append(edges.sum())
+        assert cells.polar_moment_about_centroid == pytest.approx(np.array(direct), abs=1e-11)
+        lever = points - cells.centroid
+        shifted = np.array(direct) + cells.mass * (lever**2).sum(axis=1)
+        assert cells.polar_moment == pytest.approx(shifted, abs=1e-11)
+
+
+@settings(deadline=None, max_examples=120)
+@given(seeds, st.integers(1, 40), st.floats(0.0, 6.3), st.booleans())
+def test_turned_and_mirrored(seed: int, n: int, angle: float, mirror: bool) -> None:
+    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    if mirror:
+        turn = np.diag([-1.0, 1.0]) @ turn
+    plain = partition(points, PENTAGON)
+    turned = partition(points @ turn, Region(PENTAGON.vertices @ turn))
+    assert turned.mass == pytest.approx(plain.mass, abs=1e-11)
+    lever = plain.centroid @ turn - turned.centroid
+    assert plain.mass[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seeds, st.integers(2, 40))
+def test_order_of_the_robots_does_not_matter(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = scattered(SQUARE, n, rng)
+    order = rng.permutation(n)
+    plain, mixed = partition(points, SQUARE), partition(points[order], SQUARE)
+    assert mixed.mass == pytest.approx(plain.mass[order], abs=1e-11)
+
+
+def test_coincident_robots_get_the_same_cell() -> None:
+    for n in (2, 8, 30):
+        points = scattered(PENTAGON, n, np.random.default_rng(n))
+        twice = partition(np.concatenate([points, points[:2]]), PENTAGON)
+        once = partition(points, PENTAGON)
+        assert twice.mass[:n] == pytest.approx(once.mass, rel=1e-12)
+        assert twice.mass[n:].tolist() == twice.mass[:2].tolist()
+        assert twice.centroid[n:].tolist() == twice.centroid[:2].tolist()
+        assert twice.polygons[n].tolist() == twice.polygons[0].tolist()
+
+
+def test_all_at_one_place_have_the_region_each() -> None:
+    cells = partition(np.full((7, 2), 1.5), PENTAGON)
+    assert cells.mass == pytest.approx(np.full(7, PENTAGON.area))
+    assert cells.adjacency.shape == (0, 2)
+
+
+def test_an_empty_cell_has_its_generator_for_centroid() -> None:
+    cells = partition(np.array([[1.0, 1.0], [-9.0, 1.0], [5.0, 5.0]]), SQUARE)
+    assert cells.mass[1] == 0.0
+    assert cells.centroid[1].tolist() == [-9.0, 1.0]
+    assert cells.polygons[1].shape == (0, 2)
+    assert cells.polar_moment[1] == 0.0
+    assert cells.mass.sum() == pytest.approx(SQUARE.area)
+
+
+@settings(deadline=None, max_examples=200)
+@given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
+def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, range_: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = scattered(SQUARE, n, rng)
+    robot = int(rng.integers(n))
+    neighbours = Neighbours.within(points, np.full(n, range_))
+    heard = np.union1d(neighbours.of(robot), [robot])
+    before = partition(points, SQUARE, neighbours)
+
+    # the others move, out of range still, and some leave the team or join it
+    moved = points.copy()
+    for other in np.setdiff1d(np.arange(n), heard):
+        place = scattered(SQUARE, 1, rng)[0]
+        if np.hypot(*(place - points[robot])) > range_:
+            moved[other] = place
+    kept = np.union1d(heard, np.flatnonzero(rng.random(n) < 0.6))
+    joined = scattered(SQUARE, 5, rng)
+    joined = joined[np.hypot(*(joined - points[robot]).T) > range_]
+    moved = np.concatenate([moved[kept], joined])
+    again = int(np.searchsorted(kept, robot))
+    after = partition(moved, SQUARE, Neighbours.within(moved, np.full(len(moved), range_)))
+
+    assert after.mass[again] == before.mass[robot]
+    assert after.centroid[again].tolist() == before.centroid[robot].tolist()
+    assert after.polygons[again].tolist() == before.polygons[robot].tolist()
+    assert after.polar_moment[again] == before.polar_moment[robot]
+
+
+@settings(deadline=None, max_examples=120)
+@given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
+def test_limited_cells_are_those_of_the_heard_alone(seed: int, n: int, range_: float) -> None:
+    points = scattered(PENTAGON, n, np.random.default_rng(seed))
+    neighbours = Neighbours.within(points, np.full(n, range_))
+    cells = partition(points, PENTAGON, neighbours)
+    for robot in range(n):
+        heard = np.concatenate([points[robot : robot + 1], points[neighbours.of(robot)]])
+        area, mx, my, _ = map(float, exact_cell(0, heard, PENTAGON))
+        assert cells.mass[robot] == pytest.approx(area, abs=1e-11)
+        lever = cells.centroid[robot] - points[robot]
+        assert cells.mass[robot] * lever == pytest.approx([mx, my], abs=1e-10)
+
+
+def test_adjacent_cells_share_a_piece_of_boundary() -> None:
+    points = scattered(PENTAGON, 40, np.random.default_rng(3))
+    cells = partition(points, PENTAGON)
+    shapes = [shapely.Polygon(ring) for ring in cells.polygons]
+    pairs = {
+        (i, j)
+        for i in range(40)
+        for j in range(i + 1, 40)
+        if shapes[i].buffer(1e-7).intersection(shapes[j].buffer(1e-7)).area > 1e-10
+    }
+    assert {tuple(pair) for pair in cells.adjacency.tolist()} == pairs
+
+
+@pytest.mark.parametrize("n", [2, 6, 50])
+def test_the_same_input_gives_the_same_bits_and_nothing_changes_it(n: int) -> None:
+    points = scattered(PENTAGON, n, np.random.default_rng(n))
+    first = partition(points, PENTAGON)
+    second = partition(points, Region(PENTAGON.vertices))
+    assert first.mass.tobytes() == second.mass.tobytes()
+    assert first.centroid.tobytes() == second.centroid.tobytes()
+    rings = [ring.tobytes() for ring in second.polygons]
+    points[:] = 0.0  # the caller's array is not the partition's
+    assert [ring.tobytes() for ring in first.polygons] == rings
+    with pytest.raises(ValueError, match="read-only"):
+        first.mass[0] = 1.0
+    copy = pickle.loads(pickle.dumps(first))
+    assert [ring.tobytes() for ring in copy.polygons] == rings
+
+
+@pytest.mark.parametrize("n", [1, 9])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_points_that_are_not_finite_are_named(n: int, bad: float) -> None:
+    points = scattered(SQUARE, n, np.random.default_rng(0))
+    points[n // 2, 1] = bad
+    with pytest.raises(InputError, match=rf"^generators\[{n // 2}\]: .*finite"):
+        partition(points, SQUARE)
+
+
+def test_points_of_the_wrong_shape_are_named() -> None:
+    with pytest.raises(InputError, match=r"shape \(3,\), but \(n, 2\)"):
+        partition(np.zeros(3), SQUARE)

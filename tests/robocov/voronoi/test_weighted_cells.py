@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from voronoi_cases import (
+    PENTAGON,
+    REGIONS,
+    SQUARE,
+    almost_twins,
+    circle,
+    collinear,
+    huddles,
+    lattice,
+    names,
+    scattered,
+    seeds,
+)
+
+from robocov.density import Gaussian, Gaussians, Uniform
+from robocov.errors import InputError
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+
+FAMILIES = {"scattered": scattered, "lattice": lattice, "circle": circle, "collinear": collinear}
+DEGENERATE = {**FAMILIES, "almost twins": almost_twins, "huddles": huddles}
+SPEEDS = {
+    "two": lambda n, rng: rng.choice([0.5, 1.0], n),
+    "powers of two": lambda n, rng: rng.choice([0.5, 1.0, 2.0, 4.0], n),
+    "all different": lambda n, rng: rng.uniform(0.3, 2.0, n),
+    "almost equal": lambda n, rng: 1.0 + 10.0 ** rng.uniform(-16, -4, n),
+    "very different": lambda n, rng: 10.0 ** rng.uniform(-3, 3, n),
+}
+
+
+def buffered(
+    i: int, points: np.ndarray, speeds: np.ndarray, region: Region, heard: np.ndarray
+) -> shapely.Geometry:
+    """Return a cell by shapely's buffers: the region, cut by discs and half planes one after the other."""
+    cell = region.polygon
+    for j in heard:
+        offset = points[j] - points[i]
+        distance = float(np.hypot(*offset))
+        if speeds[j] == speeds[i]:
+            middle, along = (points[i] + points[j]) / 2, offset / distance
+            left = np.array([-along[1], along[0]])
+            far = 4.0 * region.diameter
+            corners = [middle + far * left, middle - far * left]
+            corners += [corner - far * along for corner in reversed(corners)]
+            cell = cell.intersection(shapely.Polygon(corners))
+            continue
+        square = (speeds[i] / speeds[j]) ** 2
+        centre = points[i] - offset * square / (1.0 - square)
+        radius = np.sqrt(square) * distance / abs(1.0 - square)
+        disc = shapely.Point(centre).buffer(radius, quad_segs=4000)
+        cell = cell.intersection(disc) if square < 1.0 else cell.difference(disc)
+    return cell
+
+
+@given(seeds, names, st.sampled_from(sorted(DEGENERATE)), st.sampled_from(sorted(SPEEDS)), st.integers(1, 40))
+def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    region = REGIONS[name]
+    points = np.unique(DEGENERATE[family](region, n, rng), axis=0)
+    cells = weighted_partition(points, SPEEDS[speeds](len(points), rng), region)
+    # circles of some micrometres and of a kilometre, that nearly touch, keep fewer digits
+    tolerance = 1e-6 if speeds == "very different" else 1e-9
+    assert cells.mass.sum() == pytest.approx(region.area, rel=tolerance)
+    first = cells.mass @ (cells.centroid - region.centroid)
+    np.testing.assert_allclose(first, 0.0, atol=tolerance * region.area * region.diameter)
+
+
+@settings(max_examples=12)
+@given(seeds, st.sampled_from(["square", "pentagon", "triangle", "corridor"]), st.floats(1.0, 9.0))
+def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reach: float) -> None:
+    rng = np.random.default_rng(seed)
+    region = REGIONS[name]
+    points = scattered(region, int(rng.integers(2, 9)), rng)
+    n = len(points)
+    speeds = rng.choice([0.4, 1.0, 1.0, 1.7], n)
+    neighbours = Neighbours.within(points, np.full(n, reach))
+    cells = weighted_partition(points, speeds, region, neighbours)
+    for i in range(n):
+        expected = buffered(i, points, speeds, region, neighbours.of(i))
+        assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
+        if expected.area > 1e-3 * region.area:
+            np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(1, 30))
+def test_every_place_is_in_the_cell_of_whoever_is_there_first(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = scattered(PENTAGON, n, rng)
+    speeds = rng.choice([0.5, 1.0, 1.5], n)
+    cells = weighted_partition(points, speeds, PENTAGON)
+    if isinstance(cells, VoronoiPartition):
+        return
+    places = scattered(PENTAGON, 200, rng)
+    time = np.hypot(*(places[:, None] - points).transpose(2, 0, 1)) / speeds
+    outlines, owners = cells.outlines
+    painted = np.full(len(places), -1)
+    # a slow robot's cell is painted over that of a fast one, in which it is a hole
+    for outline, owner in zip(outlines, owners.tolist(), strict=True):
+        ring = shapely.polygons(outline)
+        if shapely.is_ccw(ring.exterior):
+            painted[shapely.contains_xy(ring, *places.T)] = owner
+    order = np.sort(time, axis=1)
+    clear = np.ones(len(places), dtype=bool) if n == 1 else order[:, 1] - order[:, 0] > 0.01
+    np.testing.assert_array_equal(painted[clear], time.argmin(axis=1)[clear])
+
+
+@settings(max_examples=40)
+@given(seeds, names, st.integers(1, 60))
+def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: str, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = scattered(REGIONS[name], n, rng)
+    cells = weighted_partition(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
+    ordinary = partition(points, REGIONS[name])
+    assert cells.mass.tobytes() == ordinary.mass.tobytes()
+    assert cells.centroid.tobytes() == ordinary.centroid.tobytes()
+
+
+@settings(max_examples=40)
+@given(seeds, st.sampled_from(["square", "pentagon", "triangle"]), st.integers(2, 30))
+def test_speeds_that_hardly_differ_give_hardly_other_cells(seed: int, name: str, n: int) -> None:
+    """The circles have radii of 10^13 m here, and the ordinary cells come out of them to 1e-12."""
+    rng = np.random.default_rng(seed)
+    points = scattered(REGIONS[name], n, rng)
+    near = Neighbours(n).closer_than(points, 0.05)[2]
+    if len(near):
+        return
+    cells = weighted_partition(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
+    ordinary = partition(points, REGIONS[name])
+    np.testing.assert_allclose(cells.mass, ordinary.mass, atol=1e-10)
+    large = ordinary.mass > 0.01
+    np.testing.assert_allclose(cells.centroid[large], ordinary.centroid[large], atol=1e-9)
+
+
+def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
+    cells = weighted_partition(np.array([[3.0, 3.0], [4.0, 3.0]]), np.array([1.0, 3.0]), SQUARE)
+    assert isinstance(cells, WeightedCells)
+    # Apollonius: centre p - d / (k² - 1), radius k d / (k² - 1), k = 3
+    assert cells.mass[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
+    np.testing.assert_allclose(cells.centroid[0], [3.0 - 1 / 8, 3.0], atol=1e-15)
+    assert cells.mass[1] == pytest.approx(36.0 - cells.mass[0], rel=1e-14)
+    assert cells.polar_moment_about_centroid[0] == pytest.approx(np.pi * (3 / 8) ** 4 / 2, rel=1e-13)
+    outlines, owners = cells.outlines
+    assert owners.tolist() == [1, 1, 0]
+    assert cells.adjacency.tolist() == [[0, 1]]
+    assert shapely.Polygon(outlines[2]).area == pytest.approx(cells.mass[0], rel=0.01)
+
+
+def test_a_cell_in_two_pieces_and_a_centroid_that_is_not_in_it() -> None:
+    corridor = REGIONS["corridor"]
+    cells = weighted_partition(np.array([[20.0, 0.5], [19.0, 0.5]]), np.array([1.0, 4.0]), corridor)
+    assert isinstance(cells, WeightedCells)
+    outlines, owners = cells.outlines
+    # the slow robot's disc is narrower than the corridor
+    assert owners.tolist() == [1, 1, 0]
+    cells = weighted_partition(np.array([[20.0, 0.5], [10.0, 0.5]]), np.array([1.0, 4.0]), corridor)
+    assert isinstance(cells, WeightedCells)
+    outlines, owners = cells.outlines
+    assert owners.tolist() == [1, 1, 0]
+    assert sum(shapely.Polygon(outline).area for outline in outlines) == pytest.approx(40.0, rel=1e-3)
+    # behind the slow robot the fast one comes first again: its centroid is pulled past it
+    assert cells.centroid[1, 0] > 19.0
+
+
+def test_circles_that_are_parallel_lines_but_for_the_last_bits() -> None:
+    """Whether and where they meet, 10^20 m away, is rounding; which is the nearer one is not."""
+    points = PENTAGON.centroid + np.array([[0.0, 0.0], [2.0**-6, 0.0], [2.0**-5, 0.0]])
+    speeds = 1.0 + 4.0 * np.finfo(float).eps * np.arange(3)
+    ordinary = partition(points, PENTAGON)
+    np.testing.assert_allclose(weighted_partition(points, speeds, PENTAGON).mass, ordinary.mass, rtol=1e-9)
+
+
+def test_robots_in_one_place() -> None:
+    points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
+    cells = weighted_partition(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
+    assert cells.mass[0] == 0.0
+    np.testing.assert_array_equal(cells.centroid[0], points[0])
+    np.testing.assert_allclose(cells.mass[[1, 2, 3]], [18.0, 18.0, 18.0])
+    np.testing.assert_array_equal(cells.centroid[1], cells.centroid[3])
+
+
+@settings(max_examples=15)
+@given(seeds, st.integers(2, 20))
+def test_the_centroid_is_where_the_cost_of_the_cells_has_no_slope(seed: int, n: int) -> None:
+    """H = sum of the integrals of (|q - p| / v)² over the cells: dH/dp = 2 M (p - C) / v²."""
+    rng = np.random.default_rng(seed)
+    points = scattered(SQUARE, n, rng)
+    speeds = rng.choice([0.5, 1.0, 1.5], n)
+    cells = weighted_partition(points, speeds, SQUARE)
+    slope = 2.0 * (cells.mass / speeds**2)[:, None] * (points - cells.centroid)
+
+    def cost(where: np.ndarray) -> float:
+        return float((weighted_partition(where, speeds, SQUARE).polar_moment / speeds**2).sum())
+
+    i, step = int(rng.integers(n)), 1e-5
+    for axis in (0, 1):
+        shift = np.zeros((n, 2))
+        shift[i, axis] = step
+        numeric = (cost(points + shift) - cost(points - shift)) / (2.0 * step)
+        assert numeric == pytest.approx(slope[i, axis], abs=1e-5 * (1.0 + abs(slope[i, axis])))
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(2, 25), st.floats(0.5, 6.0))
+def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, reach: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = scattered(SQUARE, n, rng)
+    speeds = rng.choice([0.5, 1.0], n)
+    neighbours = Neighbours.within(points, np.full(n, reach))
+    i = int(rng.integers(n))
+    strangers = np.ones(n, dtype=bool)
+    strangers[i] = False
+    strangers[neighbours.of(i)] = False
+    other, slower = points.copy(), speeds.copy()
+    for k in np.flatnonzero(strangers):
+        place = scattered(SQUARE, 1, rng)[0]
+        if np.hypot(*(place - points[i])) > reach:
+            other[k] = place
+        slower[k] = rng.choice([0.5, 1.0, 2.0])
+    before = weighted_partition(points, speeds, SQUARE, neighbours)
+    after = weighted_partition(other, slower, SQUARE, Neighbours.within(other, np.full(n, reach)))
+    assert before.mass[i].tobytes() == after.mass[i].tobytes()
+    assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
+
+
+def test_neighbours_may_be_believed_elsewhere() -> None:
+    points = np.array([[1.0, 1.0], [5.0, 1.0], [3.0, 5.0]])
+    speeds = np.array([1.0, 2.0, 1.0])
+    neighbours = Neighbours.within(points, np.full(3, 100.0))
+    heard = points[neighbours.indices] + [[0.3, 0.1]] * 6
+    cells = weighted_partition(points, speeds, SQUARE, neighbours, heard=heard)
+    for i in range(3):
+        known = points.copy()
+        known[neighbours.of(i)] = heard[neighbours.indptr[i] : neighbours.indptr[i + 1]]
+        alone = weighted_partition(known, speeds, SQUARE)
+        assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "speeds", "message"),
+    [
+        ([[1.0, 2.0, 3.0]], [1.0], "generators: an array of shape"),
+        ([[1.0, 2.0]], [0.0], r"speeds: \[0.0\], but 1 positive numbers were wanted"),
+        ([[1.0, 2.0]], [1.0, 2.0], "positive numbers were wanted"),
+        ([[1.0, 2.0], [1.0, np.nan]], [1.0, 2.0], r"generators\[1\]"),
+    ],
+)
+def test_what_is_no_team_is_told(points: list[list[float]], speeds: list[float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        weighted_partition(np.array(points), np.array(speeds), SQUARE)
+
+
+@pytest.mark.parametrize("name", ["gaussians", "uniform"])
+def test_mass_and_centroid_by_a_density(name: str) -> None:
+    density = (
+        Gaussians((Gaussian((2.0, 3.0), weight=4.0, sigma=0.8),), floor=0.5)
+        if name == "gaussians"
+        else Uniform(3.0)
+    )
+    rng = np.random.default_rng(7)
+    points, speeds = scattered(SQUARE, 5, rng), np.array([1.0, 0.3, 1.0, 0.5, 0.3])
+    cells = weighted_partition(points, speeds, SQUARE, density=density)
+    middles = (np.arange(600) + 0.5) / 100
+    x, y = (part.ravel() for part in np.meshgrid(middles, middles))
+    places = np.column_stack([x, y])
+    owner = (np.hypot(*(places[:, None] - points).transpose(2, 0, 1)) / speeds).argmin(axis=1)
+    weight = density.value(places) * 1e-4
+    for i in range(5):
+        own = owner == i
+        mass = weight[own].sum()
+        assert cells.mass[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
+        if mass > 0.1:
+            np.testing.assert_allclose(cells.centroid[i], weight[own] @ places[own] / mass, atol=0.02)
+        polar = weight[own] @ ((places[own] - points[i]) ** 2).sum(axis=1)
+        assert cells.polar_moment[i] == pytest.approx(polar, rel=2e-2, abs=1e-3)

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pymunk
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import Environment
+from robocov.mapfile import bundled_maps, load_map
+from robocov.world.solid import convex_pieces, pieces_area, solid_pieces
+
+
+def is_convex(ring: np.ndarray) -> bool:
+    ahead = np.roll(ring, -1, axis=0) - ring
+    after = np.roll(ahead, -1, axis=0)
+    return bool((ahead[:, 0] * after[:, 1] - ahead[:, 1] * after[:, 0] > 0).all())
+
+
+def engine_area(ring: np.ndarray) -> float:
+    return float(pymunk.Poly(None, ring.tolist()).area)
+
+
+@pytest.mark.parametrize("name", sorted(bundled_maps()))
+def test_the_engine_gets_exactly_what_is_not_free(name: str) -> None:
+    environment = load_map(name).standing  # what moves is no part of the walls
+    pieces = solid_pieces(environment)
+    frame = shapely.box(*shapely.union_all([shapely.Polygon(ring) for ring in pieces]).bounds)
+    solid = shapely.union_all([shapely.Polygon(ring) for ring in pieces])
+    expected = shapely.difference(frame, environment.free)
+    assert pieces_area(pieces) == pytest.approx(expected.area, rel=1e-9)
+    assert shapely.symmetric_difference(solid, expected).area < 1e-6
+    # pymunk takes the hull of what it is given: the areas agree only if every piece is convex
+    assert sum(map(engine_area, pieces)) == pytest.approx(expected.area, rel=1e-9)
+    assert all(is_convex(ring) for ring in pieces)
+
+
+def test_a_concave_polygon_is_not_filled() -> None:
+    u_shape = shapely.Polygon([(0, 0), (6, 0), (6, 6), (4, 6), (4, 2), (2, 2), (2, 6), (0, 6)])
+    pieces = convex_pieces(u_shape)
+    assert engine_area(np.array(u_shape.exterior.coords)[:-1]) == pytest.approx(36.0)
+    assert sum(map(engine_area, pieces)) == pytest.approx(u_shape.area) == pytest.approx(28.0)
+    assert len(pieces) == 3, "an optimal decomposition of a U has three pieces"
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.floats(0.1, 3)), min_size=1, max_size=6))
+def test_pieces_tile_unions_of_discs(discs: list[tuple[float, float, float]]) -> None:
+    union = shapely.union_all(
+        [shapely.Point(x, y).buffer(r, quad_segs=3) for x, y, r in discs], grid_size=1e-6
+    )
+    pieces = convex_pieces(union)
+    assert pieces_area(pieces) == pytest.approx(union.area, rel=1e-9)
+    assert sum(map(engine_area, pieces)) == pytest.approx(union.area, rel=1e-6)
+
+
+def test_everything_outside_a_non_convex_boundary_is_solid(cluttered: Environment) -> None:
+    pieces = [shapely.Polygon(ring) for ring in solid_pieces(cluttered)]
+    outside = shapely.Point(2.0, 8.0)  # inside the hull, outside the L
+    assert any(piece.contains(outside) for piece in pieces)
+    assert not any(piece.contains(shapely.Point(7.0, 7.0)) for piece in pieces)
