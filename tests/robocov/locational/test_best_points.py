@@ -104,6 +104,35 @@ def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n:
         ).all()
 
 
+@settings(max_examples=40)
+@given(seeds, names, families, st.floats(-2.0, 1.0), st.integers(1, 6))
+def test_no_place_of_a_grid_over_the_cell_is_better_for_a_sensor(
+    seed: int, name: str, family: Family, height: float, n: int
+) -> None:
+    """Also where the cell is large against h, and most of what counts is near: there is no second optimum."""
+    region = REGIONS[name]
+    f = Sensing(10.0**height * region.diameter / 10.0)
+    cells = partition(family(region, n, np.random.default_rng(seed)), region)
+    most = value(cells.edges, best_points(cells, f) - cells.generators, f)
+    share = np.linspace(0.02, 0.98, 12)
+    for k, ring in enumerate(cells.polygons):
+        if len(ring) < 3 or cells.mass[k] < 1e-6 * region.area:
+            continue
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        places = np.stack(np.meshgrid(*(low + share[:, None] * (high - low)).T), axis=-1).reshape(-1, 2)
+        edge = np.roll(ring, -1, axis=0) - ring
+        to = places[:, None] - ring
+        inside = (edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] >= 0.0).all(axis=1)
+        own = cells.edges.cell == k
+        alone = CellEdges(
+            *(each[own] for each in (cells.edges.start, cells.edges.end)),
+            np.zeros(own.sum(), dtype=int),
+            cells.edges.beyond[own],
+        )
+        there = [value(alone, (place - cells.generators[k])[None], f)[0] for place in places[inside]]
+        assert max(there, default=0.0) <= most[k] * (1.0 + 1e-12)
+
+
 @pytest.mark.parametrize("f", FUNCTIONS, ids=repr)
 @pytest.mark.parametrize("scale", [1e-9, 1e-4, 1.0, 1e5, 1e9])
 @pytest.mark.parametrize("aspect", [1.0, 1e-3, 1e-6, 1e-9])

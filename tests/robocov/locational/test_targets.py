@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from voronoi_cases import PENTAGON, scattered
 
-from robocov.controllers import make_controller
+from robocov.controllers import Lloyd, Rapf, make_controller
+from robocov.cost import CoverageCost
 from robocov.density import Uniform
-from robocov.environment import Environment
+from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
-from robocov.locational import Distance, Sensing
+from robocov.locational import Distance, Sensing, value
 from robocov.locational.best_points import best_points
 from robocov.locational.targets import TARGETS, targets
 from robocov.observation import Observations
@@ -77,3 +78,35 @@ def test_at_rest_a_team_is_where_its_targets_are(empty: Environment) -> None:
         ends.append(last)
     assert np.abs(ends[0] - ends[2]).max() > 1e-3
     assert np.abs(ends[0] - ends[1]).max() > 1e-3
+
+
+def test_a_sensor_sees_more_from_its_own_target_and_without_walls_the_cost_is_the_same() -> None:
+    box = Environment("box", ((0, 0), (12, 0), (12, 7), (0, 7)))
+    starts = np.random.default_rng(0).uniform([0.5, 0.5], [11.5, 6.5], (5, 2))
+    height, seen, costs = 0.5, [], []
+    for target in ("centroid", "sensing"):
+        law = Lloyd(target=target, height=height)
+        last = Simulation(box, law, starts=starts, dt=1 / 30).run(20.0).positions[-1]
+        cells = partition(last, box.region)
+        seen.append(value(cells.edges, np.zeros((5, 2)), Sensing(height)).sum())
+        costs.append(CoverageCost(box, 48)(last).mean_distance)
+    assert 1.0002 < seen[1] / seen[0] < 1.01
+    assert costs[1] / costs[0] == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("held", ["centroid", "sensing"])
+def test_a_wall_holds_a_robot_whose_goal_has_its_foot_on_it(held: str) -> None:
+    """The targets are 1 m apart behind a wall that ends between them; either may be the one that is held."""
+    corners = ((0.0, 0.0), (12.0, 0.0), (0.0, 6.0))
+    whole = partition(np.array([[3.5, 0.5]]), Region(np.array(corners)))
+    goals = {word: targets(whole, None, word, 1.0)[0] for word in ("centroid", "sensing")}
+    end = 3.5
+    assert goals["sensing"][0] + 0.4 < end < goals["centroid"][0] - 0.4
+    wall = WallObstacle(((end, 1.2), (8.0 if held == "centroid" else 0.8, 1.2)), 0.1)
+    room = Environment("room", corners, (wall,))
+    for word, goal in goals.items():
+        last = Simulation(room, Rapf(target=word), [[end, 0.5]], dt=1 / 30).run(30.0).positions[-1][0]
+        if word == held:
+            assert last[1] < 1.0 and last[0] == pytest.approx(goal[0], abs=0.05)
+        else:
+            assert last[1] > 1.5 and np.hypot(*(last - goal)) < 0.4
