@@ -82,7 +82,8 @@ class Barrier:
     on, is granted by leaving out what passing a lone point by would allow.
 
     Robots do not hear velocities: each derives its neighbours' from two positions that it heard. Obstacle
-    points are the closest one and the last scan's. Decided here: the root is rounded over the last
+    points are the closest one and the last scan's. That the bodies and limits of the others are known is
+    taken for granted. Decided here: the root is rounded over the last
     millimetre, and inside the safe distance continued as an odd function, so that who begins too near is
     led out.
 

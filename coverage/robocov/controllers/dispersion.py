@@ -53,7 +53,9 @@ class Dispersion:
     The paper's robots go at constant speed, and never rest. For placements to compare, a robot that is
     alone rests by default, and the speed falls to zero at `reach`, so that nobody trembles there.
 
-    Taken from the paper's abstract and what is generally known of it, not from its text.
+    Taken from the paper's abstract and what is generally known of it, not from its text, are the
+    behaviours and their order; the formula of each is made here. That others may be as large as the
+    largest of the team is taken for granted.
     """
 
     name: ClassVar[str] = "dispersion"

@@ -57,7 +57,8 @@ class Howard:
     closest point stands for a straight wall across. Below 5 cm the forces no longer grow.
 
     Taken from what is generally known of the paper, not from its text: sum over all ranged obstacles
-    and robots, inverse-square forces, viscous friction.
+    and robots, inverse-square forces, viscous friction. Decided here: the share of a ray, the cap
+    below 5 cm, and that the robots are those which are heard, as the range sensor does not see robots.
     """
 
     name: ClassVar[str] = "howard"

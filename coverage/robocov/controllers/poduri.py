@@ -39,7 +39,8 @@ class Poduri:
     none is lost takes robots that can do what the forces ask for: two that part at full speed must be
     able to stop within (1 - eta) R_c. The closest obstacle point pushes as (24) does, within `rho_obs`.
 
-    Taken from what is generally known of the paper, not from its text.
+    Taken from what is generally known of the paper, not from its text, are the two forces, their
+    balance at eta R_c and the degree of at least K; the repulsion from obstacles is (24), as RAPF has it.
     """
 
     name: ClassVar[str] = "poduri"

@@ -32,7 +32,9 @@ class RangeLimited:
     The centroid is exact with density 1; another density is integrated over a polygon, whose chords
     stand for the arcs (see `robocov.voronoi.disc_cells`).
 
-    Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text.
+    Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text: cells,
+    cost and gradient. Decided here: that the motion is Lloyd's, straight to the centroid with the limits of
+    the robots, and that r may be less than the communication range, which in a simulation need not end.
     """
 
     name: ClassVar[str] = "range-limited"

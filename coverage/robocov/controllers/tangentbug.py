@@ -73,7 +73,8 @@ class TangentBug:
     own sensor; its body is accounted for by widening what they meet by radius and `clearance`.
     Robots that are near are gone round by sliding along them.
 
-    Taken from the paper's abstract and what is generally known of both papers, not from their text.
+    Taken from the paper's abstract and what is generally known of both papers, not from their text. That
+    others may be as large as the largest of the team is taken for granted.
     """
 
     name: ClassVar[str] = "tangentbug"
