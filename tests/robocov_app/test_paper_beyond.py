@@ -16,7 +16,16 @@ from tiny_paper import TINY, TINY_BEYOND, means, shared
 from robocov.controllers import CONTROLLERS
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.paper import beyond, beyond_studies, beyond_writing, evidence, goals, steps, studying
+from robocov_app.paper import (
+    beyond,
+    beyond_studies,
+    beyond_writing,
+    evidence,
+    goals,
+    rival_gains,
+    steps,
+    studying,
+)
 from robocov_app.paper import plan as planned
 from robocov_app.paper.beyond import among_rivals, forecast_beyond, studied_beyond
 from robocov_app.paper.beyond_plots import WORDS, beyond_figures, gap_samples
@@ -34,9 +43,11 @@ PLAN = replace(TINY, duration=3.0, generated=(1,), beyond=TINY_BEYOND)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def small_teams():
-    """Time steps of teams that are small, and few of them."""
+def small_parts():
+    """Try two sets of each rival's gains; time steps of teams that are small, and few of them."""
     with pytest.MonkeyPatch.context() as patch:
+        two = {name: (grid[0], grid[-1]) for name, grid in rival_gains.GRIDS.items()}
+        patch.setattr(rival_gains, "GRIDS", two)
         patch.setattr(steps, "BLOCK", 3)
         for module in (beyond, evidence, goals, beyond_writing):
             patch.setattr(module, "LARGE", 8)
@@ -80,6 +91,19 @@ class TestRuns:
         assert material.failed == 0
         again = forecast_beyond(folder, PLAN, 2, alone=True)
         assert (again.left, again.seconds, again.runs) == (0, 0.0, material.runs + 2 * 3 * 4)
+
+    def test_rivals_have_the_gains_that_were_best_on_the_maps_of_the_tuning(self, study):
+        folder, material = study
+        assert set(material.gains) == {law.controller for law in beyond_studies.rivals()}
+        table = read_results(folder / "studies" / "rivals").to_table().to_pylist()
+        for name, grid in material.gains.items():
+            assert [tuple(each) for each in grid.scenarios] == [
+                ("generated-101", start, PLAN.tuning_seed) for start in PLAN.tuning_starts
+            ]
+            best = grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+            for row in table:
+                if row["controller"] == name:
+                    assert {gain: row[gain] for gain in best} == best
 
     def test_every_registered_controller_has_a_row(self, material):
         rows = evidence_rows(material.outcomes, material.contenders, material.steps)
@@ -251,6 +275,12 @@ class TestPage:
             assert goal.words in plain
         assert goal_words(beyond_writing.beyond_goals(material)) in plain
         assert goal_words([]) == "Nothing was measured."
+
+    def test_it_says_where_the_gains_of_rivals_come_from(self, content, material):
+        plain = content.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
+        for name, grid in material.gains.items():
+            assert rival_gains.gains_words(name, grid) in plain
+        assert "on 1 generated maps (seeds 101)" in plain
 
     def test_the_same_runs_give_the_same_page(self, content, material):
         images = {name: Image(name, 2148, 900, words) for name, words in WORDS.items()}

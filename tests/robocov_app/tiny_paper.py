@@ -38,6 +38,7 @@ TINY_BEYOND = BeyondPlan(
     bundled=None,
     generated=None,
     starts=("corner",),
+    tuning=(101,),
     seeds=(0,),
     own_seeds=(0,),
     shared_seeds=(0,),

@@ -22,6 +22,7 @@ from robocov_app.paper.figures import Shown
 from robocov_app.paper.maps import KINDS
 from robocov_app.paper.outcomes import Outcomes, joined
 from robocov_app.paper.reading import read_gain_outcomes, read_outcomes, scenarios_of
+from robocov_app.paper.rival_gains import NAME, rival_gains_study, studied_rival_gains, tuned_rivals
 from robocov_app.paper.steps import step_times
 from robocov_app.paper.studying import (
     Forecast,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from robocov.record import Record
     from robocov_app.paper.contenders import Contender
     from robocov_app.paper.degradation import Degradation
-    from robocov_app.paper.outcomes import Scenario
+    from robocov_app.paper.outcomes import GainOutcomes, Scenario
     from robocov_app.paper.plan import Plan
     from robocov_app.paper.references import Reference
     from robocov_app.paper.steps import StepTimes
@@ -74,6 +75,8 @@ class BeyondMaterial:
     outcomes : Outcomes
         Of all contenders: those of the claims, the rivals, and ours.
     contenders : tuple of Contender
+    gains : dict of controller to GainOutcomes
+        Of the rivals whose gains were tuned here.
     references : dict of map to Reference
     steps : dict of number of robots to StepTimes
     worst : sequence of (Scenario, Record)
@@ -91,6 +94,7 @@ class BeyondMaterial:
     plan: Plan
     outcomes: Outcomes
     contenders: tuple[Contender, ...]
+    gains: Mapping[str, GainOutcomes]
     references: Mapping[str, Reference]
     steps: Mapping[int, StepTimes]
     worst: Sequence[tuple[Scenario, Record]]
@@ -133,22 +137,26 @@ def studied_beyond(folder: Path, plan: Plan, means: Means, material: Material | 
     else:
         known = dict(material.references)
         papers, claims = planned.claim_contenders(material.best), material.claims
-    rival_studies = beyond_studies.rival_studies(plan)
+    gains = studied_rival_gains(folder, plan, means)
+    tuned = tuned_rivals(gains)
+    rival_studies = beyond_studies.rival_studies(plan, tuned)
     small = beyond_studies.small_studies(plan)
     known |= referenced(beyond_studies.small_maps(plan), folder, plan, means)
-    swept_together(beyond_studies.all_studies(plan), folder, means, "paper: beyond")
+    swept_together(beyond_studies.all_studies(plan, tuned), folder, means, "paper: beyond")
     others = tuple(law for _, laws in rival_studies.values() for law in laws)
     parts = [among_rivals(claims, plan)]
     for name, (study, laws) in rival_studies.items():
         parts.append(read_outcomes(folder / "studies" / name, study, laws, known))
     steps = timed(folder, plan, means)
-    counts = [counted_runs(folder / "studies" / name) for name in (*rival_studies, *small)]
+    done = [*([NAME] if gains else ()), *rival_studies, *small]
+    counts = [counted_runs(folder / "studies" / name) for name in done]
     outcomes = joined(parts)
     return BeyondMaterial(
         plan=plan,
         outcomes=outcomes,
         worst=_worst(plan, outcomes, rival_studies),
         contenders=(*papers, *others),
+        gains=gains,
         references=known,
         steps=steps,
         targets=read_outcomes(
@@ -209,6 +217,9 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
     from robocov_app.sweep.task import tasks_of
 
     studies = beyond_studies.all_studies(plan)
+    tuning = rival_gains_study(plan)
+    if tuning is not None:
+        studies[NAME] = tuning
     if alone:
         studies["claims"] = planned.study_of(
             plan, planned.claim_maps(plan), beyond_studies.UNTUNED, KINDS, plan.seeds
@@ -228,7 +239,7 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
     work = 0.0
     for name, study in studies.items():
         left = len(study) - min(runs_there(folder, name), len(study))
-        mean = float(np.mean([each[law] for law in study.controllers]))
+        mean = float(np.mean([each[law] for law in study.controllers for _ in study.gains_of(law).choices]))
         work += left * mean * study.duration
     seconds = {law: value * plan.duration for law, value in each.items()}
     return Forecast(runs, runs - there, work / workers, seconds)

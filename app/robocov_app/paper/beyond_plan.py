@@ -23,6 +23,8 @@ class BeyondPlan:
     bundled, generated : maps of the rivals, among those of the claims; None for all of them
     starts : names
         Kinds of starts of the rivals.
+    tuning : seeds of generated maps of the rivals' grids of gains
+        Among those of the paper's grids; without any, rivals keep their defaults.
     seeds, own_seeds, shared_seeds : seeds of the starts
         For the rivals, for our own controller, and for that which shares its map; among those of the claims.
     maps : seeds of generated maps for targets, density and mixed teams
@@ -43,6 +45,7 @@ class BeyondPlan:
     bundled: tuple[str, ...] | None
     generated: tuple[int, ...] | None
     starts: tuple[str, ...]
+    tuning: tuple[int, ...]
     seeds: tuple[int, ...]
     own_seeds: tuple[int, ...]
     shared_seeds: tuple[int, ...]
@@ -65,6 +68,7 @@ FULL = BeyondPlan(
     bundled=None,
     generated=None,
     starts=("corner", "centre", "uniform"),
+    tuning=(101, 102, 103, 104),
     seeds=(0,),
     own_seeds=(0, 1, 2, 3),
     shared_seeds=(0,),
@@ -84,6 +88,7 @@ QUICK = BeyondPlan(
     bundled=("rooms",),
     generated=(1,),
     starts=("corner",),
+    tuning=(),
     seeds=(0,),
     own_seeds=(0,),
     shared_seeds=(0,),

@@ -1,16 +1,17 @@
 """What is run beyond the paper, study by study, with all parameters in one place.
 
-1. ``ours``, ``ours-shared``, ``rivals``: every registered controller, on the maps of the claims and from the
+1. ``rival-gains``: grids of the rivals' gains, on maps of their own (see `rival_gains`);
+2. ``ours``, ``ours-shared``, ``rivals``: every registered controller, on the maps of the claims and from the
    same starts as those of the paper, whose runs are used;
-2. ``targets``: RAPF heading for another optimum of its cell than the centroid;
-3. ``density``, ``density-ignored``: RAPF that knows what places count, and RAPF that does not;
-4. ``teams``: robots that are not equally fast, with cells by distance and by time;
-5. ``conditions-…``: what goes wrong, one study for each axis of `robocov_app.paper.degradation`.
+3. ``targets``: RAPF heading for another optimum of its cell than the centroid;
+4. ``density``, ``density-ignored``: RAPF that knows what places count, and RAPF that does not;
+5. ``teams``: robots that are not equally fast, with cells by distance and by time;
+6. ``conditions-…``: what goes wrong, one study for each axis of `robocov_app.paper.degradation`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ from robocov_app.sweep.study import TEAM, Study, StudyMap
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
+
+NOT_TUNED: Mapping[str, Contender] = {}
+"""Rivals have their default gains."""
 
 UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
 """Contenders of the claims that take part whether the grids of gains have been run or not."""
@@ -65,9 +69,16 @@ def of(plan: Plan) -> BeyondPlan:
     return plan.beyond
 
 
-def rivals() -> tuple[Contender, ...]:
-    """Return all registered controllers that are neither the paper's nor ours, with their default gains."""
-    return tuple(contender(name) for name in CONTROLLERS if name not in (*IN_CLAIMS, *OURS))
+def rivals(tuned: Mapping[str, Contender] = NOT_TUNED) -> tuple[Contender, ...]:
+    """Return all registered controllers that are neither the paper's nor ours.
+
+    Parameters
+    ----------
+    tuned : dict of controller to Contender
+        Those with their best gains; all others have their default ones.
+    """
+    names = [name for name in CONTROLLERS if name not in (*IN_CLAIMS, *OURS)]
+    return tuple(tuned.get(name) or contender(name) for name in names)
 
 
 def ours() -> tuple[Contender, ...]:
@@ -91,10 +102,12 @@ def rival_maps(plan: Plan) -> tuple[StudyMap, ...]:
     return claim_maps(wanted)
 
 
-def rival_studies(plan: Plan) -> dict[str, tuple[Study, tuple[Contender, ...]]]:
-    """Return the studies of rivals and ours with who takes part, by name."""
+def rival_studies(
+    plan: Plan, tuned: Mapping[str, Contender] = NOT_TUNED
+) -> dict[str, tuple[Study, tuple[Contender, ...]]]:
+    """Return the studies of rivals and ours with who takes part, by name; `tuned` is that of `rivals`."""
     beyond, found = of(plan), {}
-    parts = {"rivals": rivals()}
+    parts = {"rivals": rivals(tuned)}
     parts |= {f"ours-{each.key}": (each,) for each in ours()}
     maps = rival_maps(plan)
     for name, part in parts.items():
@@ -204,9 +217,9 @@ def small_studies(plan: Plan) -> dict[str, Study]:
     }
 
 
-def all_studies(plan: Plan) -> dict[str, Study]:
-    """Return all studies beyond the paper, by name."""
-    return {**{name: study for name, (study, _) in rival_studies(plan).items()}, **small_studies(plan)}
+def all_studies(plan: Plan, tuned: Mapping[str, Contender] = NOT_TUNED) -> dict[str, Study]:
+    """Return all studies beyond the paper but that of the rivals' gains, by name."""
+    return {**{name: study for name, (study, _) in rival_studies(plan, tuned).items()}, **small_studies(plan)}
 
 
 def probes(plan: Plan) -> Iterator[Study]:

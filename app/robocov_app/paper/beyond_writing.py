@@ -16,6 +16,8 @@ from robocov_app.paper.evidence import Evidence, evidence, evidence_rows
 from robocov_app.paper.extensions import extension_claims
 from robocov_app.paper.goals import EXTENSIONS, GOALS, QUESTIONS, RIVALS, Goal, goals, rival_claims
 from robocov_app.paper.pages import BEYOND_PAGE, PAGE, Image, rendered, save_drawn, style_sheet
+from robocov_app.paper.plan import FULL
+from robocov_app.paper.rival_gains import GRIDS, gains_words
 from robocov_app.paper.steps import BLOCK, MAP
 from robocov_app.paper.strips import Strip, strips
 from robocov_app.paper.verdicts import amount
@@ -198,9 +200,11 @@ def _failures(material: BeyondMaterial) -> list[dict[str, Any]]:
 
 def _section(one: Evidence, each: Sequence[Evidence], material: BeyondMaterial) -> dict[str, Any]:
     """Return what the page says of one controller."""
+    name = one.account.controller
     return {
         "evidence": one,
-        "id": f"controller-{one.account.controller}",
+        "id": f"controller-{name}",
+        "gains": gains_words(name, material.gains[name]) if name in material.gains else "",
         "picture": _picture(one, each, material),
     }
 
@@ -218,6 +222,26 @@ def _picture(one: Evidence, each: Sequence[Evidence], material: BeyondMaterial) 
 def _strip(one: Evidence) -> Strip:
     label = one.best.law.label if one.best else one.account.label
     return Strip(label, one.ours, one.maps)
+
+
+def _gains_told(plan: Plan) -> str:
+    """Return in words where the gains of rivals and ours come from."""
+    tuned = bool(of(plan).tuning)
+    where = plan if tuned else FULL
+    sets = sum(len(grid) for grid in GRIDS.values())
+    words = (
+        f"with the least mean of J/J_ref among {sets} sets of gains for {len(GRIDS)} rivals, in runs of "
+        f"{where.duration:g} s on {len(of(where).tuning)} generated maps (seeds "
+        f"{told.span(of(where).tuning)}) "
+        f"on which nothing is tested, starts {', '.join(where.tuning_starts)} with a seed of their own "
+        f"({where.tuning_seed}). What the sets do not name has its default. Ours has its default gains."
+    )
+    if tuned:
+        return f"Each rival has those {words}"
+    return (
+        f"Each rival has its default gains: those that the full study, robocov paper without --quick, found, "
+        f"{words}"
+    )
 
 
 def _protocol(material: BeyondMaterial) -> list[tuple[str, str]]:
@@ -241,11 +265,7 @@ def _protocol(material: BeyondMaterial) -> list[tuple[str, str]]:
             f"As in the paper's part: {SMALL} discs, the same limits for every controller, a range sensor of "
             f"{team['sensing_range']:g} m, every other robot heard; {plan.duration:g} s.",
         ),
-        (
-            "Gains",
-            "Each rival has its default gains, which were chosen by hand, not tuned on a grid as those of "
-            "RAPF and RPF were. Ours has its default ones.",
-        ),
+        ("Gains", _gains_told(plan)),
         (
             "Runs",
             f"Starts {', '.join(beyond.starts)}; seeds of the starts: "
