@@ -41,7 +41,9 @@ _PARTS = (
 
 _PART_WORDS = {
     "targets": "The paper derives the best place for f = 1/(r² + h²), (14) to (21), and simulates the "
-    "centroid, the best place for r². By (22) the geometric median, the best place for r, is what counts.",
+    "centroid, the best place for r². By (22) the geometric median, the best place for r, is what counts; "
+    "a sensor counts what is within a few h, and hardly anything beyond. Where a wall holds a robot, "
+    "centimetres between two targets may decide how a run ends.",
     "density": "The paper's future work: a weight φ by which some places matter more. Masses and centroids "
     "of the cells are then those of φ, and so is the cost (22).",
     "teams": "The paper's future work: a speed limit for every robot. A place then belongs to the robot that "

@@ -43,10 +43,17 @@ def _grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
 GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
     "howard": _grid(k_robots=(3.0, 10.0, 30.0), k_obs=(0.3, 1.0, 3.0)),
     "poduri": _grid(link_range=(4.0, 6.0, 12.0), k_cover=(3.0, 10.0, 30.0), k_obs=(0.1, 0.3)),
-    "dispersion": (*_grid(reach=(3.5, 5.0, 7.0), k_disperse=(1.0,)), {"reach": 5.0, "k_disperse": 0.3}),
+    "dispersion": (
+        *_grid(reach=(3.5, 5.0, 7.0), k_disperse=(1.0,)),
+        *_grid(reach=(5.0,), k_disperse=(0.3, 3.0)),
+    ),
     "range-limited": _grid(interaction_range=(4.0, 6.0, 9.0, 12.0)),
-    "tangentbug": _grid(detour=(4.0, 8.0, 16.0)),
-    "barrier": _grid(gamma=(5.0, 20.0, 80.0)),
+    "tangentbug": (
+        *_grid(detour=(2.0, 4.0, 8.0, 16.0), moved=(0.5,)),
+        {"detour": 4.0, "moved": 0.25},
+    ),
+    # a higher gamma lets robots of 2 m/s into the safe gap
+    "barrier": (*_grid(gamma=(5.0, 20.0), braking=(0.8,)), {"gamma": 20.0, "braking": 0.5}),
     "geodesic-lloyd": _grid(exponent=(1.0, 1.5, 2.0)),
 }
 """By controller the sets of gains that are tried; what they do not name has its default."""

@@ -69,7 +69,7 @@ class Howard:
     scanning: ClassVar[Scanning] = Scanning(rays=72, period=0.1)
 
     k_robots: float = gain(3.0, "N m²", "charge of the other robots")
-    k_obs: float = gain(3.0, "N m²", "charge of the obstacles, over a full turn of rays")
+    k_obs: float = gain(1.0, "N m²", "charge of the obstacles, over a full turn of rays")
     friction: float = gain(2.0, "N s/m", "nu of the law, in place of the robots' own", high=20.0)
 
     def __post_init__(self) -> None:

@@ -49,9 +49,9 @@ class Poduri:
 
     neighbours: float = gain(2.0, "robots", "K, the neighbours that each robot keeps", high=100.0)
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
-    k_cover: float = gain(3.0, "N m²", "strength of F_cover")
+    k_cover: float = gain(10.0, "N m²", "strength of F_cover")
     eta: float = gain(0.9, "R_c", "distance at which the two forces are equal", low=0.1, high=0.99)
-    k_obs: float = gain(0.3, "N m³", "strength of the repulsion from the closest obstacle point")
+    k_obs: float = gain(0.1, "N m³", "strength of the repulsion from the closest obstacle point")
     rho_obs: float = gain(2.0, "m", "range of that repulsion", low=0.01, high=1e4)
 
     def __post_init__(self) -> None:
