@@ -44,12 +44,13 @@ GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
     "howard": _grid(k_robots=(3.0, 10.0, 30.0), k_obs=(0.3, 1.0, 3.0)),
     "poduri": _grid(link_range=(4.0, 6.0, 12.0), k_cover=(3.0, 10.0, 30.0), k_obs=(0.1, 0.3)),
     "dispersion": (
-        *_grid(reach=(3.5, 5.0, 7.0), k_disperse=(1.0,)),
+        *_grid(reach=(3.5, 4.25, 5.0, 6.0, 7.0), k_disperse=(1.0,)),
         *_grid(reach=(5.0,), k_disperse=(0.3, 3.0)),
     ),
     "range-limited": _grid(interaction_range=(4.0, 6.0, 9.0, 12.0)),
+    # with a detour of 2 it does not get out of a trap any more
     "tangentbug": (
-        *_grid(detour=(2.0, 4.0, 8.0, 16.0), moved=(0.5,)),
+        *_grid(detour=(4.0, 8.0, 16.0), moved=(0.5,)),
         {"detour": 4.0, "moved": 0.25},
     ),
     # a higher gamma lets robots of 2 m/s into the safe gap

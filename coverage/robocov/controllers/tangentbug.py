@@ -89,12 +89,12 @@ class TangentBug:
     )
     jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
     detour: float | None = gain(
-        8.0,
+        4.0,
         "distances",
         "longest way along a boundary, in those to the goal; null for once round",
         optional=True,
     )
-    moved: float = gain(0.5, "m", "way of a goal given up after which it is tried again", high=1e4)
+    moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = gain(
         0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0

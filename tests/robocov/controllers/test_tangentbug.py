@@ -43,9 +43,11 @@ def test_it_gets_out_of_a_u_trap() -> None:
     assert np.hypot(*(lloyd - middle)) > 1.0
 
 
-@pytest.mark.parametrize("reach", [1.0, 2.0, 8.0])
-def test_it_goes_round_with_any_sensor_that_sees_the_wall(reach: float) -> None:
-    simulation = Simulation(U_TRAP, TangentBug(), [[2.5, 4.9]], Team.homogeneous(1, sensing_range=reach), DT)
+@pytest.mark.parametrize(("reach", "detour"), [(1.0, 8.0), (2.0, 4.0), (8.0, 4.0)])
+def test_it_goes_round_with_any_sensor_that_sees_the_wall(reach: float, detour: float) -> None:
+    """One that sees little follows the wall for longer."""
+    team = Team.homogeneous(1, sensing_range=reach)
+    simulation = Simulation(U_TRAP, TangentBug(detour=detour), [[2.5, 4.9]], team, DT)
     for _ in range(round(40 / DT)):
         simulation.step()
     np.testing.assert_allclose(simulation.positions[0], [5.0, 5.0], atol=0.05)
