@@ -82,10 +82,16 @@ def test_the_set_with_the_least_mean_is_taken():
     assert all(each.gains == {} for each in rivals if each.controller != "range-limited")
 
 
+def test_without_a_scenario_in_which_every_run_was_well_the_defaults_stay():
+    found = outcomes((1.2, np.nan), (np.nan, 1.1))
+    assert tuned_rivals({"range-limited": found}) == {}
+    assert gains_words("range-limited", found).startswith("Gains: its defaults; in every scenario")
+
+
 def test_it_is_told_what_tuning_was_worth():
     better = gains_words("range-limited", outcomes((1.2, 1.2, 1.5), (1.5, 1.8, 2.1), (0.9, 1.2, 1.2)))
     assert better == (
-        "Gains: interaction_range 22: of 3 sets the best on 3 maps of the tuning, J/J_ref 1.100; "
+        "Gains: interaction_range 22: of 3 sets the best on 3 maps of the tuning, mean J/J_ref 1.100; "
         "with its defaults 1.3, median ratio 0.8; with the worst set 1.8, median ratio 0.6."
     )
     usual = gains_words("range-limited", outcomes((1.2, 1.2, 1.2), (1.8, 2.4, np.nan)))

@@ -97,8 +97,15 @@ def studied_rival_gains(folder: Path, plan: Plan, means: Means) -> dict[str, Gai
 
 
 def tuned_rivals(found: Mapping[str, GainOutcomes]) -> dict[str, Contender]:
-    """Return the rivals with their best gains: the sets with the least mean of J/J_ref."""
-    return {name: _contender(name, grid.gains[grid.best()]) for name, grid in found.items()}
+    """Return the rivals with their best gains: the sets with the least mean of J/J_ref.
+
+    One of which in every scenario some run failed is left out.
+    """
+    return {
+        name: _contender(name, grid.gains[grid.best()])
+        for name, grid in found.items()
+        if grid.complete.scenarios
+    }
 
 
 def gains_words(controller: str, grid: GainOutcomes) -> str:
@@ -107,6 +114,8 @@ def gains_words(controller: str, grid: GainOutcomes) -> str:
     Ratios are medians over the runs, pair by pair, in those scenarios in which no set failed.
     """
     grid = grid.complete
+    if not grid.scenarios:
+        return "Gains: its defaults; in every scenario of the tuning some run failed."
     best, worst = grid.best(), int(np.argmax(grid.excess.mean(axis=1)))
     varied = [name for name in grid.gains[best] if len({gains[name] for gains in grid.gains}) > 1]
     values = ", ".join(f"{name} {value_text(grid.gains[best][name])}" for name in varied)
@@ -116,7 +125,7 @@ def gains_words(controller: str, grid: GainOutcomes) -> str:
     if own == best:
         head += ", which are its defaults"
     sets, maps = len(grid.gains), len(set(grid.maps))
-    told = f"{head}: of {sets} sets the best on {maps} maps of the tuning, J/J_ref {_mean(grid, best)}"
+    told = f"{head}: of {sets} sets the best on {maps} maps of the tuning, mean J/J_ref {_mean(grid, best)}"
     if own is not None and own != best:
         told += f"; with its defaults {_mean(grid, own)}, median ratio {_ratio(grid, best, own)}"
     return f"{told}; with the worst set {_mean(grid, worst)}, median ratio {_ratio(grid, best, worst)}."
