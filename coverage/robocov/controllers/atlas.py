@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,8 @@ FINEST_CELL = 0.1
 
 MOST_CELLS = 250_000
 
-MOST_NODES, CROWD_NODES = 1000, 400
-"""Nodes of the lattice on which a robot plans: for its whole team, and for itself in a crowd."""
+TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 400
+"""Nodes of the lattices on which a robot plans: for its whole team, for itself, and for itself in a crowd."""
 
 CREW = 8
 """A robot plans for itself and up to so many less one that it hears. Where it hears more it only considers
@@ -55,6 +55,14 @@ _TOGETHER = 1.5
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
+class Moving(NamedTuple):
+    """When a robot relocates: parts of the cost that it must save, and whether among what is known alone."""
+
+    threshold: float
+    nearby: float
+    sure: bool
+
+
 @dataclass(frozen=True)
 class Atlas:
     """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
@@ -66,15 +74,16 @@ class Atlas:
         J(P) = sum over q of w_q min_j d(q, p_j),
 
     where q are the nodes of a lattice, d the geodesic distances among the walls that it knows, and w_q the
-    areas, times φ; an unknown patch counts by its openness: insides of obstacles hardly do (`Stock`).
+    areas, times φ; what is unknown counts by its openness: insides of obstacles hardly do (`openness`).
 
     1. *A plan for all.* From its former plan on, Lloyd's iteration in turn with interchange (the k-median
-       problem). Who has rested for `STILL_FOR` seconds has said where it wants to be, and is there in the
-       plan. A relocation must save the part `threshold` of J. Who goes where is such that the sum of the
-       squared ways is least, which stays so on the way. Once there has been time to cross the region some
-       times, each decides for itself alone, and relocates only while all others rest.
-    2. *Its own place.* The local minimum of J by its own place, between nodes by a parabola; a goal that
-       saves less than the part `rest` of J is not worth moving.
+       problem), on a coarse lattice. Who has rested for `STILL_FOR` seconds has said where it wants to be,
+       and is there in the plan. Relocations must save the part `threshold` of J, one in its own cell the
+       part `nearby`. Who goes where is such that the sum of the squared ways is least, which stays so on the
+       way. Once there has been time to cross the region some times, each decides for itself alone, by what
+       it knows to be free, and relocates out of its cell only while all others rest.
+    2. *Its own place.* The local minimum of J by its own place, on a fine lattice, between its nodes by a
+       parabola; a goal that saves less than the part `rest` of what its own cell costs is not worth moving.
     3. *A look.* When it is there, it looks at what is still unknown of its own cell, as long as what is at
        stake is more than the part `stake` of J; that doubles for each `patience` seconds of looking.
     4. *The way* is the shortest on its map, with braking before walls and other robots (`steering`).
@@ -93,7 +102,8 @@ class Atlas:
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
-    rest: float = gain(0.001, "1", "part of the cost that a new goal must save", high=1.0)
+    nearby: float = gain(0.003, "1", "part of the cost that a relocation in its own cell must save", high=1.0)
+    rest: float = gain(0.004, "1", "part of its own cell's cost that a new goal must save", high=1.0)
     stake: float = gain(0.004, "1", "part of the cost that is worth a look", high=1.0)
     patience: float = gain(4.0, "s", "looking around in which that doubles", low=0.01, high=1e4)
     settling: float = gain(
@@ -161,7 +171,7 @@ class Atlas:
             near = np.sort(np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: CREW - 1])
             others, at = others[near], at[near]
         reach = 1.1 * float(np.sqrt(((at - place) ** 2).sum(axis=1).max())) if crowd else math.inf
-        most = CROWD_NODES if crowd else MOST_NODES
+        most = CROWD_NODES if crowd else OWN_NODES
         window = Window.around(mind.known.raster, place, reach, most)
         spacing = window.stride * mind.known.raster.cell
         # nobody gets farther than to the next node meanwhile
@@ -176,15 +186,15 @@ class Atlas:
         situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
         if mind.idle and mind.planned is mind.known and mind.ways is not None and mind.ways.window == window:
             same = mind.crew is not None and np.array_equal(mind.crew, crew)
-            if same and np.abs(situation - mind.situation).max() < _HARDLY * spacing:
+            same = same and np.abs(situation - mind.situation).max() < _HARDLY * spacing
+            if same and mind.quiet == bool(still.all()):
                 return mind, None
         mind = self._mapped(mind, window, float(team.radius[i]) + self.clearance)
         ways = mind.ways
         assert ways is not None
-        mind = replace(mind, planned=mind.known, situation=situation, crew=crew)
-        share = seen.region.area / (len(watch.robots) + 1)
+        mind = replace(mind, planned=mind.known, situation=situation, crew=crew, quiet=bool(still.all()))
         settling = 2.0 ** min((seen.time - mind.since) / self.settling, 60.0)
-        stock = Stock(mind.known, window, share, seen.density)
+        stock = Stock(mind.known, window, seen.density)
         together = seen.time - mind.since <= _TOGETHER * seen.region.diameter / float(team.max_speed[i])
         if crowd:
             begin = ways.standing(place) if mind.node < 0 else mind.node
@@ -195,7 +205,9 @@ class Atlas:
                 # from now on each decides for itself alone, and nobody goes elsewhere while others do
                 threshold = threshold if still.all() else 1.0
                 still[:] = True
-            mind, begin, elsewhere = self._plan_for_all(mind, stock, still, at, threshold)
+            # who is there already does not leave for what may not be there
+            moving = Moving(threshold, min(1.0, self.nearby * settling), sure=not together)
+            mind, begin, elsewhere = self._plan_for_all(mind, seen, still, at, moving)
         if begin < 0:
             return replace(mind, own=place, idle=False), place
         former = np.full(2, np.nan) if mind.own is None else mind.own
@@ -216,12 +228,17 @@ class Atlas:
         return replace(mind, ways=Ways(mind.known.raster, window, blocked, clearance), table=None, node=node)
 
     def _plan_for_all(
-        self, mind: Mind, stock: Stock, still: BoolArray, at: Array, threshold: float
+        self, mind: Mind, seen: Observations, still: BoolArray, at: Array, moving: Moving
     ) -> tuple[Mind, int, Array]:
         """Return the mind with a plan for the team, the node of the own place, and those of the others."""
-        ways, situation, crew = mind.ways, mind.situation, mind.crew
+        known, ways, situation, crew = mind.known, mind.ways, mind.situation, mind.crew
         assert ways is not None and situation is not None and crew is not None
-        table = Table.of(ways) if mind.table is None else mind.table
+        table = mind.table
+        if table is None:
+            window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
+            blocked = window.cut(known.blocked, True)
+            table = Table.of(Ways(known.raster, window, blocked, ways.clearance))
+        weights = Stock(known, table.ways.window, seen.density, moving.sure).weights
         given = np.concatenate([[False], still])
         begin = situation.copy()
         if mind.places is not None:
@@ -229,7 +246,7 @@ class Atlas:
             _, here, there = np.intersect1d(crew, robots, return_indices=True)
             free = ~given[here]
             begin[here[free]] = places[there[free]]
-        places = team_places(ways, table, stock.weights, situation, begin, given, threshold)
+        places = team_places(table, weights, situation, begin, given, moving.threshold, moving.nearby)
         mind = replace(mind, table=table, places=np.column_stack([crew, places]))
         near = ((ways.nodes - places[0]) ** 2).sum(axis=1)
         near[~ways.roomy] = np.inf
@@ -280,9 +297,11 @@ class Atlas:
         wanted = steering.slowed(wanted, gap)
         robot, _, away, apart = seen.neighbours_within(_HEEDED)
         # of the size of others a robot knows its own
-        wanted = steering.clear_of_robots(wanted, robot, away, apart, 2.0 * team.radius[robot])
+        reach = 2.0 * team.radius[robot]
+        wanted = steering.clear_of_robots(wanted, robot, away, apart, reach)
         walls = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
         wanted = steering.clear_of_walls(wanted, walls, team.radius)
+        wanted = steering.held(wanted, walls, team.radius, robot, away, apart, reach)
         forces = drive(wanted, seen, team, self.response_time)
         goals = np.array([route[-1] for route in memory.routes])
         return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)

@@ -62,6 +62,8 @@ class Mind:
         Where the robots were at the last plan, this one first.
     crew : (k,) or None
         Who they were.
+    quiet : bool
+        Whether all others rested then.
     places : (k, 3) or None
         Where they were to be: number, x, y.
     own : (2,) m
@@ -87,6 +89,7 @@ class Mind:
     planned: DiscoveredMap | None = None
     situation: Array | None = None
     crew: IntArray | None = None
+    quiet: bool = False
     places: Array | None = None
     own: Array | None = None
     node: int = -1

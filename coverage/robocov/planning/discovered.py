@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation.scans import headings
@@ -182,49 +181,6 @@ class DiscoveredMap:
         if np.array_equal(state, self.state):
             return self
         return DiscoveredMap(self.raster, _fixed(state))
-
-
-def patches(state: NDArray[np.uint8], outside: BoolArray) -> tuple[IntArray, Array]:
-    """Return the connected patches of unknown cells, and how open each is.
-
-    The openness of a patch is the part of its border (with cells that are known) where it is free cells
-    that it borders on, and no walls. What has not been seen because it is inside an obstacle has walls
-    nearly all around; what lies in the shadow of an obstacle is open to where the shadow begins.
-
-    Parameters
-    ----------
-    state : (rows, columns)
-        As in `DiscoveredMap`.
-    outside : (rows, columns)
-        Cells that do not count at all.
-
-    Returns
-    -------
-    patch : (rows, columns)
-        Numbers from 1; 0 where it is known what is there.
-    openness : (patches + 1,)
-        From 0 to 1; 1 where nothing around is known.
-
-    Examples
-    --------
-    >>> state = np.array([[3, 3, 3], [3, 0, 1], [3, 3, 3]], dtype=np.uint8)
-    >>> patches(state, np.zeros((3, 3), dtype=bool))[1]
-    array([0.  , 0.25])
-    """
-    label, count = ndimage.label((state == UNKNOWN) & ~outside)
-    free, wall = np.zeros(count + 1), np.zeros(count + 1)
-    ahead, behind, every = slice(1, None), slice(None, -1), slice(None)
-    for here, there in (((ahead, every), (behind, every)), ((every, ahead), (every, behind))):
-        for one, other in ((here, there), (there, here)):
-            patch = label[one]
-            edge = patch > 0
-            patch, beyond = patch[edge], state[other][edge]
-            free += np.bincount(patch[beyond == FREE], minlength=count + 1)
-            wall += np.bincount(patch[beyond >= PRESUMED], minlength=count + 1)
-    border = free + wall
-    openness = np.where(border > 0.0, free / np.maximum(border, 1.0), 1.0)
-    openness[0] = 0.0
-    return label.astype(np.intp), openness
 
 
 def grown(blocked: BoolArray, reach: float) -> BoolArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
@@ -10,12 +12,22 @@ from robocov.arrays.grouping import beginnings
 _MOST = 60
 """Passes; a few are usual."""
 
+_HARDLY = 1e-4
+"""Part of the sum that a step must save: more than rounding."""
+
+_TAKEN = (2, 3)
+"""So many sources are taken away at once."""
+
+_TRIED = 4
+"""So many ways to put them back are tried to the end."""
+
 
 def improved(table: Array, sources: IntArray, given: BoolArray, threshold: float) -> IntArray:
     """Return sources for which the sum over the targets of the nearest one's entries is low.
 
-    Lloyd's iteration in turn with the best swap of one source for another, as long as it lowers the sum by
-    more than `threshold` of it.
+    Lloyd's iteration in turn with the best swap of one source for another, and, where no swap helps, with
+    taking away two or three and putting them back where each helps most. What all this saves must be more
+    than `threshold` of the sum after Lloyd's iteration alone; that one is returned else.
 
     Parameters
     ----------
@@ -27,13 +39,17 @@ def improved(table: Array, sources: IntArray, given: BoolArray, threshold: float
         Which of these stay as they are.
     threshold : float
     """
+    near = best = settled(table, sources, given)
+    if not threshold < 1.0:
+        return near
     for _ in range(_MOST):
-        sources = settled(table, sources, given)
-        after = swapped(table, sources, given, threshold)
-        if after is sources:
+        after = swapped(table, best, given, _HARDLY)
+        if after is best:
+            after = rebuilt(table, best, given, _HARDLY)
+        if after is best:
             break
-        sources = after
-    return sources
+        best = settled(table, after, given)
+    return best if _total(table, best) < (1.0 - threshold) * _total(table, near) else near
 
 
 def settled(table: Array, sources: IntArray, given: BoolArray) -> IntArray:
@@ -70,6 +86,59 @@ def swapped(table: Array, sources: IntArray, given: BoolArray, threshold: float)
     sources = sources.copy()
     sources[place] = source
     return sources
+
+
+def moved(table: Array, sources: IntArray, among: BoolArray, threshold: float) -> IntArray:
+    """Return the sources with the best one of some, (c,), in the place of the first, the others staying.
+
+    What this saves must be more than `threshold` of the sum; the same array is returned else. Unlike Lloyd's
+    iteration, it does not take the clusters for given.
+    """
+    near = table[sources[1:]].min(axis=0, initial=np.inf)
+    sums = np.minimum(table, near).sum(axis=1)
+    before = sums[sources[0]]
+    sums[~among] = np.inf
+    best = int(sums.argmin())
+    if not sums[best] < before * (1.0 - threshold):
+        return sources
+    sources = sources.copy()
+    sources[0] = best
+    return sources
+
+
+def rebuilt(table: Array, sources: IntArray, given: BoolArray, threshold: float) -> IntArray:
+    """Return the sources after some were taken away at once, and put back one by one where each helps most.
+
+    Of all pairs and triples the most promising few are tried to the end, with Lloyd's iteration. The same
+    array is returned where none lowers the sum by the threshold.
+    """
+    free = (~given).nonzero()[0].tolist()
+    far = 10.0 * float(table[sources].max())
+    found: list[tuple[float, IntArray]] = []
+    for away in (each for size in _TAKEN for each in combinations(free, size)):
+        kept = np.delete(sources, away)
+        near = table[kept].min(axis=0) if len(kept) else np.full(table.shape[1], far)
+        after = sources.copy()
+        put = kept
+        for place in away:
+            sums = np.minimum(table, near).sum(axis=1)
+            sums[put] = np.inf
+            after[place] = sums.argmin()
+            put = np.append(put, after[place])
+            near = np.minimum(near, table[after[place]])
+        found.append((float(near.sum()), after))
+    found.sort(key=lambda each: each[0])
+    least, chosen = _total(table, sources) * (1.0 - threshold), sources
+    for _, after in found[:_TRIED]:
+        after = settled(table, after, given)
+        total = _total(table, after)
+        if total < least:
+            least, chosen = total, after
+    return chosen
+
+
+def _total(table: Array, sources: IntArray) -> float:
+    return float(table[sources].min(axis=0).sum())
 
 
 def _after_swaps(table: Array, sources: IntArray) -> tuple[float, Array]:

@@ -4,7 +4,7 @@ The cost is (22) on the nodes of `Ways`, weighted with the area (times the densi
 
     J(P) = sum over q of w_q min_j d(q, p_j)
 
-with geodesic distances d. An unknown node counts by how open its patch is (see `discovered.patches`).
+with geodesic distances d. An unknown cell counts by how likely it is free (see `openness`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.planning.discovered import FREE, UNKNOWN, patches
-from robocov.planning.medians import improved
+from robocov.planning.discovered import FREE, UNKNOWN
+from robocov.planning.medians import improved, moved
+from robocov.planning.openness import openness
 
 if TYPE_CHECKING:
     from robocov.density import Density
@@ -31,9 +33,6 @@ MOST_SOURCES = 180
 
 _FAR = 1e9
 """Metres that stand for "nobody is there"."""
-
-_UNEXPLORED = 0.6
-"""What a patch as large as a robot's share counts at least: so large is no obstacle."""
 
 _SEEN_ENOUGH = 0.6
 """Metres around a place from where somebody has looked: it is not gone to again."""
@@ -47,37 +46,37 @@ class Stock:
     ----------
     known : DiscoveredMap
     window : Window
-    share : float, m²
-        Area of the region for each robot of the team.
     density : Density or None
+    sure : bool
+        Whether only what is known to be free counts.
     """
 
     known: DiscoveredMap
     window: Window
-    share: float
     density: Density | None = None
+    sure: bool = False
 
     def __deepcopy__(self, memo: object) -> Stock:
         return self
 
     @cached_property
-    def _parts(self) -> tuple[NDArray[np.uint8], IntArray, Array]:
-        """Return state, patches and their openness in the window."""
-        outside = self.window.cut(self.known.raster.outside, True)
-        state = self.window.cut(self.known.state, np.uint8(UNKNOWN))
-        patch, openness = patches(state, outside)
-        area = np.bincount(patch.ravel(), minlength=len(openness)) * self.known.raster.cell**2
-        openness = np.maximum(openness, _UNEXPLORED * np.minimum(1.0, area / self.share))
-        openness[0] = 0.0
-        return state, patch, openness
+    def _state(self) -> NDArray[np.uint8]:
+        return self.window.cut(self.known.state, np.uint8(UNKNOWN))
+
+    @cached_property
+    def _outside(self) -> BoolArray:
+        return self.window.cut(self.known.raster.outside, True)
+
+    @cached_property
+    def _openness(self) -> Array:
+        return openness(self._state, self._outside)
 
     @cached_property
     def weights(self) -> Array:
         """How many cells each node stands for, (m,); unknown ones count by their openness."""
-        _, patch, openness = self._parts
         window = self.window
-        blocked = window.cut(self.known.blocked, True)
-        worth = np.where(blocked, 0.0, np.where(patch > 0, openness[patch], 1.0))
+        worth = np.where(self._state == FREE, 1.0, 0.0 if self.sure else self._openness)
+        worth[self._outside] = 0.0
         blocks = worth.reshape(window.rows, window.stride, window.columns, window.stride)
         weights = blocks.sum(axis=(1, 3)).ravel()
         if self.density is not None and not self.density.uniform:
@@ -91,9 +90,9 @@ class Stock:
     ) -> Array | None:
         """Return where to look at what may matter most, of the unknown patches in a robot's own cell.
 
-        At stake is what the patch, if it were all free, would add to the cost, times its openness: an
-        inside of an obstacle has hardly any. The place is a free cell on the border of the patch, chosen by
-        stake over one metre plus the way.
+        At stake is what a patch is expected to add to the cost: an inside of an obstacle hardly adds
+        anything. The place is a free cell on the border of the patch, chosen by stake over one metre plus
+        the way.
 
         Parameters
         ----------
@@ -113,11 +112,12 @@ class Stock:
         (2,) m, or None
             When there is nothing to look at.
         """
-        state, patch, openness = self._parts
+        state = self._state
+        patch, _ = ndimage.label((state == UNKNOWN) & ~self._outside)
         row, column = patch.nonzero()
         label = patch[row, column]
         node = row // self.window.stride * self.window.columns + column // self.window.stride
-        stake = np.bincount(label, mine[node], minlength=len(openness)) * openness
+        stake = np.bincount(label, mine[node] * self._openness[row, column])
         good = stake[label] > least
         row, column, label = row[good], column[good], label[good]
         if not len(label):
@@ -147,10 +147,12 @@ class Table:
 
     Attributes
     ----------
+    ways : Ways
     sources : (c,)
     distance : (c, m) m
     """
 
+    ways: Ways
     sources: IntArray
     distance: Array
 
@@ -168,27 +170,27 @@ class Table:
                 break
             k += 1
         sources = chosen.nonzero()[0]
-        return cls(sources, ways.table(sources))
+        return cls(ways, sources, ways.table(sources))
 
 
 def team_places(
-    ways: Ways,
     table: Table,
     weights: Array,
     now: Array,
     begin: Array,
     given: BoolArray,
     threshold: float,
+    nearby: float,
 ) -> Array:
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
-    From `begin` on, Lloyd's iteration in turn with interchange (see `medians.improved`); who goes to which of
-    the places is such that the sum of the squared ways is least: then the choice stays the same while the
-    robots are on their way, and their ways do not cross.
+    From `begin` on, Lloyd's iteration in turn with interchange (see `medians.improved`); where all others are
+    given, who plans then goes to the best place of its own cell. Who goes to which of the places is such that
+    the sum of the squared ways is least: then the choice stays the same while the robots are on their way,
+    and their ways do not cross.
 
     Parameters
     ----------
-    ways : Ways
     table : Table
     weights : (m,)
     now : (k, 2) m
@@ -199,7 +201,10 @@ def team_places(
         Who stays where `begin` says.
     threshold : float
         Part of the cost that a relocation must save.
+    nearby : float
+        Part of the cost that one in the own cell must save.
     """
+    ways = table.ways
     home = ways.standing(now[0])
     if home < 0:
         return begin
@@ -219,7 +224,14 @@ def team_places(
         away[taken] = np.inf
         chosen[k] = away.argmin()
         taken[chosen[k]] = True
-    chosen = improved(distance[:, target] * weights[target], chosen, given, threshold)
+    weighed = distance[:, target] * weights[target]
+    # in an order that does not depend on who plans: of two equal plans all take the same
+    order = np.lexsort(begin.T)
+    chosen[order] = improved(weighed, chosen[order], given[order], threshold)
+
+    if given[1:].all():
+        own = distance[:, sources[chosen]].argmin(axis=1) == 0
+        chosen = moved(weighed, chosen, own, nearby)
 
     places = nodes[chosen]
     mobile = (~given).nonzero()[0]
@@ -259,7 +271,7 @@ def own_place(
 
     From a node on, as long as a neighbouring node is better; then the minimum of the parabolas, in x and
     in y, through the costs of the node and those beside it. The former goal is kept where the new one is
-    better by less than a part `rest` of the cost.
+    better by less than a part `rest` of what its own cell costs.
 
     Parameters
     ----------
@@ -295,12 +307,12 @@ def own_place(
         if not cost(best) < known[node]:
             break
         node = best
-    goal, fall = _refined(ways, node, cost, former)
-    if np.isfinite(former).all() and fall < rest * known[node]:
-        goal = former.copy()
     mine = np.zeros(len(weights))
     away = ways.near(node, limit)[target]
     mine[target] = np.where(away < near, np.minimum(away, limit), 0.0)
+    goal, fall = _refined(ways, node, cost, former)
+    if np.isfinite(former).all() and fall < rest * float((worth * mine[target]).sum()):
+        goal = former.copy()
     return OwnPlace(goal, node, mine, known[node])
 
 

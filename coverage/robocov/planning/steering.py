@@ -3,7 +3,8 @@
 A robot that is `gap` metres off something that does not move may approach it with at most
 ``sqrt(2 b gap)``: it then stops before it with the deceleration b. Two robots share the gap between them.
 The velocity is the wanted one, corrected along the directions to what is too close (the correction is
-the projection onto the half-plane of velocities that are allowed, for the most violated one first).
+the projection onto the half-plane of velocities that are allowed, for the most violated one first). Where
+corrections contradict each other, as between a wall and a robot, it is slowed down until all is allowed.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ CREEP = 0.15
 """Speed at which a robot moves along what it is closest to, m/s; the more room, the faster."""
 
 _ROUNDS = 3
+_TOLERANCE = 0.01
+"""Speed, m/s, by which an approach may be too fast before it is slowed down."""
+
 _ASIDE = 0.3
 """Largest speed, m/s, at which robots that stand in each other's way pass on the left."""
 
@@ -50,12 +54,7 @@ def clear_of_walls(velocity: Array, offset: Array, radius: Array) -> Array:
         From points of walls to the robot; nan where there is none.
     radius : (n,) m
     """
-    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
-    gap = distance - radius[:, None] - MARGIN
-    allowed = np.where(gap > 0.0, np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
-    allowed = np.where(np.isnan(gap), np.inf, allowed)
-    normal = offset / np.maximum(distance, 1e-9)[..., None]
-    normal = np.where(np.isnan(normal), 0.0, normal)
+    normal, allowed = _wall_limits(offset, radius)
     rows = np.arange(len(velocity))
     for _ in range(_ROUNDS):
         approach = -(normal[..., 0] * velocity[:, None, 0] + normal[..., 1] * velocity[:, None, 1])
@@ -84,9 +83,7 @@ def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: A
     """
     if not len(robot):
         return velocity
-    gap = distance - reach - APART
-    allowed = np.where(gap > 0.0, 0.5 * np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
-    normal = offset / np.maximum(distance, 1e-9)[:, None]
+    normal, allowed = _robot_limits(offset, distance, reach)
     n = len(velocity)
     velocity = velocity.copy()
     # first past each other, then, in a throng, at least not into anybody
@@ -106,3 +103,50 @@ def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: A
         left = np.column_stack([normal[chosen, 1], -normal[chosen, 0]])
         velocity[rows] += normal[chosen] * over[:, None] + left * np.minimum(over, aside)[:, None]
     return velocity
+
+
+def held(
+    velocity: Array,
+    walls: Array,
+    radius: Array,
+    robot: IntArray,
+    offset: Array,
+    distance: Array,
+    reach: Array,
+) -> Array:
+    """Return velocities that are slowed down where they still approach anything faster than is allowed.
+
+    Who is too close already may not get closer. Parameters are those of `clear_of_walls` and of
+    `clear_of_robots`.
+    """
+    normal, allowed = _wall_limits(walls, radius)
+    approach = -(normal[..., 0] * velocity[:, None, 0] + normal[..., 1] * velocity[:, None, 1])
+    part = _part(approach, allowed).min(axis=1, initial=1.0)
+    if len(robot):
+        normal, allowed = _robot_limits(offset, distance, reach)
+        approach = -(normal * velocity[robot]).sum(axis=1)
+        np.minimum.at(part, robot, _part(approach, allowed))
+    return np.asarray(velocity * part[:, None])
+
+
+def _part(approach: Array, allowed: Array) -> Array:
+    allowed = np.maximum(allowed, 0.0) + _TOLERANCE
+    fast = approach > allowed
+    return np.where(fast, allowed / np.where(fast, approach, 1.0), 1.0)
+
+
+def _wall_limits(offset: Array, radius: Array) -> tuple[Array, Array]:
+    """Return (n, k, 2) directions away from walls, 0 for none, and (n, k) speeds of approach, m/s."""
+    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
+    gap = distance - radius[:, None] - MARGIN
+    allowed = np.where(gap > 0.0, np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    allowed = np.where(np.isnan(gap), np.inf, allowed)
+    normal = offset / np.maximum(distance, 1e-9)[..., None]
+    return np.where(np.isnan(normal), 0.0, normal), allowed
+
+
+def _robot_limits(offset: Array, distance: Array, reach: Array) -> tuple[Array, Array]:
+    """Return (m, 2) directions away from neighbours, and (m,) speeds of approach: a half each."""
+    gap = distance - reach - APART
+    allowed = np.where(gap > 0.0, 0.5 * np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    return offset / np.maximum(distance, 1e-9)[:, None], allowed

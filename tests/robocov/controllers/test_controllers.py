@@ -174,8 +174,9 @@ def test_the_information_test_can_fail(controller: Controller) -> None:
     positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
     team = Team.homogeneous(3)
     seen = observations(positions, np.inf, 1)
-    # who flees at full speed goes by the direction alone
-    step = [0.5, 0.7] if controller.name == "dispersion" else [0.6, 0.3]
+    # who flees at full speed goes by the direction alone, who plans by what is nearest on a lattice
+    steps = {"dispersion": [0.5, 0.7], "atlas": [-2.5, -3.0], "atlas-shared": [-2.5, -3.0]}
+    step = steps.get(controller.name, [0.6, 0.3])
     moved = observations(positions + [[0, 0], step, [0, 0]], np.inf, 1)
     one = controller.decide(seen, controller.begin(REGION, team)).forces[0]
     other = controller.decide(moved, controller.begin(REGION, team)).forces[0]

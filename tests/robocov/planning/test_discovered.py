@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment
-from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, grown, patches
+from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, grown
 from robocov.sensor import RangeSensor
 from robocov.world.solid import solid_pieces
 
@@ -88,22 +88,6 @@ def test_maps_are_merged(cluttered: Environment, sensor: RangeSensor) -> None:
     assert ((both.state == UNKNOWN) == ((one.state == UNKNOWN) & (other.state == UNKNOWN))).all()
     assert both.merged([one, other]) is both
     assert np.array_equal(other.merged([one]).state, both.state)
-
-
-def test_an_inside_has_no_openness_and_a_shadow_has() -> None:
-    state = np.full((12, 20), FREE, dtype=np.uint8)
-    state[2:7, 2:7] = WALL
-    state[3:6, 3:6] = UNKNOWN
-    state[8:11, 12:18] = UNKNOWN
-    state[7, 12:18] = WALL
-    patch, openness = patches(state, np.zeros_like(state, dtype=bool))
-    assert openness[patch[4, 4]] == 0.0
-    # six cells of wall below; three free ones at each side, six above
-    assert openness[patch[9, 14]] == pytest.approx(12 / 18)
-    assert patch[0, 0] == 0
-    alone, value = patches(np.zeros((3, 3), dtype=np.uint8), np.zeros((3, 3), dtype=bool))
-    assert (alone == 1).all()
-    assert value[1] == 1.0
 
 
 @settings(max_examples=20)

@@ -43,3 +43,27 @@ def test_two_that_meet_pass_on_the_left() -> None:
     np.testing.assert_allclose(safe[0], -safe[1])
     nobody = steering.clear_of_robots(velocity, np.empty(0, dtype=int), np.empty((0, 2)), *np.empty((2, 0)))
     assert np.array_equal(nobody, velocity)
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 10_000))
+def test_where_corrections_contradict_each_other_it_is_slow_enough_for_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, k = 12, 6
+    velocity, radius = rng.normal(size=(n, 2)), np.full(n, 0.1)
+    walls = rng.normal(scale=0.2, size=(n, k, 2))
+    robot = np.sort(rng.integers(0, n, 30))
+    offset = rng.normal(scale=0.4, size=(30, 2))
+    distance, reach = np.hypot(*offset.T), np.full(30, 0.2)
+    safe = steering.held(velocity, walls, radius, robot, offset, distance, reach)
+    gap = np.hypot(*np.moveaxis(walls, -1, 0)) - 0.1 - steering.MARGIN
+    toward = -(walls * safe[:, None]).sum(axis=2) / np.hypot(*np.moveaxis(walls, -1, 0))
+    assert (toward <= np.sqrt(2 * steering.BRAKING * gap.clip(0)) + 0.0101).all()
+    gap = distance - reach - steering.APART
+    toward = -(offset * safe[robot]).sum(axis=1) / distance
+    assert (toward <= 0.5 * np.sqrt(2 * steering.BRAKING * gap.clip(0)) + 0.0101).all()
+    # the direction is the same, and who approaches nothing goes on
+    assert np.abs(velocity[:, 0] * safe[:, 1] - velocity[:, 1] * safe[:, 0]).max() < 1e-12
+    nothing = np.full((n, 1, 2), np.nan)
+    free = steering.held(velocity, nothing, radius, robot[:0], offset[:0], distance[:0], reach[:0])
+    assert np.array_equal(free, velocity)
