@@ -48,7 +48,7 @@ COMMANDS = {
 }
 
 _EXAMPLES = (
-    ("robocov demo", "the interactive window; robocov demo --tour tells the story in three minutes"),
+    ("robocov demo", "the interactive window; robocov demo --tour tells the story in 3.5 minutes"),
     ("robocov run rooms --video --out first-run", "six robots cover six rooms; pictures and a film"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),

@@ -50,7 +50,7 @@ class Arguments:
     paused: bool = False
     """Begin paused."""
     tour: bool = False
-    """Play the guided tour of three minutes."""
+    """Play the guided tour of three and a half minutes."""
     theme: Literal["light", "dark"] | None = None
     """Colours; by default those of the last time."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None

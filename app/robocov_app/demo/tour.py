@@ -1,4 +1,4 @@
-"""The guided tour: the paper's story in three minutes, played on the desk. Knows no pygame."""
+"""The guided tour: the paper's story in three and a half minutes, played on the desk. Knows no pygame."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _fail(number: int) -> Callable[[Desk], None]:
     return go
 
 
-_RAPF, _RPF, _LLOYD = Law("rapf"), Law("rpf"), Law("lloyd")
+_RAPF, _RPF, _LLOYD, _ATLAS = (Law(name) for name in ("rapf", "rpf", "lloyd", "atlas"))
 
 CHAPTERS: tuple[Chapter, ...] = (
     Chapter(
@@ -194,6 +194,19 @@ CHAPTERS: tuple[Chapter, ...] = (
         (_RAPF,),
         2.0,
         frozenset({"centroids", "goals", "force_attraction", "force_repulsion_obstacle"}),
+        asks=6,
+    ),
+    Chapter(
+        "Who remembers gets round",
+        "Atlas has the same sensor and is told no more, but every robot keeps what it has seen in a map of "
+        "its own, here that of robot 6. It plans on it where the whole team should be, and walks out of the "
+        "trap; what that takes is memory, and some computing.",
+        20.0,
+        "trap",
+        "inside",
+        (_RAPF, _ATLAS),
+        2.0,
+        frozenset({"goals", "sensed"}),
         asks=6,
     ),
 )

@@ -67,9 +67,10 @@ __all__ = [
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
     for kind in (
-        *(Rapf, Rpf, Lloyd),
+        # the default comparison first, in its order
+        *(Rapf, Rpf, Lloyd, Atlas),
         *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
-        *(Atlas, AtlasShared),
+        AtlasShared,
     )
 }
 """The built-in controllers by name."""

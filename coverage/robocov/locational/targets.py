@@ -1,7 +1,7 @@
 """What a robot heads for in its cell: the point from which the cell's locational cost (4) is best.
 
 Of a convex cell with density 1 each of them is the best point of the whole cell, wherever the robot is (see
-`robocov.locational.best_points`). They are different aims nevertheless: centroid and median count how far away places
+`best_points`). They are different aims nevertheless: centroid and median count how far away places
 are, f = 1/(r²+h²) counts what is within a few h, and hardly anything beyond. In a cell that is large against
 h, "sensing" gives up the far ends of the cell; for h well above the size of the cells it is the centroid.
 
