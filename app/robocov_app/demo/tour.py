@@ -199,7 +199,7 @@ CHAPTERS: tuple[Chapter, ...] = (
     Chapter(
         "Who remembers gets round",
         "Atlas has the same sensor and is told no more, but every robot keeps what it has seen in a map of "
-        "its own, here that of robot 6. It plans on it where the whole team should be, and walks out of the "
+        "its own, here that of robot 3. It plans on it where the whole team should be, and walks out of the "
         "trap; what that takes is memory, and some computing.",
         20.0,
         "trap",
@@ -207,7 +207,7 @@ CHAPTERS: tuple[Chapter, ...] = (
         (_RAPF, _ATLAS),
         2.0,
         frozenset({"goals", "sensed"}),
-        asks=6,
+        asks=3,
     ),
 )
 """The chapters in their order."""

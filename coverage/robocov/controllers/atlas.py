@@ -52,6 +52,9 @@ _HEEDED = 1.5
 _TOGETHER = 1.5
 """A robot plans for its whole team as long as it takes to cross the region so many times."""
 
+_STAGGERED = 0.5
+"""Part of the period in which all robots make their first plans."""
+
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -127,7 +130,8 @@ class Atlas:
         n = len(team)
         return AtlasMemory(
             team,
-            tuple(Mind(empty, -math.inf, nobody) for _ in range(n)),
+            # the robots do not all plan at the same moment
+            tuple(Mind(empty, self.period * _STAGGERED * (i * _GOLDEN % 1.0), nobody) for i in range(n)),
             (np.full((1, 2), np.nan),) * n,
             np.zeros(n, dtype=np.intp),
             np.full((n, self.scanning.rays, 2), np.nan),
@@ -155,6 +159,8 @@ class Atlas:
                 ways = minds[i].ways
                 if goal is not None and ways is not None:
                     routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
+            elif mind.planned is None:
+                routes[i] = seen.positions[i : i + 1]
         return self._driven(seen, AtlasMemory(memory.team, tuple(minds), tuple(routes), legs, walls))
 
     def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
@@ -176,8 +182,7 @@ class Atlas:
         spacing = window.stride * mind.known.raster.cell
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / float(team.max_speed[i]))
-        # the robots do not all plan at the same moment
-        first = math.isinf(mind.due)
+        first = mind.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         # a team that has changed may have much to do again
         since = mind.since if np.array_equal(mind.watch.robots, watch.robots) and not first else seen.time
