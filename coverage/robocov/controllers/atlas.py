@@ -27,7 +27,7 @@ FINEST_CELL = 0.1
 
 MOST_CELLS = 250_000
 
-TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 400
+TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350
 """Nodes of the lattices on which a robot plans: for its whole team, for itself, and for itself in a crowd."""
 
 CREW = 8
@@ -302,11 +302,12 @@ class Atlas:
         wanted = steering.slowed(wanted, gap)
         robot, _, away, apart = seen.neighbours_within(_HEEDED)
         # of the size of others a robot knows its own
-        reach = 2.0 * team.radius[robot]
-        wanted = steering.clear_of_robots(wanted, robot, away, apart, reach)
-        walls = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
-        wanted = steering.clear_of_walls(wanted, walls, team.radius)
-        wanted = steering.held(wanted, walls, team.radius, robot, away, apart, reach)
+        neighbours = steering.robot_limits(away, apart, 2.0 * team.radius[robot])
+        wanted = steering.clear_of_robots(wanted, robot, neighbours)
+        offsets = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
+        walls = steering.wall_limits(offsets, team.radius)
+        wanted = steering.clear_of_walls(wanted, walls)
+        wanted = steering.held(wanted, walls, robot, neighbours)
         forces = drive(wanted, seen, team, self.response_time)
         goals = np.array([route[-1] for route in memory.routes])
         return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)

@@ -15,6 +15,8 @@ It is solved on blocks of cells: a block is one unknown, joined to its neighbour
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -29,11 +31,11 @@ PRIOR = 0.8
 LONG = 30.0
 """So many blocks away is far."""
 
-_BLOCKS = 1000
+BLOCKS = 1000
 """Blocks that a map is divided into, at most."""
 
 
-def openness(state: NDArray[np.uint8], outside: BoolArray) -> Array:
+def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS) -> Array:
     """Return how open each unknown cell is, from 0 to 1; 0 for all other cells, (rows, columns).
 
     Parameters
@@ -42,6 +44,8 @@ def openness(state: NDArray[np.uint8], outside: BoolArray) -> Array:
         As in `DiscoveredMap`.
     outside : (rows, columns)
         Cells beyond the region; they do not count at all.
+    blocks : int
+        So many at most.
 
     Examples
     --------
@@ -51,40 +55,67 @@ def openness(state: NDArray[np.uint8], outside: BoolArray) -> Array:
     """
     rows, columns = state.shape
     side = 1
-    while -(-rows // side) * -(-columns // side) > _BLOCKS:
+    while -(-rows // side) * -(-columns // side) > blocks:
         side += 1
     high, wide = -(-rows // side), -(-columns // side)
-    block = (np.arange(rows) // side)[:, None] * wide + np.arange(columns) // side
-    unknown = (state == UNKNOWN) & ~outside
-    free, wall = (state == FREE) & ~outside, (state >= PRESUMED) & ~outside
-    size = high * wide
-
-    open_to, closed_to = np.zeros(size), np.zeros(size)
-    begins, ends = [], []
-    ahead, behind, every = slice(1, None), slice(None, -1), slice(None)
-    for here, there in (((ahead, every), (behind, every)), ((every, ahead), (every, behind))):
-        for one, other in ((here, there), (there, here)):
-            open_to += np.bincount(block[one][unknown[one] & free[other]], minlength=size)
-            closed_to += np.bincount(block[one][unknown[one] & wall[other]], minlength=size)
-        meet = unknown[here] & unknown[there] & (block[here] != block[there])
-        begins.append(block[here][meet])
-        ends.append(block[there][meet])
-    begin, end = np.concatenate(begins), np.concatenate(ends)
-    # the middles of two blocks are one side apart, and a block's border is half a side from its middle
-    across, border = 1.0, 2.0
-    count = np.bincount(block[unknown], minlength=size)
-    lost = side * (count / side**2) / LONG**2
-    diagonal = border * (open_to + closed_to) + lost
-    diagonal += across * (np.bincount(begin, minlength=size) + np.bincount(end, minlength=size))
-    some = count > 0
+    missing = ((0, high * side - rows), (0, wide * side - columns))
+    outside = np.pad(outside, missing, constant_values=True)
+    whole = np.pad(state, missing)
+    unknown = (whole == UNKNOWN) & ~outside
+    open_to = _sums(_beside((whole == FREE) & ~outside) * unknown, side)
+    closed_to = _sums(_beside((whole >= PRESUMED) & ~outside) * unknown, side)
+    count = _sums(unknown, side)
+    some = (count > 0).ravel()
     if not some.any():
         return np.zeros(state.shape)
-    number = np.cumsum(some) - 1
-    begin, end, own = number[begin], number[end], np.arange(int(some.sum()))
-    flow = np.full(len(begin), -across)
-    parts = np.concatenate([diagonal[some], flow, flow])
+
+    # how many cells of a block meet some of the next one
+    above = _pairs(unknown, side)
+    right = _pairs(unknown.T, side).T
+    # the middles of two blocks are one side apart, and a block's border is half a side from its middle
+    across, border = 1.0, 2.0
+    lost = side * (count / side**2) / LONG**2
+    diagonal = border * (open_to + closed_to) + lost
+    diagonal[:-1] += across * above
+    diagonal[1:] += across * above
+    diagonal[:, :-1] += across * right
+    diagonal[:, 1:] += across * right
+
+    number = (np.cumsum(some) - 1).reshape(high, wide)
+    begin = np.concatenate([number[:-1][above > 0], number[:, :-1][right > 0]])
+    end = np.concatenate([number[1:][above > 0], number[:, 1:][right > 0]])
+    flow = -across * np.concatenate([above[above > 0], right[right > 0]])
+    own = np.arange(int(some.sum()))
+    parts = np.concatenate([diagonal.ravel()[some], flow, flow])
     where = np.concatenate([own, begin, end]), np.concatenate([own, end, begin])
     matrix = coo_array((parts, where), shape=(len(own), len(own))).tocsc()
-    result = np.zeros(size)
-    result[some] = splu(matrix).solve((border * open_to + lost * PRIOR)[some])
-    return np.asarray(np.where(unknown, result[block].clip(0.0, 1.0), 0.0))
+    # the matrix is symmetric
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    result = np.zeros(high * wide)
+    result[some] = factors.solve((border * open_to + lost * PRIOR).ravel()[some])
+    of_cells = result.clip(0.0, 1.0).reshape(high, wide).repeat(side, axis=0).repeat(side, axis=1)
+    return np.asarray((of_cells * unknown)[:rows, :columns])
+
+
+def _beside(cells: BoolArray) -> NDArray[np.uint8]:
+    """Return how many of the four cells beside each are some."""
+    one = cells.astype(np.uint8)
+    result = np.zeros_like(one)
+    result[1:] += one[:-1]
+    result[:-1] += one[1:]
+    result[:, 1:] += one[:, :-1]
+    result[:, :-1] += one[:, 1:]
+    return result
+
+
+def _sums(cells: NDArray[Any], side: int) -> Array:
+    """Return the sum over each block."""
+    rows, columns = cells.shape
+    blocks = cells.reshape(rows // side, side, columns // side, side)
+    return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64))
+
+
+def _pairs(cells: BoolArray, side: int) -> Array:
+    """Return how many cells of each block meet some of the next one above."""
+    meet = cells[side - 1 : -1 : side] & cells[side::side]
+    return np.asarray(meet.reshape(len(meet), cells.shape[1] // side, side).sum(axis=2, dtype=np.float64))

@@ -21,7 +21,7 @@ from scipy.optimize import linear_sum_assignment
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.discovered import FREE, UNKNOWN
 from robocov.planning.medians import improved, moved
-from robocov.planning.openness import openness
+from robocov.planning.openness import BLOCKS, openness
 
 if TYPE_CHECKING:
     from robocov.density import Density
@@ -69,7 +69,8 @@ class Stock:
 
     @cached_property
     def _openness(self) -> Array:
-        return openness(self._state, self._outside)
+        blocks = min(BLOCKS, self.window.rows * self.window.columns)
+        return openness(self._state, self._outside, blocks)
 
     @cached_property
     def weights(self) -> Array:

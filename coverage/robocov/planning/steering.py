@@ -9,6 +9,8 @@ corrections contradict each other, as between a wall and a robot, it is slowed d
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from robocov.arrays import Array, IntArray
@@ -44,30 +46,68 @@ def slowed(velocity: Array, gap: Array) -> Array:
     return np.asarray(velocity * np.minimum(1.0, most / np.maximum(speed, 1e-9))[:, None])
 
 
-def clear_of_walls(velocity: Array, offset: Array, radius: Array) -> Array:
-    """Return velocities that brake before points of walls.
+class Limits(NamedTuple):
+    """How fast something may be approached.
+
+    Attributes
+    ----------
+    away : (..., 2)
+        Directions from it to the robot, of length 1; 0 where there is nothing.
+    speed : (...) m/s
+        Of the approach, at most; below 0 where the gap should widen.
+    """
+
+    away: Array
+    speed: Array
+
+
+def wall_limits(offset: Array, radius: Array) -> Limits:
+    """Return how fast (n,) robots of some radii may approach walls.
 
     Parameters
     ----------
-    velocity : (n, 2) m/s
     offset : (n, k, 2) m
         From points of walls to the robot; nan where there is none.
     radius : (n,) m
     """
-    normal, allowed = _wall_limits(offset, radius)
+    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
+    gap = distance - radius[:, None] - MARGIN
+    speed = np.where(gap > 0.0, np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    away = offset / np.maximum(distance, 1e-9)[..., None]
+    return Limits(np.where(np.isnan(away), 0.0, away), np.where(np.isnan(gap), np.inf, speed))
+
+
+def robot_limits(offset: Array, distance: Array, reach: Array) -> Limits:
+    """Return how fast robots may approach neighbours: a half of what two together may.
+
+    Parameters
+    ----------
+    offset : (m, 2) m
+        From the neighbour to the robot.
+    distance : (m,) m
+    reach : (m,) m
+        At which the two touch.
+    """
+    gap = distance - reach - APART
+    speed = np.where(gap > 0.0, 0.5 * np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
+    return Limits(offset / np.maximum(distance, 1e-9)[:, None], speed)
+
+
+def clear_of_walls(velocity: Array, walls: Limits) -> Array:
+    """Return (n, 2) velocities, m/s, that brake before points of walls, (n, k)."""
+    away, speed = walls
     rows = np.arange(len(velocity))
     for _ in range(_ROUNDS):
-        approach = -(normal[..., 0] * velocity[:, None, 0] + normal[..., 1] * velocity[:, None, 1])
-        excess = approach - allowed
+        excess = _approach(velocity, walls) - speed
         worst = excess.argmax(axis=1)
         over = np.maximum(excess[rows, worst], 0.0)
         if not over.any():
             break
-        velocity = velocity + normal[rows, worst] * over[:, None]
+        velocity = velocity + away[rows, worst] * over[:, None]
     return velocity
 
 
-def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: Array, reach: Array) -> Array:
+def clear_of_robots(velocity: Array, robot: IntArray, neighbours: Limits) -> Array:
     """Return velocities that brake before other robots, and pass them on the left.
 
     Parameters
@@ -75,20 +115,16 @@ def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: A
     velocity : (n, 2) m/s
     robot : (m,)
         Sorted; whose neighbour it is.
-    offset : (m, 2) m
-        From the neighbour to the robot.
-    distance : (m,) m
-    reach : (m,) m
-        At which the two touch.
+    neighbours : Limits, (m,)
     """
     if not len(robot):
         return velocity
-    normal, allowed = _robot_limits(offset, distance, reach)
+    away, speed = neighbours
     n = len(velocity)
     velocity = velocity.copy()
     # first past each other, then, in a throng, at least not into anybody
     for aside in (_ASIDE, _ASIDE, 0.0, 0.0, 0.0):
-        excess = -(normal * velocity[robot]).sum(axis=1) - allowed
+        excess = -(away * velocity[robot]).sum(axis=1) - speed
         worst = np.full(n, -np.inf)
         np.maximum.at(worst, robot, excess)
         hit = ((excess == worst[robot]) & (excess > 0.0)).nonzero()[0]
@@ -100,53 +136,30 @@ def clear_of_robots(velocity: Array, robot: IntArray, offset: Array, distance: A
         rows = (which >= 0).nonzero()[0]
         chosen = which[rows]
         over = excess[chosen]
-        left = np.column_stack([normal[chosen, 1], -normal[chosen, 0]])
-        velocity[rows] += normal[chosen] * over[:, None] + left * np.minimum(over, aside)[:, None]
+        left = np.column_stack([away[chosen, 1], -away[chosen, 0]])
+        velocity[rows] += away[chosen] * over[:, None] + left * np.minimum(over, aside)[:, None]
     return velocity
 
 
-def held(
-    velocity: Array,
-    walls: Array,
-    radius: Array,
-    robot: IntArray,
-    offset: Array,
-    distance: Array,
-    reach: Array,
-) -> Array:
+def held(velocity: Array, walls: Limits, robot: IntArray, neighbours: Limits) -> Array:
     """Return velocities that are slowed down where they still approach anything faster than is allowed.
 
     Who is too close already may not get closer. Parameters are those of `clear_of_walls` and of
     `clear_of_robots`.
     """
-    normal, allowed = _wall_limits(walls, radius)
-    approach = -(normal[..., 0] * velocity[:, None, 0] + normal[..., 1] * velocity[:, None, 1])
-    part = _part(approach, allowed).min(axis=1, initial=1.0)
+    part = _part(_approach(velocity, walls), walls.speed).min(axis=1, initial=1.0)
     if len(robot):
-        normal, allowed = _robot_limits(offset, distance, reach)
-        approach = -(normal * velocity[robot]).sum(axis=1)
-        np.minimum.at(part, robot, _part(approach, allowed))
+        approach = -(neighbours.away * velocity[robot]).sum(axis=1)
+        np.minimum.at(part, robot, _part(approach, neighbours.speed))
     return np.asarray(velocity * part[:, None])
+
+
+def _approach(velocity: Array, walls: Limits) -> Array:
+    away = walls.away
+    return np.asarray(-(away[..., 0] * velocity[:, None, 0] + away[..., 1] * velocity[:, None, 1]))
 
 
 def _part(approach: Array, allowed: Array) -> Array:
     allowed = np.maximum(allowed, 0.0) + _TOLERANCE
     fast = approach > allowed
     return np.where(fast, allowed / np.where(fast, approach, 1.0), 1.0)
-
-
-def _wall_limits(offset: Array, radius: Array) -> tuple[Array, Array]:
-    """Return (n, k, 2) directions away from walls, 0 for none, and (n, k) speeds of approach, m/s."""
-    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
-    gap = distance - radius[:, None] - MARGIN
-    allowed = np.where(gap > 0.0, np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
-    allowed = np.where(np.isnan(gap), np.inf, allowed)
-    normal = offset / np.maximum(distance, 1e-9)[..., None]
-    return np.where(np.isnan(normal), 0.0, normal), allowed
-
-
-def _robot_limits(offset: Array, distance: Array, reach: Array) -> tuple[Array, Array]:
-    """Return (m, 2) directions away from neighbours, and (m,) speeds of approach: a half each."""
-    gap = distance - reach - APART
-    allowed = np.where(gap > 0.0, 0.5 * np.sqrt(2.0 * BRAKING * np.maximum(gap, 0.0)), 2.0 * gap)
-    return offset / np.maximum(distance, 1e-9)[:, None], allowed

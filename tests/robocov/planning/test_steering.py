@@ -15,7 +15,7 @@ def test_nobody_approaches_one_wall_faster_than_he_can_stop(seed: int) -> None:
     offset = rng.normal(size=(20, 1, 2))
     offset[rng.random(20) < 0.2] = np.nan
     radius = np.full(20, 0.1)
-    safe = steering.clear_of_walls(velocity, offset, radius)
+    safe = steering.clear_of_walls(velocity, steering.wall_limits(offset, radius))
     distance = np.hypot(*np.moveaxis(offset[:, 0], -1, 0))
     for v, w, o, d in zip(velocity, safe, offset[:, 0], distance, strict=True):
         if np.isnan(d):
@@ -37,11 +37,13 @@ def test_in_narrow_places_nobody_is_fast() -> None:
 def test_two_that_meet_pass_on_the_left() -> None:
     velocity = np.array([[1.0, 0.0], [-1.0, 0.0]])
     offset = np.array([[-0.3, 0.0], [0.3, 0.0]])
-    safe = steering.clear_of_robots(velocity, np.array([0, 1]), offset, np.full(2, 0.3), np.full(2, 0.2))
+    near = steering.robot_limits(offset, np.full(2, 0.3), np.full(2, 0.2))
+    safe = steering.clear_of_robots(velocity, np.array([0, 1]), near)
     assert safe[0, 0] < 0.5
     assert safe[1, 1] < 0.0 < safe[0, 1]
     np.testing.assert_allclose(safe[0], -safe[1])
-    nobody = steering.clear_of_robots(velocity, np.empty(0, dtype=int), np.empty((0, 2)), *np.empty((2, 0)))
+    none = steering.robot_limits(np.empty((0, 2)), *np.empty((2, 0)))
+    nobody = steering.clear_of_robots(velocity, np.empty(0, dtype=int), none)
     assert np.array_equal(nobody, velocity)
 
 
@@ -55,7 +57,8 @@ def test_where_corrections_contradict_each_other_it_is_slow_enough_for_all(seed:
     robot = np.sort(rng.integers(0, n, 30))
     offset = rng.normal(scale=0.4, size=(30, 2))
     distance, reach = np.hypot(*offset.T), np.full(30, 0.2)
-    safe = steering.held(velocity, walls, radius, robot, offset, distance, reach)
+    near = steering.robot_limits(offset, distance, reach)
+    safe = steering.held(velocity, steering.wall_limits(walls, radius), robot, near)
     gap = np.hypot(*np.moveaxis(walls, -1, 0)) - 0.1 - steering.MARGIN
     toward = -(walls * safe[:, None]).sum(axis=2) / np.hypot(*np.moveaxis(walls, -1, 0))
     assert (toward <= np.sqrt(2 * steering.BRAKING * gap.clip(0)) + 0.0101).all()
@@ -64,6 +67,6 @@ def test_where_corrections_contradict_each_other_it_is_slow_enough_for_all(seed:
     assert (toward <= 0.5 * np.sqrt(2 * steering.BRAKING * gap.clip(0)) + 0.0101).all()
     # the direction is the same, and who approaches nothing goes on
     assert np.abs(velocity[:, 0] * safe[:, 1] - velocity[:, 1] * safe[:, 0]).max() < 1e-12
-    nothing = np.full((n, 1, 2), np.nan)
-    free = steering.held(velocity, nothing, radius, robot[:0], offset[:0], distance[:0], reach[:0])
+    nothing = steering.wall_limits(np.full((n, 1, 2), np.nan), radius)
+    free = steering.held(velocity, nothing, robot[:0], near)
     assert np.array_equal(free, velocity)
