@@ -21,12 +21,14 @@ import pytest
 from tiny_paper import TINY, means, shared
 
 from robocov.errors import InputError
+from robocov_app.paper import plan as planned
 from robocov_app.paper import studying
 from robocov_app.paper.asking import QUESTIONS, asked
 from robocov_app.paper.claims import compared
 from robocov_app.paper.tables import ORDER, law_rows, map_rows
 from robocov_app.paper.words import arrival, seen
 from robocov_app.paper.writing import page, save_claims, save_page, save_pictures
+from robocov_app.sweep.task import tasks_of
 
 pytestmark = pytest.mark.xdist_group("tiny-paper")
 
@@ -76,6 +78,16 @@ TINY_COMMAND = (
     "from robocov_app.cli import main\n"
     "sys.exit(main(['paper', '--quick', *sys.argv[1:]]))\n"
 )
+
+
+def test_runs_of_a_former_study_do_not_count(tmp_path: Path) -> None:
+    """They lie there where a folder is gone on with by a newer version; the grid is complete all the same."""
+    tuning = planned.gains_study(TINY)
+    for task in tasks_of(tuning):
+        (tmp_path / "studies/gains/runs" / task.name).mkdir(parents=True)
+    (tmp_path / "studies/gains/runs/of-a-former-version").mkdir()
+    assert studying.runs_there(tmp_path, "gains", tuning) == len(tuning)
+    assert studying.runs_there(tmp_path, "gains") == len(tuning) + 1
 
 
 def begun(*words: str) -> subprocess.Popen[str]:

@@ -225,8 +225,9 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
             plan, planned.claim_maps(plan), beyond_studies.UNTUNED, KINDS, plan.seeds
         )
     runs = sum(len(study) for study in studies.values())
-    there = sum(min(runs_there(folder, name), len(study)) for name, study in studies.items())
-    if runs <= there:
+    # which gains will be the best is not known yet, and how many runs these are does not depend on it
+    there = {name: min(runs_there(folder, name), len(study)) for name, study in studies.items()}
+    if runs == sum(there.values()):
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
     for probe in beyond_studies.probes(plan):
@@ -238,11 +239,11 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
         each.setdefault(task.controller, (time.perf_counter() - begin) / probe.duration)
     work = 0.0
     for name, study in studies.items():
-        left = len(study) - min(runs_there(folder, name), len(study))
+        left = len(study) - there[name]
         mean = float(np.mean([each[law] for law in study.controllers for _ in study.gains_of(law).choices]))
         work += left * mean * study.duration
     seconds = {law: value * plan.duration for law, value in each.items()}
-    return Forecast(runs, runs - there, work / workers, seconds)
+    return Forecast(runs, runs - sum(there.values()), work / workers, seconds)
 
 
 def _worst(
@@ -263,7 +264,7 @@ def _papers_laws(
     laws: tuple[Contender, ...] = beyond_studies.UNTUNED
     known: dict[str, Reference] = {}
     tuning = planned.gains_study(plan)
-    if runs_there(folder, "gains") == len(tuning):
+    if runs_there(folder, "gains", tuning) == len(tuning):
         # nothing is left to be done of it: the table is made sure of
         known |= referenced(tuning.maps, folder, plan, means)
         swept(tuning, folder, "gains", means)

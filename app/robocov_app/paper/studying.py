@@ -303,9 +303,15 @@ def together(parts: Sequence[Forecast]) -> Forecast:
     )
 
 
-def runs_there(folder: Path, name: str) -> int:
-    """Return how many runs of a study are there, whether its table is written or not."""
-    return len(list((folder / "studies" / name / "runs").glob("[!.]*")))
+def runs_there(folder: Path, name: str, study: Study | None = None) -> int:
+    """Return how many runs are there under the name of a study, whether its table is written or not.
+
+    Of a study that is given only its own: runs of a former one, of an older version say, may lie beside.
+    """
+    from robocov_app.sweep.task import tasks_of
+
+    there = {each.name for each in (folder / "studies" / name / "runs").glob("[!.]*")}
+    return len(there if study is None else there.intersection(task.name for task in tasks_of(study)))
 
 
 def _scenarios(study: Study) -> int:
