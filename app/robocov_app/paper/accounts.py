@@ -109,8 +109,9 @@ _KNOWN: dict[str, tuple[str, str, str]] = {
         "robocov",
         "The project's own controller.",
         "Every robot enters what its own range sensor meets into a map of its own, in which the unknown "
-        "counts as free, plans on it where all that it hears would best be (a k-median problem with geodesic "
-        "distances), goes to its own place in that plan, and looks around there where that may matter.",
+        "counts by how likely it is free, plans on it where all that it hears would best be (a k-median "
+        "problem with geodesic distances), goes to its own place in that plan, and looks around there where "
+        "that may matter.",
     ),
     "atlas-shared": (
         "robocov",

@@ -59,6 +59,11 @@ def test_it_comes_to_rest(finished: Simulation) -> None:
     assert np.abs(twin.positions - before).max() < 0.05
 
 
+def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulation) -> None:
+    """Only then it may relocate: it plans once more then, though nothing that it sees has changed."""
+    assert all(mind.idle and mind.quiet for mind in finished.memory.minds)
+
+
 def test_nothing_is_touched_on_the_way() -> None:
     record = simulation().run(25.0)
     clearance = clearances(record)
