@@ -64,6 +64,7 @@ def test_files_do_one_thing() -> None:
 TESTED_THROUGH = {
     "arrays_types": "everywhere",
     "mouse": "test_demo_window",
+    "aims": "test_aim_marks",
     "atomic": "test_record",
     "corner_views": "test_cost",
     "robot_views": "test_cost",

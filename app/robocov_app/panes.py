@@ -11,6 +11,8 @@ import numpy as np
 from robocov.errors import ParameterError
 from robocov_app.recording import Frame, iter_frames
 from robocov_app.view.furniture import LEGEND_ROW, MARGIN, STRIP, legend_picture
+from robocov_app.view.layers import LegendEntry
+from robocov_app.view.legends import united
 from robocov_app.view.picture import Painter, pane_layers, scale_for
 from robocov_app.view.record_scene import record_scene
 from robocov_app.view.spacing import columns_for
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from robocov.record import Record
     from robocov_app.recording import Costs
     from robocov_app.view.field import Fields
-    from robocov_app.view.layers import LegendEntry
 
 USUAL_SIZE = (1920, 1080)
 """Pixels that a film of several panes has at most, where no size is asked for."""
@@ -245,5 +246,5 @@ def _legend(
             scene = record_scene(record, row % len(record), fields=fields)
             found.append(painter.legend_entries(scene))
     # the longest first: its order is kept, and mostly nothing is missing
-    entries = {(entry.text, entry.style): entry for part in sorted(found, key=len)[::-1] for entry in part}
-    return legend_picture(list(entries.values()), width, look, scale, shown.also)
+    entries = united(sorted(found, key=len)[::-1], LegendEntry.key)
+    return legend_picture(entries, width, look, scale, shown.also)

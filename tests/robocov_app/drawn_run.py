@@ -10,6 +10,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
 from robocov.robots import Team
+from robocov.voronoi import partition
 from robocov_app.view.scene import Scene
 
 ROOMS = Environment(
@@ -36,7 +37,10 @@ SHAFT = Environment("shaft", ((0, 0), (4, 0), (4, 40), (0, 40)), (), {"spread": 
 def run_of(
     environment: Environment, n: int, steps: int = 40, seed: int = 0, controller: str = "rapf"
 ) -> Record:
-    """Return a record in which every robot walks from its start to another free place."""
+    """Return a record in which every robot walks from its start to another free place.
+
+    But for RPF its goals are the centroids of the cells.
+    """
     begin = environment.start("spread").sample(n, seed)
     end = environment.start("spread").sample(n, seed + 1000)
     part = np.linspace(0.0, 1.0, steps)[:, None, None]
@@ -46,7 +50,9 @@ def run_of(
     positions = np.clip(positions, low + 0.1, high - 0.1)
     time = np.arange(steps) * 0.1
     nothing = np.full_like(positions, np.nan)
-    goals = nothing if controller == "rpf" else np.broadcast_to(end, positions.shape)
+    goals = nothing
+    if controller != "rpf":
+        goals = np.array([partition(each, environment.region).centroid for each in positions])
     return Record(
         environment=environment,
         team=Team.homogeneous(n),

@@ -133,14 +133,9 @@ def test_links_are_those_of_the_graph():
     assert nearest(frame, none, LIGHT.final) < 120
 
 
-def test_goals_and_obstacle_points_are_marked_where_there_are_any():
-    goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
+def test_obstacle_points_are_marked_where_there_are_any():
     points = np.array([[np.nan, np.nan], [7.0, 1.0]])
-    scene = explained(TWO, goals=goals, obstacle_points=points)
-    frame, painter = drawn(scene, "goals")
-    assert nearest(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 60
-    pixels, _ = changed(scene, "goals")
-    assert (painter.camera.to_world(pixels.astype(float))[:, 0] < 4.0).all()  # robot 2 has none
+    scene = explained(TWO, obstacle_points=points)
     frame, painter = drawn(scene, "obstacle_points")
     assert nearest(frame, painter.camera.to_pixels(points[1]), LIGHT.forces["repulsion_obstacle"]) < 30
     pixels, _ = changed(scene, "obstacle_points")

@@ -7,6 +7,7 @@ import pytest
 from drawn_pixels import SIZE, TWO, changed, drawn
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
+from robocov.voronoi import partition
 from robocov_app.view.fonts import label, text_width
 from robocov_app.view.furniture import fitting_status
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
@@ -82,7 +83,7 @@ def test_the_legend_lists_exactly_what_is_shown():
     scene = explained(
         TWO,
         forces=np.ones((2, 2)),
-        goals=TWO + 1,
+        goals=partition(TWO, SQUARE.region).centroid,
         obstacle_points=TWO - 1,
         communication_range=5.0,
     )

@@ -141,24 +141,6 @@ def test_starts_are_green_rings():
         assert distance(frame, center, LIGHT.background) == 0
 
 
-def test_centroids_are_plus_signs():
-    scene = explained(TWO, goals=TWO + 1)
-    frame, painter = drawn(scene, "centroids")
-    for center in painter.camera.to_pixels(scene.centroids):
-        assert nearest(frame, center, LIGHT.ink) < 60
-        assert nearest(frame, center + np.array([3.0, 0.0]), LIGHT.ink) < 60
-        assert nearest(frame, center + np.array([0.0, 3.0]), LIGHT.ink) < 60
-
-
-def test_centroids_are_those_that_the_controller_knows():
-    """RPF has no goals: neither crosses nor their entry in the legend."""
-    for goals, words in ((TWO + 1, ["cell centroid"]), (None, [])):
-        scene = explained(TWO, goals=goals)
-        pixels, painter = changed(scene, "centroids")
-        assert bool(len(pixels)) == bool(words)
-        assert painter.legend(scene) == words
-
-
 @pytest.mark.parametrize("size", [SIZE, (1279, 961), (1920, 1440), (1366, 1000)])
 def test_the_boundary_has_clean_corners(size):
     """Nothing sticks out there: the corners reach as far as the sides between them."""
@@ -170,12 +152,6 @@ def test_the_boundary_has_clean_corners(size):
         assert (whole.min(), whole.max()) == (middle.min(), middle.max())
     for x, y in painter.camera.to_pixels(SQUARE.region.vertices).round().astype(int):
         assert ink[y, x]
-
-
-def test_a_centroid_is_not_marked_where_its_robot_has_arrived():
-    centroids = explained(TWO).centroids
-    pixels, _ = changed(explained(centroids, goals=centroids), "centroids")
-    assert len(pixels) == 0
 
 
 class TestCrowds:

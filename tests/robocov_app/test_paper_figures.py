@@ -119,9 +119,14 @@ def test_the_legend_names_centroids_only_where_some_are_seen():
         (legend,) = draw_figure(2, runs, PARTITION, "light").legends
         return [text.get_text() for text in legend.get_texts()]
 
-    assert "cell centroid" not in words(RUNS)  # made-up robots end where they wanted to be
-    away = RUNS["convex/rapf"].record
-    goals = away.goals.copy()
-    goals[-1, 0] += 1.0
-    runs = RUNS | {"convex/rapf": Shown(replace(away, goals=goals), RUNS["convex/rapf"].history)}
-    assert "cell centroid" in words(runs)
+    def ending(goals):
+        return {
+            name: Shown(replace(shown.record, goals=goals(shown.record)), shown.history)
+            for name, shown in RUNS.items()
+        }
+
+    assert "cell centroid" in words(RUNS)
+    arrived = words(ending(lambda record: record.positions))
+    assert not {"cell centroid", "goal"} & set(arrived)
+    runs = ending(lambda record: record.positions + 1.0)
+    assert "goal" in words(runs)  # which is no centroid

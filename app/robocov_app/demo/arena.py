@@ -15,7 +15,8 @@ from robocov_app.view import sprites
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.furniture import Status, legend_rows, legend_strip
-from robocov_app.view.layers import drawn_radii
+from robocov_app.view.layers import LegendEntry, drawn_radii
+from robocov_app.view.legends import united
 from robocov_app.view.phi import cost_words, mean_words
 from robocov_app.view.picture import Painter, pane_layers, standard_layers
 from robocov_app.view.scene import Scene
@@ -336,8 +337,8 @@ class Arena:
                 lane = self.desk.session.lanes[pane]
                 screen.fill(self.theme.controller(lane.law.name), bar)
         x, y, wide, high = self.layout.legend
-        entries = self._painters[0].legend_entries(self._scenes[0])
-        key = (tuple((e.text, e.style) for e in entries), wide, self.theme.name, scale)
+        entries = self._legend_entries()
+        key = (tuple(entry.key() for entry in entries), wide, self.theme.name, scale)
         if self._strip is None or self._strip_key != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(self.theme.background)
@@ -353,9 +354,14 @@ class Arena:
         if len(self._scenes) < 2:
             return 0
         kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.desk.shown)
-        entries = self._painters[0].legend_entries(self._scenes[0])
+        entries = self._legend_entries()
         page = pygame.Surface((self.layout.arena[2], 1))
         canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))
         rows = max(len(legend_rows(canvas, entries)), 1, self._rows[1] if self._rows[0] == kept else 1)
         self._rows = kept, rows
         return rows
+
+    def _legend_entries(self) -> list[LegendEntry]:
+        """Return the shared legend: what any of the panes shows."""
+        each = zip(self._painters, self._scenes, strict=True)
+        return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

@@ -33,7 +33,9 @@ FAR = 0.3
 REST = "law"
 """Kind of the line for what the terms of a controller leave of its force."""
 
-_NOTHING = 5e-4  # N; less is written as 0 N
+NOTHING = 5e-4
+"""Force in newtons below which there is none: it is written as 0 N, and has no arrow."""
+
 _SWAY = 0.02  # m; who goes to and fro by less seems to stand
 _HUGE = 1e100  # what is not below is no number to reckon with
 _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
@@ -154,7 +156,7 @@ class _Case:
         self.resultant = sum(self.forces.values(), self.drag)
         # whether that is too little to move a robot visibly from rest
         largest = max(map(abs, self.forces.values()), default=0.0)
-        self.balanced = abs(self.resultant) <= max(0.1 * largest, 0.1 * self.mass, _NOTHING)
+        self.balanced = abs(self.resultant) <= max(0.1 * largest, 0.1 * self.mass, NOTHING)
         near = [thing for thing in (self.solid, *self.others) if thing is not None]
         self.touched = [thing for thing in near if thing.gap <= TOUCHING]
         pressed = [thing.name for thing in self.touched if _along(self.resultant, thing.offset) > 0.1]
@@ -269,7 +271,7 @@ def _length(metres: float) -> str:
 
 
 def _force(newtons: float) -> str:
-    return f"{1000 * newtons:.0f} mN" if _NOTHING <= newtons < 0.00995 else f"{_number(newtons)} N"
+    return f"{1000 * newtons:.0f} mN" if NOTHING <= newtons < 0.00995 else f"{_number(newtons)} N"
 
 
 def _state(case: _Case) -> str:
@@ -300,7 +302,7 @@ def _verdict(case: _Case, motion: str) -> str:
     if aim and abs(aim.offset) <= FAR:
         near = "on" if abs(aim.offset) <= SETTLED_DISTANCE else f"{_length(abs(aim.offset))} from"
         return f"arrived: at rest {near} {aim.name}" + (f", which is {aim.hidden}" if aim.hidden else "")
-    loaded = any(abs(vector) >= _NOTHING for vector in case.forces.values())
+    loaded = any(abs(vector) >= NOTHING for vector in case.forces.values())
     balance = "the forces balance" if case.balanced else "the forces almost balance"
     why = f"held by {held}" if held else balance if loaded else "no force acts on it"
     return f"at rest {_length(abs(aim.offset))} short of {aim.name}: {why}" if aim else f"at rest, {why}"
@@ -310,16 +312,16 @@ def _forces(case: _Case) -> list[Line]:
     """Return each force with what causes it, and their sum."""
     parts = [(_cause(case, kind, vector), vector, kind) for kind, vector in case.forces.items()]
     if case.viscosity > 0.0:
-        slowed = f"held back {_force(abs(case.drag))}" if abs(case.drag) >= _NOTHING else "not held back"
+        slowed = f"held back {_force(abs(case.drag))}" if abs(case.drag) >= NOTHING else "not held back"
         parts.append((f"{slowed} by viscosity", case.drag, "viscosity"))
-    way = _compass(case.resultant) if abs(case.resultant) >= _NOTHING else ""
+    way = _compass(case.resultant) if abs(case.resultant) >= NOTHING else ""
     parts.append((f"resultant {_force(abs(case.resultant))} {way}".rstrip(), case.resultant, "resultant"))
     return [Line(text, (vector.real, vector.imag), kind) for text, vector, kind in parts]
 
 
 def _cause(case: _Case, kind: str, vector: complex) -> str:
     """Return a force with its size and what causes it."""
-    aim, none, away = case.aim, abs(vector) < _NOTHING, False
+    aim, none, away = case.aim, abs(vector) < NOTHING, False
     size, way = _force(abs(vector)), _compass(vector)
     if kind == "attraction" and aim:
         straight = _along(vector, aim.offset)
@@ -367,7 +369,7 @@ def _reasons(case: _Case, motion: str) -> list[str]:
         texts.append(f"limited: {_number(case.strength)} m/s² instead of {_number(wanted)} m/s²")
     if speed >= 0.995 * top:
         texts.append(f"{'at' if speed < 1.005 * top else 'faster than'} its top speed, {_number(top)} m/s")
-    sizes = {kind: abs(vector) for kind, vector in case.forces.items() if abs(vector) >= _NOTHING}
+    sizes = {kind: abs(vector) for kind, vector in case.forces.items() if abs(vector) >= NOTHING}
     if motion in {"moving", "starting"} or not sizes:
         return texts
     stuck = "stuck: " if case.stuck else ""

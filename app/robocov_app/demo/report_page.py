@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from robocov_app.demo.inspector import NOTHING
 from robocov_app.demo.overlays import FLAT, wrapped
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.theme import mix
@@ -103,7 +104,7 @@ def _words(
 def _arrow(canvas: Canvas, line: Line, middle: tuple[float, float], largest: float) -> None:
     assert line.vector is not None
     size = float(np.hypot(*line.vector))
-    if size < 1e-6:
+    if size < NOTHING:
         return
     length = 13 * canvas.scale * (0.35 + 0.65 * size / largest)
     half = np.array(line.vector) / size * (length, -length)

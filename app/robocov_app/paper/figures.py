@@ -18,12 +18,15 @@ from robocov_app.plots.arena import (
     draw_robots,
     draw_run,
     has_goals,
+    label_of,
     map_handles,
     robot_handle,
     run_handles,
 )
 from robocov_app.plots.curves import draw_curves, end_label
 from robocov_app.plots.page import SMALL, TITLE, Page, plain_style, tone
+from robocov_app.view.aims import CENTROID, GOAL
+from robocov_app.view.legends import united
 from robocov_app.view.theme import LIGHT, Theme, mix, theme_named
 
 if TYPE_CHECKING:
@@ -210,10 +213,7 @@ def trajectories_figure(runs: Sequence[Shown], theme: Theme = LIGHT) -> Figure:
     """Draw runs on one map side by side: (a), (b), ... (figures 2, 4, 6, 8)."""
     with plain_style():
         records = [shown.record for shown in runs]
-        handles: dict[str, Artist] = {}
-        for record in records:
-            for handle in run_handles(record, theme, "paper"):
-                handles.setdefault(str(handle.get_label()), handle)
+        handles = united((run_handles(record, theme, "paper") for record in records), label_of)
         page, places = panels(
             records[0].environment, len(runs), WIDE, _worth_naming(handles, runs), theme, above=30.0
         )
@@ -266,11 +266,11 @@ def panels(
     return page, found
 
 
-def _worth_naming(handles: dict[str, Artist], runs: Sequence[Shown]) -> list[Artist]:
-    """Return the legend's entries without that of centroids, where robots hide them all."""
+def _worth_naming(handles: Sequence[Artist], runs: Sequence[Shown]) -> list[Artist]:
+    """Return the legend's entries without that of centroids or goals, where robots hide them all."""
     hidden = all(
         (np.hypot(*(shown.record.goals[-1] - shown.record.positions[-1]).T) < ARRIVED).all()
         for shown in runs
         if has_goals(shown.record)
     )
-    return [handle for label, handle in handles.items() if not (hidden and label == "cell centroid")]
+    return [handle for handle in handles if not (hidden and label_of(handle) in (CENTROID, GOAL))]

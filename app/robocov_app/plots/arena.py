@@ -9,6 +9,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.voronoi.weighted_cells import outlines_of
 from robocov_app.plots.page import tone
+from robocov_app.view.aims import CENTROID, GOAL, are_centroids
 from robocov_app.view.phi import density_words, shading
 from robocov_app.view.spacing import fitted_radii, line_crowding, mark_size
 from robocov_app.view.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
 """Radius of a robot where it has room and in the densest crowd, and least size of its number, in points."""
 
-_START, _CENTROID = 6.2, 8.0
+_START, _AIM = 6.2, 8.0
 """Sizes of marks where they have room, in points."""
 
 
@@ -105,7 +106,7 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
 
 
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
-    """Draw map, final cells, trajectories, starts, final positions and centroids."""
+    """Draw map, final cells, trajectories, starts, final positions and where robots head."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     draw_map(axes, record.environment.at(float(record.time[-1])), theme)
@@ -148,10 +149,12 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     drawn = draw_robots(axes, last[there], record.team.radius[there], fills, theme, (there + 1).tolist())
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
-        apart = mark_size(_in_points(axes, cells.centroid), 3.2, _CENTROID)
-        away = np.hypot(*(_in_points(axes, cells.centroid) - _in_points(axes, last[working])).T)
+        aims = cells.centroid if _heads_for_centroids(record) else record.goals[-1][working]
+        places = _in_points(axes, aims)
+        away = np.hypot(*(places - _in_points(axes, last[working])).T)
+        apart = mark_size(places[np.isfinite(away)], 3.2, _AIM)
         # where a robot has arrived, only the ends of the cross would stick out from under its disc
-        axes.plot(*cells.centroid[away > radius].T, zorder=6, **_centroid_style(theme, apart))
+        axes.plot(*aims[away > radius].T, zorder=6, **_aim_style(record, theme, apart))
 
 
 def draw_robots(
@@ -219,8 +222,12 @@ def _in_points(axes: Axes, places: Array) -> Array:
 
 
 def has_goals(record: Record) -> bool:
-    """Whether the controller draws robots to goals: only then cells' centroids explain anything."""
+    """Whether the controller draws robots to goals: centroids of cells, or of another kind."""
     return bool(np.isfinite(record.goals[-1]).any())
+
+
+def _heads_for_centroids(record: Record) -> bool:
+    return are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
 
 
 def _start_style(theme: Theme, size: float) -> dict[str, Any]:
@@ -234,14 +241,22 @@ def _start_style(theme: Theme, size: float) -> dict[str, Any]:
     }
 
 
-def _centroid_style(theme: Theme, size: float) -> dict[str, Any]:
+def _aim_style(record: Record, theme: Theme, size: float) -> dict[str, Any]:
+    """Return a plus for centroids, and a times sign for goals of another kind."""
+    plus = _heads_for_centroids(record)
     return {
         "linestyle": "none",
-        "marker": "+",
-        "markersize": size,
-        "markeredgecolor": tone(theme.ink),
-        "markeredgewidth": min(1.2, 0.2 * size),
+        "label": CENTROID if plus else GOAL,
+        "marker": "+" if plus else "x",
+        "markersize": size if plus else 0.8 * size,
+        "markeredgecolor": tone(theme.ink if plus else theme.final),
+        "markeredgewidth": min(1.2 if plus else 1.6, 0.2 * size),
     }
+
+
+def label_of(handle: Artist) -> str:
+    """Return what a legend's entry says."""
+    return str(handle.get_label())
 
 
 def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
@@ -296,13 +311,12 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
 
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
-    centroid = Line2D([], [], label="cell centroid", **_centroid_style(theme, _CENTROID))
     return [
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
         *([robot_handle("failed robot", wreck_colour(theme), theme)] if _failed(record).any() else []),
-        *([centroid] if has_goals(record) else []),
+        *([Line2D([], [], **_aim_style(record, theme, _AIM))] if has_goals(record) else []),
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],
     ]

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from robocov.errors import ParameterError, shown
-from robocov_app.plots.arena import draw_map, draw_run, has_goals, map_handles, run_handles, ticks_in_metres
+from robocov_app.plots.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.plots.curves import Curve, draw_curves, end_label
 from robocov_app.plots.figure_files import check_figure_path as check_figure_path
 from robocov_app.plots.figure_files import figure_kind as figure_kind
 from robocov_app.plots.figure_files import save_figure as save_figure
 from robocov_app.plots.page import HEADING, TEXT, TITLE, Box, Page, plain_style
+from robocov_app.view.legends import united
 from robocov_app.view.phi import cost_words, mean_words
 from robocov_app.view.spacing import columns_for
 from robocov_app.view.theme import LIGHT, Theme, theme_named
@@ -168,10 +169,7 @@ def plot_comparison(
         limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
         aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
         shared, captions = _captions(records, costs, times)
-        handles: dict[str, Artist] = {}
-        for record in sorted(records, key=has_goals, reverse=True):
-            handles |= {str(h.get_label()): h for h in run_handles(record, theme, colours)}
-        entries = [*handles.values()]
+        entries = united((run_handles(record, theme, colours) for record in records), label_of)
 
         scale = 1.5 if size is None else None
         page = Page(size or (1600, 1000), theme, scale)

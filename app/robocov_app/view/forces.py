@@ -1,4 +1,4 @@
-"""Layers that explain a decision: force terms, velocities, goals, ranges, neighbours, what was sensed."""
+"""Layers that explain a decision: force terms, velocities, ranges, neighbours, what was sensed."""
 
 from __future__ import annotations
 
@@ -130,35 +130,6 @@ class Velocities(Layer):
             canvas.arrow((x - half, y), (x + half, y), canvas.theme.velocity, 1.6 * canvas.scale, "open")
 
         return [LegendEntry("velocity", glyph)] if scene.snapshot is not None else []
-
-
-class Goals(Layer):
-    """A times sign where each robot is drawn to, and a dashed line to it."""
-
-    name = "goals"
-    title = "Goals"
-    default = False
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.snapshot is None or scene.snapshot.decision.goals is None:
-            return
-        goals = canvas.camera.to_pixels(scene.snapshot.decision.goals)
-        centers = canvas.camera.to_pixels(scene.snapshot.positions)
-        for goal, center in zip(goals, centers, strict=True):
-            if np.isfinite(goal).all():
-                canvas.dashes(center.tolist(), goal.tolist(), canvas.theme.faint)
-                self._times(canvas, float(goal[0]), float(goal[1]))
-
-    @staticmethod
-    def _times(canvas: Canvas, x: float, y: float) -> None:
-        arm, width, theme = 5.5 * canvas.scale, 1.8 * canvas.scale, canvas.theme
-        canvas.stamp(
-            lambda shift: sprites.cross(arm, theme.final, theme.background, width, True, shift), (x, y)
-        )
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        known = scene.snapshot is not None and scene.snapshot.decision.goals is not None
-        return [LegendEntry("goal", self._times)] if known else []
 
 
 class Ranges(Layer):

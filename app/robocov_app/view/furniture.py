@@ -137,7 +137,7 @@ class Legend(Layer):
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         width = canvas.surface.get_width()
-        words = tuple((entry.text, entry.style) for entry in self.entries)
+        words = tuple(entry.key() for entry in self.entries)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
         if self._strip is None or key != self._key:
             self._strip, self._key = legend_strip(self.entries, canvas), key

@@ -1,6 +1,7 @@
 """What is drawn of the world, one class a layer: map, cells, robots and where they went.
 
-`forces` has the layers that explain a decision, `furniture` the scale bar, status and legend.
+`aim_marks` has where robots head, `forces` the layers that explain a decision, `furniture` the scale bar,
+status and legend.
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ class LegendEntry:
     text: str
     draw: Callable[[Canvas, float, float], None]
     style: str = ""
+
+    def key(self) -> tuple[str, str]:
+        """Return what an entry has in common with those that say and show the same."""
+        return self.text, self.style
 
 
 class Layer(ABC):
@@ -257,7 +262,7 @@ class Starts(Layer):
         view = canvas.camera, canvas.scale
         if self._kept is None or self._kept[0] is not scene.starts or self._kept[1] != view:
             centers = canvas.camera.to_pixels(scene.starts)
-            radius = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
+            radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
             self._kept = scene.starts, view, centers, radius
         centers, radius = self._kept[2:]
         for center in centers.tolist():
@@ -271,38 +276,6 @@ class Starts(Layer):
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         return [LegendEntry("start", self._ring)] if scene.starts is not None else []
-
-
-class Centroids(Layer):
-    """A plus at the centroid of each cell, where RAPF and Lloyd's algorithm usually head for.
-
-    Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them. Nor where a
-    robot has arrived: only the ends of the plus would stick out from under its disc.
-    """
-
-    name = "centroids"
-    title = "Centroids"
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.centroids is None or scene.snapshot is None or not scene.has_goals:
-            return
-        centers = canvas.camera.to_pixels(scene.centroids)
-        arm = _rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 11.0 * canvas.scale))
-        away = np.hypot(*(centers - canvas.camera.to_pixels(scene.snapshot.positions)).T)
-        for center in centers[away > drawn_radii(canvas, scene)].tolist():
-            self._plus(canvas, center[0], center[1], arm)
-
-    @staticmethod
-    def _plus(canvas: Canvas, x: float, y: float, arm: float | None = None) -> None:
-        arm = 5.5 * canvas.scale if arm is None else arm
-        width, theme = min(1.3 * canvas.scale, 0.3 * arm), canvas.theme
-        canvas.stamp(
-            lambda shift: sprites.cross(arm, theme.ink, theme.background, width, False, shift), (x, y)
-        )
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        shown = scene.centroids is not None and scene.has_goals
-        return [LegendEntry("cell centroid", self._plus)] if shown else []
 
 
 class Robots(Layer):
@@ -320,7 +293,7 @@ class Robots(Layer):
         theme = canvas.theme
         for robot, (center, radius) in enumerate(zip(centers, radii, strict=True)):
             fill = theme.robots[canvas.hues[robot]]
-            ring = min(1.6 * canvas.scale, _rounded(0.3 * radius))
+            ring = min(1.6 * canvas.scale, rounded(0.3 * radius))
             text = str(scene.number(robot))
             if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * canvas.scale:
                 text = ""
@@ -356,10 +329,10 @@ def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> list[float]:
     centers = camera.to_pixels(scene.snapshot.positions)
     true = scene.team.radius * camera.zoom
     radii = fitted_radii(centers, true, SMALLEST * scale, READABLE * scale)
-    return [_rounded(radius) for radius in np.minimum(radii, 400.0).tolist()]
+    return [rounded(radius) for radius in np.minimum(radii, 400.0).tolist()]
 
 
-def _rounded(pixels: float) -> float:
+def rounded(pixels: float) -> float:
     """Return a size in steps of half a pixel, so that few sprites are made."""
     return round(pixels * 2) / 2
 

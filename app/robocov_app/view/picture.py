@@ -10,11 +10,12 @@ import pygame
 from numpy.typing import NDArray
 
 from robocov.errors import ParameterError, unknown_name
+from robocov_app.view.aim_marks import Centroids, Goals
 from robocov_app.view.camera import Camera
 from robocov_app.view.canvas import Canvas
 from robocov_app.view.coverage import ColourBar, Distances, GeodesicCells, bar_room
 from robocov_app.view.density import DensityShading
-from robocov_app.view.forces import ForceTerm, Goals, Links, ObstaclePoints, Ranges, Velocities
+from robocov_app.view.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
 from robocov_app.view.furniture import (
     LEGEND_ROW,
     MARGIN,
@@ -29,7 +30,6 @@ from robocov_app.view.knowledge import CursorPath, RayScan, SensedObstacles
 from robocov_app.view.layers import (
     Boundary,
     Cells,
-    Centroids,
     Grid,
     Layer,
     LegendEntry,

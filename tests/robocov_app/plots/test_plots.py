@@ -127,7 +127,8 @@ class TestTrajectories:
         last = partition(record.positions[-1], ROOMS.region).centroid
         for _ in range(60):
             last = partition(last, ROOMS.region).centroid
-        arrived = replace(record, positions=np.concatenate([record.positions, last[None]]))
+        positions, goals = (np.concatenate([past, last[None]]) for past in (record.positions, record.goals))
+        arrived = replace(record, positions=positions, goals=goals)
         axes = plot_trajectories(arrived).axes[0]
         marks = next(line for line in axes.lines if line.get_marker() == "+")
         assert len(marks.get_xydata()) == 0
@@ -141,6 +142,18 @@ class TestTrajectories:
         (legend,) = mixed.legends
         words = [text.get_text() for text in legend.get_texts()]
         assert words[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
+
+    def test_goals_of_another_kind_are_called_goals(self):
+        record = run_of(ROOMS, 5)
+        goals = record.goals.copy()
+        goals[-1] = record.positions[-1] + np.array([0.8, 0.3])
+        axes = plot_trajectories(replace(record, goals=goals)).axes[0]
+        (marks,) = (line for line in axes.lines if line.get_marker() == "x")
+        assert marks.get_xydata() == pytest.approx(goals[-1])
+        assert not any(line.get_marker() == "+" for line in axes.lines)
+        (legend,) = plot_comparison([replace(record, goals=goals), record]).legends
+        words = [text.get_text() for text in legend.get_texts()]
+        assert {"goal", "cell centroid"} < set(words)
 
     def test_a_crowd_stays_readable(self):
         record = run_of(ROOMS, 120)
