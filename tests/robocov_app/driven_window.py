@@ -23,6 +23,9 @@ from robocov_app.view.picture import standard_layers
 SIZE = (900, 600)
 FRAME = 1 / 50
 
+MIDDLE = (0.6, 3.6)
+"""A place in the hall where nothing is."""
+
 KEYS = {
     **{
         name: getattr(pygame, f"K_{name.upper()}")
@@ -217,3 +220,16 @@ class Driver:
 
     def same(self, other: Any) -> bool:
         return bool(np.array_equal(self.picture(), other))
+
+
+def place(driver: Driver, number: int, pane: int = 0) -> np.ndarray:
+    """Return where a robot is, (2,) m."""
+    lane = driver.session.lanes[pane]
+    return driver.session.positions(lane)[lane.numbers.index(number)]
+
+
+def resized(driver: Driver, size: tuple[int, int]) -> None:
+    """Give the window another size."""
+    pygame.display.set_mode(size, pygame.RESIZABLE)
+    driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
+    driver.settle()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.environment.starts import DiscStart, UniformStart
+from robocov_app.demo.costs import DirectCosts
+from robocov_app.demo.desk import Desk
 from robocov_app.demo.lane import with_failed
 from robocov_app.demo.scenario import Law, Scenario
 from robocov_app.demo.session import Session
@@ -17,6 +22,7 @@ HALL = Environment(
     (CircleObstacle((4.2, 1.2), 0.5, "pillar"), WallObstacle(((2.5, 4), (2.5, 2.4)), 0.1)),
     {"corner": DiscStart((1.2, 1.2), 0.8), "far": DiscStart((5.2, 3.2), 0.5), "spread": UniformStart()},
 )
+PILLAR = CircleObstacle((3.5, 3.0), 0.3)
 RAPF, RPF, LLOYD = Law("rapf"), Law("rpf"), Law("lloyd")
 
 
@@ -72,3 +78,26 @@ def too_deep(session: Session) -> float:
         rim = shapely.distance(free.boundary, places) - lane.simulation.team.radius
         deepest = max(deepest, float(-rim.min()))
     return deepest
+
+
+def with_pillar(environment=HALL, pillar=PILLAR) -> Environment:
+    """Return the hall with one more obstacle."""
+    return replace(environment, obstacles=(*environment.obstacles, pillar))
+
+
+def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Desk:
+    """Return a desk in the hall, paused at its beginning."""
+    return Desk(begun(*laws, **changes), DirectCosts(8), {"cells", "robots"}, folder, "hall")
+
+
+def positions_of(session) -> list[np.ndarray]:
+    """Return where the robots of each pane are, (n, 2) m."""
+    return [session.positions(lane).copy() for lane in session.lanes]
+
+
+def with_curves(session, steps) -> None:
+    """Make steps, with a cost at each, as the window notes it."""
+    for _ in range(steps):
+        for lane in session.lanes:
+            lane.curve.add(session.time, 3.0 - session.time)
+        session.step()

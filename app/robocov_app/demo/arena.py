@@ -363,5 +363,5 @@ class Arena:
 
     def _legend_entries(self) -> list[LegendEntry]:
         """Return the shared legend: what any of the panes shows."""
-        each = zip(self._painters, self._scenes, strict=True)
+        each = zip(self._painters, self._scenes, strict=False)  # a pane that was just added has no scene yet
         return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

@@ -1,84 +1,19 @@
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from drawn_run import HALL, ROOMS, SQUARE
+from explained_moments import line, moment, says_no_nonsense, sums_up, texts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov import Individually, Lloyd, Rapf, Rpf, Simulation, Team, load_map
-from robocov.controllers import make_controller
-from robocov.metrics import SETTLED_WINDOW
-from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov import Rapf, Simulation, Team
+from robocov.observation import Decision
 from robocov.voronoi import partition
 from robocov_app.demo import inspector
-from robocov_app.demo.inspector import REST, Line, Report, explain
-
-
-def moment(
-    positions,
-    *,
-    velocities=None,
-    forces=None,
-    goals=None,
-    points=None,
-    environment=SQUARE,
-    cells=None,
-    recent=None,
-    robot=0,
-    names=None,
-    **terms,
-) -> Report:
-    """Explain one robot at a moment made by hand; without `forces` they are the sum of the terms."""
-    positions = np.array(positions, dtype=float)
-    limits = {name: terms.pop(name) for name in tuple(terms) if name in Team.__dataclass_fields__}
-    team = Team.homogeneous(len(positions), **limits)
-    nothing = np.full_like(positions, np.nan)
-    terms = {name: np.array(value, dtype=float) for name, value in terms.items()}
-    if forces is None:
-        forces = sum(terms.values(), np.zeros_like(positions))
-    seen = Observations(
-        positions,
-        np.zeros_like(positions) if velocities is None else np.array(velocities, dtype=float),
-        Neighbours.within(positions, team.communication_range),
-        nothing if points is None else np.array(points, dtype=float),
-        environment.region,
-    )
-    goals = None if goals is None else np.array(goals, dtype=float)
-    snapshot = Snapshot(seen, Decision(np.array(forces, dtype=float), goals, terms, cells))
-    return explain(snapshot, team, environment, robot, names=names, recent=recent)
-
-
-def run(simulation: Simulation, seconds: float) -> list[Report]:
-    """Let a run go on, and explain all robots at its end with what they did of late."""
-    past = [snapshot.positions for snapshot in simulation.snapshots(seconds)]
-    recent = np.array(past[-round(SETTLED_WINDOW / simulation.dt) - 1 :: 8])
-    team, environment = simulation.team, simulation.environment
-    return [
-        explain(simulation.snapshot, team, environment, robot, recent=recent[:, robot])
-        for robot in range(len(team))
-    ]
-
-
-def texts(report: Report) -> list[str]:
-    return [line.text for line in report.lines]
-
-
-def line(report: Report, kind: str) -> Line:
-    (found,) = (line for line in report.lines if line.kind == kind)
-    return found
-
-
-def sums_up(report: Report) -> None:
-    total = np.array(line(report, "resultant").vector)
-    parts = [one.vector for one in report.lines if one.vector is not None and one.kind != "resultant"]
-    scale = max((np.abs(part).max() for part in parts), default=0.0)
-    assert np.sum(parts or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
-
+from robocov_app.demo.inspector import REST, explain
 
 # sizes and directions
 
@@ -384,98 +319,7 @@ def test_braking_before_the_goal_is_no_pull():
     assert line(aside, "attraction").text == "pulled 1.4 N north-east on the way to its goal, 2.0 m away"
 
 
-# runs
-
-
-@pytest.mark.parametrize(
-    ("controller", "reason"),
-    [
-        (Rapf(), "stuck: the pull to its centroid (2.0 N) and the push of the wall (2.0 N) balance"),
-        (Lloyd(), "stuck: the pull to its centroid (10 N) presses it against the wall"),
-    ],
-)
-def test_stuck_in_the_trap(controller, reason):
-    trap = load_map("trap")
-    reports = run(Simulation(trap, controller, trap.start("inside").sample(3, seed=0)), 40.0)
-    (stuck,) = (report for report in reports if "stuck" in report.verdict)
-    assert stuck.title == "Robot 3"
-    assert re.fullmatch(r"at rest, stuck: its centroid is 1\.\d m away, behind an obstacle", stuck.verdict)
-    assert reason in texts(stuck)
-    for report in reports:
-        sums_up(report)
-
-
-def test_at_rest_on_the_centroid_of_the_square():
-    square = load_map("square")
-    reports = run(Simulation(square, Lloyd(), square.start().sample(4, seed=0)), 40.0)
-    assert {report.verdict for report in reports} == {"arrived: at rest on its centroid"}
-    assert "not pulled to its centroid, 0 mm away" in texts(reports[0])
-
-
-def test_robots_without_goals():
-    square = load_map("square")
-    simulation = Simulation(square, Rpf(), square.start().sample(3, seed=1))
-    (first, *_) = run(simulation, 0.0)
-    assert first.verdict.startswith("setting off ")
-    for report in run(simulation, 3.0):
-        assert report.verdict.startswith(("moving ", "braking from "))
-        assert not [text for text in texts(report) if "goal" in text or "centroid" in text]
-        assert {"repulsion_robots", "repulsion_obstacle"} < {one.kind for one in report.lines}
-
-
-def test_a_repulsive_team_trembles():
-    rooms = load_map("rooms")
-    reports = run(Simulation(rooms, Rpf(), rooms.start().sample(6, seed=0)), 40.0)
-    assert [report for report in reports if report.verdict == "trembling in place"]
-
-
-def test_a_single_robot_that_senses_nothing():
-    square = load_map("square")
-    team = Team.homogeneous(1, sensing_range=0.5)
-    simulation = Simulation(square, Rapf(), [[2.0, 3.0]], team)
-    assert run(simulation, 0.0)[0].verdict == "setting off north-east to its centroid"
-    assert run(simulation, 2.0)[0].verdict == "moving 0.98 m/s north-east to its centroid"
-    (report,) = run(simulation, 60.0)
-    assert report.verdict == "arrived: at rest on its centroid"
-    assert {"hears no other robot", "senses nothing within 50 cm", "not pushed by robots"} < {*texts(report)}
-
-
-@dataclass(frozen=True)
-class Home:
-    """Goes to its centroid, and says no more."""
-
-    def force(self, own):
-        return 0.5 * (own.centroid - own.position)
-
-
-def test_laws_that_tell_no_terms():
-    simulation = Simulation(load_map("square"), Individually(Home()), [[2.0, 3.0], [7.0, 3.0]])
-    report = run(simulation, 1.0)[0]
-    assert line(report, REST).text.endswith("by its law")
-    assert [text for text in texts(report) if re.fullmatch(r"its centroid is \d\.\d m away", text)]
-    sums_up(report)
-
-
-@pytest.mark.parametrize("law", ["rapf", "rpf", "lloyd"])
-@pytest.mark.parametrize("name", ["rooms", "l-shape"])
-def test_all_along_a_run(law, name):
-    environment = load_map(name)
-    simulation = Simulation(environment, make_controller(law), environment.start().sample(4, seed=2))
-    for snapshot in simulation.snapshots(4.0):
-        for robot in range(4):
-            says_no_nonsense(explain(snapshot, simulation.team, environment, robot))
-
-
 # anything
-
-
-def says_no_nonsense(report: Report) -> None:
-    for text in (report.title, report.verdict, *texts(report)):
-        assert text == " ".join(text.split()) != ""
-        assert not re.search(r"nan|inf|None|\de[+-]?\d|-0\.00|\bj\b", text), text
-    assert all(np.isfinite(one.vector).all() for one in report.lines if one.vector is not None)
-    assert report.lines[0].vector is None
-    sums_up(report)
 
 
 numbers = st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, 1e-300, 1e-9, 4.0])

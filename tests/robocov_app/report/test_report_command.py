@@ -18,7 +18,7 @@ from reported_results import saved_comparison, saved_run, walk
 from robocov_app.cli import main
 from robocov_app.output import cleared, is_report
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture

@@ -231,7 +231,7 @@ assert "matplotlib" not in sys.modules
 
 def test_frames_need_no_display_and_no_matplotlib():
     done = subprocess.run(
-        [sys.executable, "-c", _HEADLESS, str(Path(__file__).parent)],
+        [sys.executable, "-c", _HEADLESS, str(Path(__file__).parents[1])],
         capture_output=True,
         text=True,
         check=False,

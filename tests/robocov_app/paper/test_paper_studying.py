@@ -93,7 +93,7 @@ def test_runs_of_a_former_study_do_not_count(tmp_path: Path) -> None:
 def begun(*words: str) -> subprocess.Popen[str]:
     """Start the command with the tiny study in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parent), *words],
+        [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parents[1]), *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

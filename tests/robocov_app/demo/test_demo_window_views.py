@@ -1,0 +1,126 @@
+"""The window, as it is used: the time line and the camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_window import MIDDLE, Driver, opened
+from touched_run import RAPF, RPF
+
+# time line
+
+
+def played(driver: Driver, steps: int) -> Driver:
+    for _ in range(steps):
+        driver.session.step()
+        driver.window._ask_costs()
+    driver.frames(2, 0.2)
+    return driver
+
+
+def at(driver: Driver, time: float) -> tuple[float, float]:
+    """Return the pixel on the time line of a time."""
+    _, top, _, high = driver.window.layout.track
+    return driver.window.chart.column(time), top + high / 2
+
+
+def test_the_time_line_is_dragged_to_look_back_and_to_the_end_again(driver: Driver) -> None:
+    played(driver, 120)
+    driver.press(*at(driver, 1.0))
+    assert driver.session.time == pytest.approx(1.0, abs=0.05) and not driver.session.live
+    driver.move(*at(driver, 0.4), held=1)
+    assert driver.session.time == pytest.approx(0.4, abs=0.05)
+    driver.move(*at(driver, 9.0), held=1)
+    assert driver.session.live
+    driver.release()
+    driver.move(*at(driver, 0.2))
+    assert driver.session.live
+
+
+def test_a_branch_leaves_a_ghost_of_what_came_after(driver: Driver) -> None:
+    played(driver, 120)
+    driver.click(*at(driver, 0.5))
+    driver.key("b")
+    assert driver.session.live and driver.session.playing
+    assert driver.session.end < 0.7 and len(driver.session.ghosts) == 1
+    driver.frames(3)
+
+
+def test_a_touch_in_the_past_goes_on_from_there(driver: Driver) -> None:
+    played(driver, 120)
+    driver.click(*at(driver, 0.5))
+    driver.key("c")
+    driver.drag_at((1.0, 3.2), (1.3, 3.2))
+    assert driver.session.live and driver.session.end == pytest.approx(0.5, abs=0.05)
+    assert [event.kind for event in driver.session.events] == ["obstacle"]
+
+
+def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> None:
+    played(driver, 60)
+    driver.move(*at(driver, 0.5))
+    quiet = driver.picture()
+    driver.desk.attempt(lambda: driver.session.fail_robot(2))
+    played(driver, 60)
+    (event,) = driver.session.events
+    assert event.time == pytest.approx(1.0) and event.text == "robot 2 failed"
+    assert not driver.same(quiet)
+    driver.move(*at(driver, 1.0))
+    assert driver.window.chart.hover == driver.at
+
+
+def test_home_end_and_arrows_go_through_time(driver: Driver) -> None:
+    played(driver, 120)
+    driver.key("home")
+    assert driver.session.time == 0.0
+    driver.key("right")
+    assert 0.0 < driver.session.time < 0.2
+    driver.key("shift+right")
+    assert driver.session.time == pytest.approx(1.0, abs=0.2)
+    driver.key("end")
+    assert driver.session.live
+
+
+# camera
+
+
+def world(driver: Driver, pane: int = 0) -> np.ndarray:
+    return np.array(driver.window.arena.to_world(driver.at, pane))
+
+
+@pytest.mark.parametrize("amount", [3, -1])
+def test_zooming_keeps_the_place_under_the_cursor(amount: int, driver: Driver) -> None:
+    driver.wheel(200, 150, 2)
+    before, zoom = world(driver), driver.window.arena._painters[0].camera.zoom
+    driver.wheel(200, 150, amount)
+    assert np.allclose(world(driver), before, atol=1e-9)
+    assert (driver.window.arena._painters[0].camera.zoom > zoom) == (amount > 0)
+
+
+@pytest.mark.parametrize("button", [2, 3])
+def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Driver) -> None:
+    driver.key("p")
+    before = driver.pixel(MIDDLE)
+    driver.drag((200, 200), (230, 190), (260, 180), button=button)
+    assert np.allclose(driver.pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
+    assert driver.desk.tool.preview(driver.session) is None
+
+
+def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:
+    camera = driver.window.arena._painters[0].camera
+    for key in ("ctrl+=", "ctrl+=", "ctrl+left", "ctrl+up", "ctrl+-", "ctrl+right", "ctrl+down"):
+        before = driver.window.arena._painters[0].camera
+        driver.key(key)
+        assert driver.window.arena._painters[0].camera != before, key
+    driver.key("f")
+    assert driver.window.arena._painters[0].camera == camera
+
+
+def test_one_camera_for_all_panes(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, RPF) as driver:
+        x, y = driver.pixel(MIDDLE, 1)
+        driver.wheel(x, y, 3)
+        first, second = driver.window.arena._painters
+        assert first.camera.zoom == second.camera.zoom and first.camera.center == second.camera.center
+        assert np.allclose(driver.window.arena.to_world(driver.at, 1), MIDDLE, atol=0.02)

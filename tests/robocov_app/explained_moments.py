@@ -1,0 +1,85 @@
+"""What the inspector says of moments made by hand and of runs."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from drawn_run import SQUARE
+
+from robocov import Simulation, Team
+from robocov.metrics import SETTLED_WINDOW
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov_app.demo.inspector import Line, Report, explain
+
+
+def moment(
+    positions,
+    *,
+    velocities=None,
+    forces=None,
+    goals=None,
+    points=None,
+    environment=SQUARE,
+    cells=None,
+    recent=None,
+    robot=0,
+    names=None,
+    **terms,
+) -> Report:
+    """Explain one robot at a moment made by hand; without `forces` they are the sum of the terms."""
+    positions = np.array(positions, dtype=float)
+    limits = {name: terms.pop(name) for name in tuple(terms) if name in Team.__dataclass_fields__}
+    team = Team.homogeneous(len(positions), **limits)
+    nothing = np.full_like(positions, np.nan)
+    terms = {name: np.array(value, dtype=float) for name, value in terms.items()}
+    if forces is None:
+        forces = sum(terms.values(), np.zeros_like(positions))
+    seen = Observations(
+        positions,
+        np.zeros_like(positions) if velocities is None else np.array(velocities, dtype=float),
+        Neighbours.within(positions, team.communication_range),
+        nothing if points is None else np.array(points, dtype=float),
+        environment.region,
+    )
+    goals = None if goals is None else np.array(goals, dtype=float)
+    snapshot = Snapshot(seen, Decision(np.array(forces, dtype=float), goals, terms, cells))
+    return explain(snapshot, team, environment, robot, names=names, recent=recent)
+
+
+def run(simulation: Simulation, seconds: float) -> list[Report]:
+    """Let a run go on, and explain all robots at its end with what they did of late."""
+    past = [snapshot.positions for snapshot in simulation.snapshots(seconds)]
+    recent = np.array(past[-round(SETTLED_WINDOW / simulation.dt) - 1 :: 8])
+    team, environment = simulation.team, simulation.environment
+    return [
+        explain(simulation.snapshot, team, environment, robot, recent=recent[:, robot])
+        for robot in range(len(team))
+    ]
+
+
+def texts(report: Report) -> list[str]:
+    return [line.text for line in report.lines]
+
+
+def line(report: Report, kind: str) -> Line:
+    (found,) = (line for line in report.lines if line.kind == kind)
+    return found
+
+
+def sums_up(report: Report) -> None:
+    total = np.array(line(report, "resultant").vector)
+    parts = [one.vector for one in report.lines if one.vector is not None and one.kind != "resultant"]
+    scale = max((np.abs(part).max() for part in parts), default=0.0)
+    assert np.sum(parts or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
+
+
+def says_no_nonsense(report: Report) -> None:
+    for text in (report.title, report.verdict, *texts(report)):
+        assert text == " ".join(text.split()) != ""
+        assert not re.search(r"nan|inf|None|\de[+-]?\d|-0\.00|\bj\b", text), text
+    assert all(np.isfinite(one.vector).all() for one in report.lines if one.vector is not None)
+    assert report.lines[0].vector is None
+    sums_up(report)
