@@ -221,9 +221,8 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
     if tuning is not None:
         studies[NAME] = tuning
     if alone:
-        studies["claims"] = planned.study_of(
-            plan, planned.claim_maps(plan), beyond_studies.UNTUNED, KINDS, plan.seeds
-        )
+        laws = _papers_laws_expected(folder, plan)
+        studies["claims"] = planned.study_of(plan, planned.claim_maps(plan), laws, KINDS, plan.seeds)
     runs = sum(len(study) for study in studies.values())
     # which gains will be the best is not known yet, and how many runs these are does not depend on it
     there = {name: min(runs_there(folder, name), len(study)) for name, study in studies.items()}
@@ -255,6 +254,19 @@ def _worst(
                 own = outcomes.among(np.isfinite(outcomes.of(law.key, "gap")))
                 return worst_runs(study, own, law, beyond_studies.of(plan).worst)
     return []
+
+
+def _papers_laws_expected(folder: Path, plan: Plan) -> tuple[Contender, ...]:
+    """Return the paper's controllers as `_papers_laws` runs them, with any gains for those that are best."""
+    tuning = planned.gains_study(plan)
+    if runs_there(folder, "gains", tuning) < len(tuning):
+        return beyond_studies.UNTUNED
+    # it is taken that the best are none of the others, which the first or the last of a grid may be
+    guesses = (
+        planned.claim_contenders({law: best(law, grid[k]) for law, grid in planned.gain_sets(plan).items()})
+        for k in (0, -1)
+    )
+    return max(guesses, key=lambda laws: len(planned.distinct(laws)))
 
 
 def _papers_laws(

@@ -36,6 +36,7 @@ from robocov_app.paper.goals import QUESTIONS
 from robocov_app.paper.outcomes import joined
 from robocov_app.paper.pages import Image
 from robocov_app.sweep.study import Study
+from robocov_app.sweep.task import tasks_of
 
 pytestmark = pytest.mark.xdist_group("tiny-beyond")
 
@@ -91,6 +92,14 @@ class TestRuns:
         assert material.failed == 0
         again = forecast_beyond(folder, PLAN, 2, alone=True)
         assert (again.left, again.seconds, again.runs) == (0, 0.0, material.runs + 2 * 3 * 4)
+
+    def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
+        monkeypatch.setattr("robocov_app.sweep.performing.perform", lambda task: None)
+        without = forecast_beyond(tmp_path, PLAN, 2, alone=True)
+        for task in tasks_of(planned.gains_study(PLAN)):
+            (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
+        expected = forecast_beyond(tmp_path, PLAN, 2, alone=True)
+        assert expected.runs == expected.left == without.runs + 2 * 3 * 2  # RAPF's and RPF's
 
     def test_rivals_have_the_gains_that_were_best_on_the_maps_of_the_tuning(self, study):
         folder, material = study
