@@ -17,7 +17,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment.starts import DiscStart, PointsStart, Start
-from robocov.errors import MapError, StartError, counted
+from robocov.environment.swept import LEAST, in_the_way, swept_area
+from robocov.errors import MapError, StartError, counted, listed
 from robocov.files.strictjson import one_line
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
 from robocov.mapfile.rules import check_rules
@@ -184,6 +185,7 @@ def _warnings(
         yield from _outside(sketch)
     yield from _twice(sketch)
     yield from _double_vertices(sketch)
+    yield from _paths(sketch, faulty)
     if free.is_empty:
         return
     yield from _sealed_rooms(free, radius)
@@ -210,6 +212,25 @@ def _outside(sketch: Sketch) -> Iterator[Problem]:
         item = sketch.obstacles[k]
         words = f"{called(sketch, item.key)} lies outside the boundary"
         yield Problem(words, item.geometry, item.key, False)
+
+
+def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
+    """Warn of obstacles that move through what stands, or through the outer wall."""
+    sound = [item for item in sketch.obstacles if item.key not in faulty and not item.geometry.is_empty]
+    standing = {item.key: item.geometry for item in sound if item.shape.path is None}
+    for item in sound:
+        if item.shape.path is None:
+            continue
+        area = swept_area(item.shape.polygon, item.shape.path)
+        met = in_the_way(area, standing)
+        names, places = [called(sketch, key) for key in met], [standing[key] for key in met]
+        if BOUNDARY not in faulty:
+            outside = area.difference(Polygon(sketch.boundary))
+            if outside.area > LEAST:
+                names, places = [*names, "the boundary"], [*places, outside]
+        if names:
+            words = f"{called(sketch, item.key)} moves through {listed(names)}"
+            yield Problem(words, area.intersection(shapely.union_all(places)), item.key, False)
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:

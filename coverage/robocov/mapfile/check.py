@@ -12,7 +12,8 @@ import shapely
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.environment.starts import GAP, DiscStart, PointsStart
-from robocov.errors import StartError
+from robocov.environment.swept import LEAST, in_the_way, swept_area
+from robocov.errors import StartError, listed
 from robocov.files.strictjson import place
 from robocov.robots import DEFAULT_RADIUS
 
@@ -124,7 +125,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
     (100.0,)
     """
     gap = narrowest_gap(environment.free)
-    warnings = [*_shape_warnings(environment), *_room_warnings(environment, radius)]
+    warnings = [*_shape_warnings(environment), *_path_warnings(environment)]
+    warnings += _room_warnings(environment, radius)
     if gap is not None and gap.width < 2 * radius:
         (a, b), (c, d) = gap.between
         warnings.append(
@@ -174,6 +176,20 @@ def _shape_warnings(environment: Environment) -> Iterator[str]:
     for k, obstacle in enumerate(environment.obstacles):
         if not shapely.relate_pattern(obstacle.polygon, inside, "T********"):
             yield f"{_called(k, obstacle.name)} is entirely outside the boundary"
+
+
+def _path_warnings(environment: Environment) -> Iterator[str]:
+    """Warn of obstacles that move through what stands, or through the outer wall."""
+    standing = {k: shape.polygon for k, shape in enumerate(environment.obstacles) if shape.path is None}
+    for k, obstacle in enumerate(environment.obstacles):
+        if obstacle.path is None:
+            continue
+        area = swept_area(obstacle.polygon, obstacle.path)
+        met = [_called(other, environment.obstacles[other].name) for other in in_the_way(area, standing)]
+        if area.difference(environment.boundary_polygon).area > LEAST:
+            met.append("the boundary")
+        if met:
+            yield f"{_called(k, obstacle.name)} moves through {listed(met)}"
 
 
 def _called(k: int, name: str | None) -> str:

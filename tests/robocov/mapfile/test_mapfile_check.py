@@ -81,6 +81,33 @@ def test_an_obstacle_outside() -> None:
     assert warned(room(block(9.5, 2, 1, 1))) == []
 
 
+def test_paths_through_what_stands() -> None:
+    def moving(*points: tuple[float, float], **others: Any) -> dict[str, Any]:
+        path = {"points": points, "speed": 0.5, **others}
+        return {"kind": "circle", "center": [1, 1], "radius": 0.3, "name": "cart", "path": path}
+
+    racks = [block(3, 0.5, 0.5, 1), block(5, 0.5, 0.5, 1) | {"name": "rack"}]
+    assert warned(room(*racks, moving((1, 1), (1, 5)))) == []
+    assert warned(room(*racks, moving((1, 1), (2.6, 1)))) == []  # not as far as the first
+    assert warned(room(*racks, moving((1, 1), (9, 1)))) == [
+        "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
+    ]
+    # straight back from the last point, as a loop does
+    around = moving((1, 1), (1, 3), (9, 3), (9, 1))
+    assert warned(room(*racks, around)) == [
+        "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
+    ]
+    there_and_back = moving((1, 1), (1, 3), (9, 3), (9, 1), repeat="back-and-forth")
+    assert warned(room(*racks, there_and_back)) == []
+    assert warned(room(moving((1, 1), (9.8, 1)))) == ["obstacles[0] (cart) moves through the boundary"]
+    many = [block(x, 0.5, 0.5, 1) for x in (2, 3, 4, 5, 6)]
+    assert warned(room(*many, moving((1, 1), (9, 1)))) == [
+        "obstacles[5] (cart) moves through obstacles[0], obstacles[1], obstacles[2] and 2 more"
+    ]
+    # what moves itself may have gone when it comes
+    assert warned(room(moving((1, 1), (9, 1)), moving((1, 1), (8, 1)))) == []
+
+
 def test_vertices_given_twice() -> None:
     twice = block(4, 2, 1, 1)
     twice["vertices"].insert(2, list(twice["vertices"][2]))

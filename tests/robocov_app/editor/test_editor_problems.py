@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
@@ -240,6 +241,18 @@ def test_warnings_of_what_may_be_a_mistake():
     assert warned(hall(doubled)) == ["polygon: two vertices lie in the same place, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
     assert not [words for words in warned(hall(ended)) if "two vertices" in words]
+
+
+def test_paths_through_what_stands_are_told_where_they_do():
+    wall = WallObstacle(((6.0, 0.0), (6.0, 4.0)), 0.2, "screen")
+    cart = CircleObstacle((2.0, 2.0), 0.5, "cart", ObstaclePath(((2.0, 2.0), (10.0, 2.0)), 1.0))
+    assert warned(hall(cart)) == []
+    (problem,) = problems(hall(wall, cart))
+    assert problem.words == "circle “cart” moves through wall “screen”"
+    assert problem.of == 1 and not problem.grave
+    assert problem.where.bounds == pytest.approx((5.9, 1.5, 6.1, 2.5), abs=1e-3)
+    out = replace(cart, path=ObstaclePath(((2.0, 2.0), (14.0, 2.0)), 1.0))
+    assert warned(hall(out)) == ["circle “cart” moves through the boundary"]
 
 
 def test_sealed_rooms_and_pockets_are_told_of():

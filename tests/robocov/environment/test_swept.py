@@ -1,0 +1,53 @@
+"""Where moving obstacles come by, against points that are really carried along."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle
+from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment.swept import in_the_way, swept_area
+
+FRAME = PolygonObstacle(
+    ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)), (((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),)
+)
+NUMBERS = st.integers(-40, 40).map(lambda k: k / 10)
+POINTS = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=4, unique=True).map(tuple)
+
+
+@given(POINTS, st.sampled_from(["loop", "back-and-forth"]))
+def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
+    path = ObstaclePath(points, 0.5, repeat)
+    area = swept_area(FRAME.polygon, path)
+    times = np.linspace(0.0, path.period, 400)
+    met = shapely.union_all([FRAME.shifted(path.shift(time)).polygon for time in times])
+    assert met.difference(area.buffer(1e-6)).area < 1e-6  # nothing is missing
+    step = 0.5 * path.period / 399
+    assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more
+
+
+def test_a_hole_is_filled_only_as_far_as_its_rim_comes() -> None:
+    wide = PolygonObstacle(((0, 0), (4, 0), (4, 4), (0, 4)), (((1, 1), (3, 1), (3, 3), (1, 3)),))
+    area = swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))
+    assert area.area == pytest.approx(4.5 * 4 - 1.5 * 2)
+
+
+@pytest.mark.parametrize("points", [(), ((1, 1),), ((1, 1), (1, 1))])
+@pytest.mark.parametrize("repeat", ["loop", "back-and-forth"])
+def test_a_path_that_leads_nowhere_leaves_it_where_it_is(points, repeat) -> None:
+    assert swept_area(FRAME.polygon, ObstaclePath(points, 1.0, repeat)).equals(FRAME.polygon)
+
+
+def test_what_is_only_touched_is_not_in_the_way() -> None:
+    area = swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
+    others = {
+        "before": shapely.box(2, -0.1, 2.2, 0.1),
+        "beside": shapely.box(1, 0.5, 2, 1),
+        "off": shapely.box(8, 8, 9, 9),
+    }
+    assert in_the_way(area, others) == ("before",)
+    assert in_the_way(area, {}) == ()
