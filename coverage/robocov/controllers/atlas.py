@@ -49,6 +49,9 @@ _TURN = 0.2
 _HEEDED = 1.5
 """Metres up to which other robots matter to the velocity."""
 
+_FOR_TURNING = 0.7
+"""Part of the acceleration that is spent on where to go; the rest is left for not running into anything."""
+
 _TOGETHER = 1.5
 """A robot plans for its whole team as long as it takes to cross the region so many times."""
 
@@ -300,6 +303,8 @@ class Atlas:
         to_wall = positions - seen.obstacle_points
         gap = np.sqrt(to_wall[:, 0] ** 2 + to_wall[:, 1] ** 2) - team.radius
         wanted = steering.slowed(wanted, gap)
+        change = _FOR_TURNING * team.max_acceleration * self.response_time
+        wanted = steering.reachable(wanted, seen.velocities, change)
         robot, _, away, apart = seen.neighbours_within(_HEEDED)
         # of the size of others a robot knows its own
         neighbours = steering.robot_limits(away, apart, 2.0 * team.radius[robot])

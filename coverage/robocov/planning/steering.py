@@ -46,6 +46,16 @@ def slowed(velocity: Array, gap: Array) -> Array:
     return np.asarray(velocity * np.minimum(1.0, most / np.maximum(speed, 1e-9))[:, None])
 
 
+def reachable(wanted: Array, velocity: Array, change: Array) -> Array:
+    """Return (n, 2) velocities, m/s, that differ from the present by (n,) m/s at most, towards the wanted.
+
+    Whoever turns would else spend on that the acceleration that is needed for braking.
+    """
+    step = wanted - velocity
+    size = np.sqrt(step[:, 0] ** 2 + step[:, 1] ** 2)
+    return np.asarray(velocity + step * np.minimum(1.0, change / np.maximum(size, 1e-9))[:, None])
+
+
 class Limits(NamedTuple):
     """How fast something may be approached.
 

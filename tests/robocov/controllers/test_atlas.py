@@ -11,6 +11,7 @@ from robocov.controllers.atlas_memory import AtlasMemory
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
+from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
 from robocov.planning.discovered import UNKNOWN
 from robocov.robots import Team
@@ -62,6 +63,18 @@ def test_it_comes_to_rest(finished: Simulation) -> None:
 def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulation) -> None:
     """Only then it may relocate: it plans once more then, though nothing that it sees has changed."""
     assert all(mind.idle and mind.quiet for mind in finished.memory.minds)
+
+
+def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
+    """The gap turns out to be too narrow: then all acceleration would go into turning, none into braking."""
+    places = [
+        (6.606354578438451, 3.582792226112388), (5.82911286359781, 4.5164725372712775),
+        (5.893535020701633, 3.786360212980583), (5.341358005239178, 3.400674457312083),
+        (6.339880443956025, 4.543777359503736), (5.68626602446254, 3.4239886537883932),
+    ]  # fmt: skip
+    team = Team.homogeneous(6, sensing_range=6.0)
+    record = Simulation(load_map("gaps"), Atlas(), places, team, dt=0.02).run(11.0)
+    assert clearances(record).min() > 0.005
 
 
 def test_nothing_is_touched_on_the_way() -> None:

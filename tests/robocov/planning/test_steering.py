@@ -28,6 +28,21 @@ def test_nobody_approaches_one_wall_faster_than_he_can_stop(seed: int) -> None:
         np.testing.assert_allclose(w @ across, v @ across, atol=1e-9)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_a_turn_takes_no_more_acceleration_than_it_may(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    wanted, velocity = rng.uniform(-1, 1, (2, 8, 2))
+    change = rng.uniform(0.0, 1.5, 8)
+    found = steering.reachable(wanted, velocity, change)
+    near = np.hypot(*(wanted - velocity).T) <= change
+    assert np.array_equal(near, np.abs(found - wanted).max(axis=1) < 1e-12)
+    step = found - velocity
+    assert (np.hypot(*step.T) <= change + 1e-12).all()
+    # straight towards what is wanted
+    along = (step * (wanted - velocity)).sum(axis=1)
+    np.testing.assert_allclose(along, np.hypot(*step.T) * np.hypot(*(wanted - velocity).T), atol=1e-12)
+
+
 def test_in_narrow_places_nobody_is_fast() -> None:
     velocity = np.tile([1.0, 0.0], (4, 1))
     slow = np.hypot(*steering.slowed(velocity, np.array([np.nan, 5.0, 0.1, -0.01])).T)
