@@ -42,6 +42,7 @@ TINY_BEYOND = BeyondPlan(
     seeds=(0,),
     own_seeds=(0,),
     shared_seeds=(0,),
+    unseen=(201,),
     maps=(1, 2),
     map_starts=("corner",),
     conditions_maps=("rooms",),

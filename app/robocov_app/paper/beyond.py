@@ -15,6 +15,7 @@ from robocov.metrics.results import read_results
 from robocov_app.paper import beyond_studies
 from robocov_app.paper import plan as planned
 from robocov_app.paper.beyond_plan import HUGE, LARGE, SMALL
+from robocov_app.paper.beyond_studies import UNSEEN
 from robocov_app.paper.contenders import best
 from robocov_app.paper.degradation import degradations
 from robocov_app.paper.doing import swept_together
@@ -74,6 +75,8 @@ class BeyondMaterial:
     plan : Plan
     outcomes : Outcomes
         Of all contenders: those of the claims, the rivals, and ours.
+    unseen : Outcomes or None
+        Of the first of ours and the strongest of the paper's, on maps that played no part in its development.
     contenders : tuple of Contender
     gains : dict of controller to GainOutcomes
         Of the rivals whose gains were tuned here.
@@ -93,6 +96,7 @@ class BeyondMaterial:
 
     plan: Plan
     outcomes: Outcomes
+    unseen: Outcomes | None
     contenders: tuple[Contender, ...]
     gains: Mapping[str, GainOutcomes]
     references: Mapping[str, Reference]
@@ -142,18 +146,21 @@ def studied_beyond(folder: Path, plan: Plan, means: Means, material: Material | 
     rival_studies = beyond_studies.rival_studies(plan, tuned)
     small = beyond_studies.small_studies(plan)
     known |= referenced(beyond_studies.small_maps(plan), folder, plan, means)
-    swept_together(beyond_studies.all_studies(plan, tuned), folder, means, "paper: beyond")
+    unseen = beyond_studies.unseen_study(plan, papers)
+    known |= referenced(beyond_studies.unseen_maps(plan), folder, plan, means)
+    swept_together(beyond_studies.all_studies(plan, tuned, papers), folder, means, "paper: beyond")
     others = tuple(law for _, laws in rival_studies.values() for law in laws)
     parts = [among_rivals(claims, plan)]
     for name, (study, laws) in rival_studies.items():
         parts.append(read_outcomes(folder / "studies" / name, study, laws, known))
     steps = timed(folder, plan, means)
-    done = [*([NAME] if gains else ()), *rival_studies, *small]
+    done = [*([NAME] if gains else ()), *rival_studies, *([UNSEEN] if unseen else ()), *small]
     counts = [counted_runs(folder / "studies" / name) for name in done]
     outcomes = joined(parts)
     return BeyondMaterial(
         plan=plan,
         outcomes=outcomes,
+        unseen=None if unseen is None else read_outcomes(folder / "studies" / UNSEEN, *unseen, known),
         worst=_worst(plan, outcomes, rival_studies),
         contenders=(*papers, *others),
         gains=gains,

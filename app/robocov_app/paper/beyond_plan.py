@@ -27,6 +27,9 @@ class BeyondPlan:
         Among those of the paper's grids; without any, rivals keep their defaults.
     seeds, own_seeds, shared_seeds : seeds of the starts
         For the rivals, for our own controller, and for that which shares its map; among those of the claims.
+    unseen : seeds of generated maps
+        On which nothing was looked at while our own controller was developed: it is judged there once more,
+        beside RAPF and LA. May be empty.
     maps : seeds of generated maps for targets, density and mixed teams
     map_starts : names
         Kinds of starts on them.
@@ -49,6 +52,7 @@ class BeyondPlan:
     seeds: tuple[int, ...]
     own_seeds: tuple[int, ...]
     shared_seeds: tuple[int, ...]
+    unseen: tuple[int, ...]
     maps: tuple[int, ...]
     map_starts: tuple[str, ...]
     conditions_maps: tuple[str, ...]
@@ -72,6 +76,7 @@ FULL = BeyondPlan(
     seeds=(0,),
     own_seeds=(0, 1, 2, 3),
     shared_seeds=(0,),
+    unseen=tuple(range(201, 213)),
     maps=tuple(range(1, 11)),
     map_starts=("corner", "centre", "uniform"),
     conditions_maps=("rooms", "museum", "office", "blocks-a", "courtyard", "gaps"),
@@ -92,6 +97,7 @@ QUICK = BeyondPlan(
     seeds=(0,),
     own_seeds=(0,),
     shared_seeds=(0,),
+    unseen=(),
     maps=(1,),
     map_starts=("corner",),
     conditions_maps=("rooms",),

@@ -19,7 +19,7 @@ from robocov.controllers import CONTROLLERS
 from robocov.density import Gaussian, Gaussians
 from robocov.mapfile import load_map
 from robocov_app.paper.beyond_plan import IN_CLAIMS, OURS, BeyondPlan
-from robocov_app.paper.contenders import LLOYD, RAPF_DEFAULT, RAPF_SHARED, RPF_SHARED, Contender
+from robocov_app.paper.contenders import LLOYD, RAPF_DEFAULT, RAPF_SHARED, RPF_SHARED, Contender, strongest
 from robocov_app.paper.degradation import AXES, DegradationPlan
 from robocov_app.paper.maps import with_kinds_of_starts
 from robocov_app.paper.plan import Plan, claim_maps, generated_test_map, study_of
@@ -58,6 +58,9 @@ WEIGHED_START = "reception"
 
 HOT_SPOTS = 2
 """Gaussians that are drawn by chance on each map: 20 times as much counts a place in the middle of one."""
+
+UNSEEN = "unseen"
+"""Name of the study of our own controller on maps that played no part in its development."""
 
 BAD = 2
 """Values of each axis of what goes wrong that the quick study takes: the ideal one, and the middle one."""
@@ -115,6 +118,28 @@ def rival_studies(
             seeds = beyond.seeds_of(part[0].controller)
             found[name] = study_of(plan, maps, part, beyond.starts, seeds), part
     return found
+
+
+def unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
+    """Return generated maps that played no part in the development of our own controller."""
+    return tuple(StudyMap(f"generated-{seed}", generated_test_map(seed)) for seed in of(plan).unseen)
+
+
+def unseen_study(
+    plan: Plan, papers: Sequence[Contender] = UNTUNED
+) -> tuple[Study, tuple[Contender, ...]] | None:
+    """Return the study of our own controller on such maps with who takes part; None where there is none.
+
+    Parameters
+    ----------
+    plan : Plan
+    papers : sequence of Contender
+        The paper's controllers with their gains; the strongest take part.
+    """
+    if not (of(plan).unseen and ours()):
+        return None
+    laws = (*ours()[:1], *strongest(papers))
+    return study_of(plan, unseen_maps(plan), laws, of(plan).starts, of(plan).seeds), laws
 
 
 def small_maps(plan: Plan) -> tuple[StudyMap, ...]:
@@ -217,9 +242,18 @@ def small_studies(plan: Plan) -> dict[str, Study]:
     }
 
 
-def all_studies(plan: Plan, tuned: Mapping[str, Contender] = NOT_TUNED) -> dict[str, Study]:
-    """Return all studies beyond the paper but that of the rivals' gains, by name."""
-    return {**{name: study for name, (study, _) in rival_studies(plan, tuned).items()}, **small_studies(plan)}
+def all_studies(
+    plan: Plan, tuned: Mapping[str, Contender] = NOT_TUNED, papers: Sequence[Contender] = UNTUNED
+) -> dict[str, Study]:
+    """Return all studies beyond the paper but that of the rivals' gains, by name.
+
+    Parameters are those of `rivals` and `unseen_study`.
+    """
+    found = {name: study for name, (study, _) in rival_studies(plan, tuned).items()}
+    unseen = unseen_study(plan, papers)
+    if unseen is not None:
+        found[UNSEEN] = unseen[0]
+    return {**found, **small_studies(plan)}
 
 
 def probes(plan: Plan) -> Iterator[Study]:

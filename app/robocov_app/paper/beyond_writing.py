@@ -14,7 +14,16 @@ from robocov_app.paper.beyond_plots import WORDS, beyond_figures
 from robocov_app.paper.beyond_studies import GROUPS, conditions_plan, of, ours
 from robocov_app.paper.evidence import Evidence, evidence, evidence_rows
 from robocov_app.paper.extensions import extension_claims
-from robocov_app.paper.goals import EXTENSIONS, GOALS, QUESTIONS, RIVALS, Goal, goals, rival_claims
+from robocov_app.paper.goals import (
+    EXTENSIONS,
+    GOALS,
+    QUESTIONS,
+    RIVALS,
+    Goal,
+    goals,
+    rival_claims,
+    unseen_claim,
+)
 from robocov_app.paper.pages import BEYOND_PAGE, PAGE, Image, rendered, save_drawn, style_sheet
 from robocov_app.paper.plan import FULL
 from robocov_app.paper.rival_gains import GRIDS, gains_words
@@ -64,11 +73,21 @@ def beyond_goals(material: BeyondMaterial) -> list[Goal]:
 def beyond_claims(material: BeyondMaterial) -> tuple[Claim, ...]:
     """Return all claims beyond the paper with what the runs say of them."""
     mine = ours()
+    unseen = beyond_unseen(material)
     return (
         *(goal.claim for goal in beyond_goals(material)),
+        *(() if unseen is None else (unseen,)),
         *(rival_claims(material.outcomes, mine[0], material.contenders) if mine else ()),
         *extension_claims(material),
     )
+
+
+def beyond_unseen(material: BeyondMaterial) -> Claim | None:
+    """Return what ours reached on maps that played no part in its development, if it ran there."""
+    mine = ours()
+    if not mine or material.unseen is None:
+        return None
+    return unseen_claim(material.unseen, mine[0], material.contenders)
 
 
 def save_beyond_pictures(folder: Path, material: BeyondMaterial, *, quiet: bool) -> dict[str, Image]:
@@ -116,6 +135,7 @@ def beyond_page(images: Mapping[str, Image], material: BeyondMaterial) -> str:
         "goals": beyond_goals(material),
         "goal_words": goal_words(beyond_goals(material)),
         "ours": ours()[0].label if ours() else "",
+        "unseen": beyond_unseen(material),
         "questions": QUESTIONS,
         "goal_claims": _of(claims, GOALS),
         "rival_claims": _of(claims, RIVALS),
@@ -255,6 +275,12 @@ def _protocol(material: BeyondMaterial) -> list[tuple[str, str]]:
         "rivals": beyond.seeds,
         **{law.label: beyond.seeds_of(law.controller) for law in ours() if law.controller in OURS},
     }
+    unseen = (
+        f" {ours()[0].label}, RAPF and LA also on generated maps with seeds {told.span(beyond.unseen)}, on "
+        "which nothing was looked at before."
+        if beyond.unseen and ours()
+        else ""
+    )
     conditions = conditions_plan(plan).always.items()
     listed = ", ".join(
         f"{name.replace('_', ' ')} {value:g} {UNITS[name]}".rstrip() for name, value in conditions
@@ -272,7 +298,7 @@ def _protocol(material: BeyondMaterial) -> list[tuple[str, str]]:
             "Runs",
             f"Starts {', '.join(beyond.starts)}; seeds of the starts: "
             f"{'; '.join(f'{name} {told.span(values)}' for name, values in seeds.items())}; the paper's "
-            f"controllers {told.span(plan.seeds)}. Pairs are runs of both from the same places.",
+            f"controllers {told.span(plan.seeds)}. Pairs are runs of both from the same places.{unseen}",
         ),
         (
             "Information",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -62,6 +62,13 @@ LABELS = {each.key: each.label for each in (RAPF_SHARED, RPF_SHARED, LLOYD, RAPF
 def best(controller: str, gains: Mapping[str, Value]) -> Contender:
     """Return RAPF or RPF with the gains that were best on the maps of the tuning."""
     return Contender(f"{controller}-best", LABELS[f"{controller}-best"], controller, dict(gains))
+
+
+def strongest(contenders: Sequence[Contender]) -> list[Contender]:
+    """Return RAPF at its best gains, or where those are not known with its default ones, and LA."""
+    by_key = {each.key: each for each in contenders}
+    rapf = by_key.get("rapf-best") or by_key.get("rapf-default")
+    return [each for each in (rapf, by_key.get("lloyd")) if each is not None]
 
 
 def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:

@@ -285,6 +285,15 @@ class TestPage:
         assert goal_words(beyond_writing.beyond_goals(material)) in plain
         assert goal_words([]) == "Nothing was measured."
 
+    def test_it_says_what_ours_reached_on_maps_that_played_no_part(self, content, material):
+        assert {scenario.map for scenario in material.unseen.scenarios} == {"generated-201"}
+        assert np.isfinite(material.unseen.of("atlas", "gap")).all()
+        heading = "On maps that played no part in its development"
+        assert heading in content and "generated maps with seeds 201, on which nothing" in content
+        without = replace(material, unseen=None)
+        assert heading not in beyond_page({}, without)
+        assert "goal-unseen" not in written(without)
+
     def test_it_says_where_the_gains_of_rivals_come_from(self, content, material):
         plain = content.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
         for name, grid in material.gains.items():

@@ -7,7 +7,9 @@ from robocov.controllers import CONTROLLERS
 from robocov_app.paper import beyond_studies
 from robocov_app.paper.accounts import _KNOWN, account_of
 from robocov_app.paper.beyond_plan import IN_CLAIMS, OURS
-from robocov_app.paper.plan import FULL, QUICK, claim_maps, claims_study
+from robocov_app.paper.contenders import best
+from robocov_app.paper.plan import FULL, QUICK, claim_maps, claims_study, tuning_maps
+from robocov_app.paper.verdicts import LEAST_MAPS
 from robocov_app.sweep.task import tasks_of
 
 
@@ -38,6 +40,21 @@ def test_in_full_ours_is_run_as_often_as_rapf_and_rivals_on_every_map():
     for name, (study, laws) in beyond_studies.rival_studies(FULL).items():
         seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
         assert len(study) == 33 * 3 * seeds * len(laws)
+
+
+def test_maps_that_nobody_looked_at_are_none_of_the_others():
+    unseen = {each.name: each.environment for each in beyond_studies.unseen_maps(FULL)}
+    known = [*claim_maps(FULL), *tuning_maps(FULL), *beyond_studies.small_maps(FULL)]
+    known += beyond_studies.rival_maps(FULL)
+    assert len(unseen) >= LEAST_MAPS
+    assert not set(unseen) & {each.name for each in known}
+    assert not set(unseen.values()) & {each.environment for each in known}
+    study, laws = beyond_studies.unseen_study(FULL)
+    assert [law.key for law in laws] == [OURS[0], "rapf-default", "lloyd"]
+    assert len(study) == len(unseen) * 3 * len(laws)
+    _, tuned = beyond_studies.unseen_study(FULL, [*beyond_studies.UNTUNED, best("rapf", {"k_rep": 0.1})])
+    assert [law.key for law in tuned] == [OURS[0], "rapf-best", "lloyd"]
+    assert beyond_studies.unseen_study(QUICK) is None
 
 
 def test_the_quick_part_is_small():

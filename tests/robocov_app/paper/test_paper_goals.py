@@ -10,7 +10,15 @@ from robocov_app.paper.beyond_plan import HUGE, LARGE
 from robocov_app.paper.beyond_studies import TARGETS, TEAMS, UNTUNED, contender
 from robocov_app.paper.degradation import Degradation
 from robocov_app.paper.extensions import conditions_claim, density_claim, targets_claim, teams_claim
-from robocov_app.paper.goals import GOALS, RIVALS, goals, rival_claims, worst_median, worst_ratio
+from robocov_app.paper.goals import (
+    GOALS,
+    RIVALS,
+    goals,
+    rival_claims,
+    unseen_claim,
+    worst_median,
+    worst_ratio,
+)
 from robocov_app.paper.outcomes import Outcomes, Scenario
 from robocov_app.paper.steps import StepTimes
 from robocov_app.statistics import Interval
@@ -81,6 +89,36 @@ def test_steps_are_judged_by_their_own_goals():
     assert found["step"].words == "missed: 12 instead of at most 10"
     assert found["real-time"].words == "missed: 1.5 instead of at most 1"
     assert "step" not in asked(outcomes(), {})
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({}, "holds"),
+        ({"ours": 1.02}, "holds partly"),
+        ({"contacts": 1.0}, "holds partly"),
+        ({"settled": np.nan}, "holds partly"),
+        ({"rapf": 1.0}, "holds partly"),
+        ({"ours": 1.2, "contacts": 1.0, "settled": np.nan}, "does not hold"),
+    ],
+)
+def test_on_maps_that_nobody_looked_at_it_is_judged_once_more(changes, verdict):
+    claim = unseen_claim(outcomes(**changes), OURS, (RAPF, LLOYD, OURS))
+    assert (claim.key, claim.part, claim.runs, claim.maps) == ("goal-unseen", GOALS, 12, 6)
+    assert [criterion.text for criterion in claim.criteria] == [
+        "median of J/J_ref - 1",
+        "runs with a contact",
+        "runs that come to rest",
+        f"median of J({OURS.label}) / J({RAPF.label}) at the end",
+        f"median of J({OURS.label}) / J({LLOYD.label}) at the end",
+    ]
+    assert claim.verdict == verdict
+
+
+def test_where_it_has_not_run_nothing_is_claimed():
+    there = outcomes()
+    nowhere = there.among(np.zeros(len(there.scenarios), dtype=bool))
+    assert unseen_claim(nowhere, OURS, (RAPF, LLOYD, OURS)) is None
 
 
 def test_on_one_bad_map_the_goal_for_every_map_is_missed():
