@@ -80,11 +80,15 @@ class Raster:
 
     def cells(self, points: Array) -> tuple[IntArray, IntArray]:
         """Return row and column of the cells that hold (..., 2) points, the nearest for points beside."""
-        x, y = self.origin
-        rows, columns = self.shape
-        column = np.floor((points[..., 0] - x) * (1.0 / self.cell)).astype(np.intp)
-        row = np.floor((points[..., 1] - y) * (1.0 / self.cell)).astype(np.intp)
-        return row.clip(0, rows - 1), column.clip(0, columns - 1)
+        return self.rows(points[..., 1]), self.columns(points[..., 0])
+
+    def rows(self, y: Array) -> IntArray:
+        """Return the rows of cells at some heights, m, the nearest for those beside."""
+        return _numbers(y, self.origin[1], self.cell, self.shape[0])
+
+    def columns(self, x: Array) -> IntArray:
+        """Return the columns of cells, m, as `rows`."""
+        return _numbers(x, self.origin[0], self.cell, self.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,15 +137,17 @@ class DiscoveredMap:
         # beyond the region there is nothing to know
         longest = min(float(distances.max()), raster.region.diameter)
         along = (np.arange(math.ceil(longest / (_STRIDE * cell))) + 0.5) * (_STRIDE * cell)
-        ray, step = np.nonzero(along < distances[:, None] - _STRIDE * cell)
-        passed = position + along[step][:, None] * heading[ray]
-        row, column = raster.cells(passed)
+        free = along < distances[:, None] - _STRIDE * cell
+        # places on all rays as far as the longest goes: quicker than on each as far as it does
+        x, y = ((position[k] + along * heading[:, k, None])[free] for k in (0, 1))
+        row, column = raster.rows(y), raster.columns(x)
         place = row * columns + column
         was = flat[place]
         flat[place[was == UNKNOWN]] = FREE
         doubtful = (was == PRESUMED).nonzero()[0]
         if len(doubtful):
-            off = np.abs(passed[doubtful] - raster.middles(row[doubtful], column[doubtful])).max(axis=1)
+            middle = raster.middles(row[doubtful], column[doubtful])
+            off = np.maximum(np.abs(x[doubtful] - middle[:, 0]), np.abs(y[doubtful] - middle[:, 1]))
             flat[place[doubtful[off < _CORE * cell]]] = FREE
 
         ends = position + (distances + _INTO * cell)[:, None] * heading
@@ -198,6 +204,12 @@ def grown(blocked: BoolArray, reach: float) -> BoolArray:
             if 0 < up * up + right * right <= reach * reach:
                 result |= padded[margin + up : margin + up + rows, margin + right : margin + right + columns]
     return result
+
+
+def _numbers(at: Array, origin: float, cell: float, count: int) -> IntArray:
+    number = np.floor((at - origin) * (1.0 / cell)).astype(np.intp)
+    # as clip does, which looks up the limits of the type each time
+    return np.asarray(np.minimum(np.maximum(number, 0), count - 1))
 
 
 def _fixed(state: NDArray[np.uint8]) -> NDArray[np.uint8]:

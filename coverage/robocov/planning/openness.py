@@ -111,8 +111,10 @@ def _beside(cells: BoolArray) -> NDArray[np.uint8]:
 def _sums(cells: NDArray[Any], side: int) -> Array:
     """Return the sum over each block."""
     rows, columns = cells.shape
-    blocks = cells.reshape(rows // side, side, columns // side, side)
-    return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64))
+    # rows are added as a whole first, which is much quicker than block by block
+    strips = cells.reshape(rows // side, side, columns).sum(axis=1, dtype=np.int32)
+    blocks = strips.reshape(rows // side, columns // side, side)
+    return np.asarray(blocks.sum(axis=2).astype(np.float64))
 
 
 def _pairs(cells: BoolArray, side: int) -> Array:

@@ -24,6 +24,8 @@ from robocov.planning.medians import improved, moved
 from robocov.planning.openness import BLOCKS, openness
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from robocov.density import Density
     from robocov.planning.discovered import DiscoveredMap
     from robocov.planning.wayfinding import Ways, Window
@@ -296,22 +298,27 @@ def own_place(
     limit = 1.5 * float(away[cell].max(initial=0.0)) + 4.0 * ways.spacing
     known: dict[int, float] = {begin: float((worth * np.minimum(near, away)).sum())}
 
-    def cost(node: int) -> float:
-        if node not in known:
-            known[node] = float((worth * np.minimum(near, ways.near(node, limit)[target])).sum())
-        return known[node]
+    tables: dict[int, Array] = {}
+
+    def look_at(nodes: list[int]) -> None:
+        fresh = [k for k in nodes if k not in tables]
+        for k, table in zip(fresh, ways.near(fresh, limit), strict=True):
+            tables[k] = table[target]
+            known.setdefault(k, float((worth * np.minimum(near, tables[k])).sum()))
 
     node = begin
     for _ in range(steps):
         beside = [k for k in _beside(ways, node) if k >= 0]
-        best = min(beside, key=cost, default=node)
-        if not cost(best) < known[node]:
+        look_at(beside)
+        best = min(beside, key=known.__getitem__, default=node)
+        if not known[best] < known[node]:
             break
         node = best
     mine = np.zeros(len(weights))
-    away = ways.near(node, limit)[target]
+    look_at([node, *(k for k in _beside(ways, node) if k >= 0)])
+    away = tables[node]
     mine[target] = np.where(away < near, np.minimum(away, limit), 0.0)
-    goal, fall = _refined(ways, node, cost, former)
+    goal, fall = _refined(ways, node, known, former)
     if np.isfinite(former).all() and fall < rest * float((worth * mine[target]).sum()):
         goal = former.copy()
     return OwnPlace(goal, node, mine, known[node])
@@ -329,9 +336,8 @@ def _beside(ways: Ways, node: int) -> list[int]:
     return found
 
 
-def _refined(ways: Ways, node: int, cost: object, former: Array) -> tuple[Array, float]:
+def _refined(ways: Ways, node: int, cost: Mapping[int, float], former: Array) -> tuple[Array, float]:
     """Return the minimum of the parabolas round a node, and how far the former goal is above it."""
-    assert callable(cost)
     right, up, left, down = _beside(ways, node)
     goal = ways.nodes[node].copy()
     fall = 0.0
@@ -341,8 +347,8 @@ def _refined(ways: Ways, node: int, cost: object, former: Array) -> tuple[Array,
             fall = np.inf
         if ahead < 0 or behind < 0:
             continue
-        slope = 0.5 * (cost(ahead) - cost(behind))
-        bend = cost(ahead) + cost(behind) - 2.0 * cost(node)
+        slope = 0.5 * (cost[ahead] - cost[behind])
+        bend = cost[ahead] + cost[behind] - 2.0 * cost[node]
         if not bend > 0.0:
             continue
         shift = float(np.clip(-slope / bend, -0.5, 0.5))

@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.planning.discovered import grown
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from robocov.planning.discovered import Raster
 
 Cell = TypeVar("Cell", bound=np.generic)
@@ -148,7 +150,8 @@ class Ways:
         """Return row and column, in the window, of the cells of (..., 2) points, the nearest for others."""
         row, column = self.raster.cells(points)
         high, wide = self.blocked.shape
-        return (row - self.window.row).clip(0, high - 1), (column - self.window.column).clip(0, wide - 1)
+        row, column = row - self.window.row, column - self.window.column
+        return np.minimum(np.maximum(row, 0), high - 1), np.minimum(np.maximum(column, 0), wide - 1)
 
     def distances(self, node: int) -> Array:
         """Return the distances from a node to all nodes, (m,) m, infinite where there is no way."""
@@ -156,11 +159,14 @@ class Ways:
             self._known[node] = self.table(np.array([node]))[0]
         return self._known[node]
 
-    def near(self, node: int, limit: float) -> Array:
-        """Return the same, infinite beyond a limit in metres; it is quicker the lower this is."""
-        if node in self._known:
-            return self._known[node]
-        return np.asarray(dijkstra(self._graph, directed=True, indices=np.array([node]), limit=limit)[0])
+    def near(self, nodes: Sequence[int], limit: float) -> list[Array]:
+        """Return the same for some nodes, infinite beyond a limit, m; it is quicker the lower this is."""
+        asked = [node for node in nodes if node not in self._known]
+        found = dict(self._known)
+        if asked:
+            tables = dijkstra(self._graph, directed=True, indices=np.array(asked), limit=limit)
+            found.update(zip(asked, tables, strict=True))
+        return [found[node] for node in nodes]
 
     def table(self, nodes: IntArray) -> Array:
         """Return the distances from some nodes to all, (k, m) m."""
@@ -217,7 +223,7 @@ class Ways:
         along = ends - place
         length = np.sqrt((along**2).sum(axis=1))
         steps = math.ceil(float(length.max(initial=0.0)) / (_FINE * self.raster.cell)) + 1
-        part = np.linspace(0.0, 1.0, steps + 1)
+        part = _parts(steps)
         met = cells[self.cells(place + along[:, None, :] * part[:, None])]
         if skip > 0.0:
             met &= length[:, None] * part > skip
@@ -272,6 +278,11 @@ class Ways:
         return np.array(kept)
 
 
+@lru_cache(maxsize=1024)
+def _parts(steps: int) -> Array:
+    return frozen(np.linspace(0.0, 1.0, steps + 1))
+
+
 @lru_cache(maxsize=256)
 def _edges(rows: int, columns: int) -> tuple[IntArray, IntArray, Array, IntArray]:
     """Return the ends, lengths in strides and moves of all edges of an empty lattice."""
@@ -306,8 +317,10 @@ def _joined(window: Window, blocked: BoolArray, tight: BoolArray, spacing: float
     end, other, length, move = _edges(window.rows, window.columns)
     half, stride = window.stride // 2, window.stride
     roomy = ~tight[half::stride, half::stride].ravel()
-    way = _unmet(window, tight)[move, end]
-    last = _unmet(window, blocked)[move, end] & ~way
+    both = tight.astype(np.uint8) | np.where(blocked, np.uint8(2), np.uint8(0))
+    met = _met(window, both)[move, end]
+    way = met & 1 == 0
+    last = (met & 2 == 0) & ~way
     onto, back = last & roomy[end] & ~roomy[other], last & roomy[other] & ~roomy[end]
     begins = np.concatenate([end[way], other[way], end[onto], other[back]])
     ends = np.concatenate([other[way], end[way], other[onto], end[back]])
@@ -316,15 +329,15 @@ def _joined(window: Window, blocked: BoolArray, tight: BoolArray, spacing: float
     return csr_array((lengths, (begins, ends)), shape=(size, size))
 
 
-def _unmet(window: Window, cells: BoolArray) -> BoolArray:
-    """Return for each move which nodes it leads from without meeting some cells, (moves, m)."""
+def _met(window: Window, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return for each move from each node what it meets, (moves, m): the bits of all cells on its line."""
     stride, half = window.stride, window.stride // 2
     margin = 2 * stride
-    padded = np.pad(cells, margin, constant_values=True)
+    padded = np.pad(cells, margin, constant_values=255)
     high, wide = window.rows * stride, window.columns * stride
-    met = np.zeros((len(_MOVES), window.rows, window.columns), dtype=bool)
+    met = np.zeros((len(_MOVES), window.rows, window.columns), dtype=np.uint8)
     for k, line in enumerate(_crossed(stride)):
         for down, right in line:
             row, column = margin + half + down, margin + half + right
             met[k] |= padded[row : row + high - half : stride, column : column + wide - half : stride]
-    return np.asarray(~met.reshape(len(_MOVES), -1))
+    return met.reshape(len(_MOVES), -1)

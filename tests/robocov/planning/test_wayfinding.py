@@ -74,7 +74,7 @@ def test_distances_are_those_of_a_plain_search(seed: int) -> None:
     found = some.distances(begin)
     assert set(np.flatnonzero(np.isfinite(found)).tolist()) == set(best)
     np.testing.assert_allclose([found[k] for k in best], list(best.values()), rtol=1e-9)
-    limited = some.near(int(np.flatnonzero(some.roomy)[-1]), 1.0)
+    (limited,) = some.near([int(np.flatnonzero(some.roomy)[-1])], 1.0)
     assert (limited[np.isfinite(limited)] <= 1.0).all()
 
 
