@@ -14,15 +14,15 @@ from robocov_app.paper.claims import compared
 from robocov_app.paper.degradation_plots import plot_degradations
 from robocov_app.paper.evidence import evidence_rows
 from robocov_app.paper.figures import DOTS, WIDE, panels
-from robocov_app.plots.arena import draw_run, run_handles
+from robocov_app.plots.arena import draw_run, label_of, run_handles
 from robocov_app.plots.curves import CurveStyle, curve_styles
 from robocov_app.plots.heights import plot_heights
 from robocov_app.plots.page import SMALL, TITLE, plain_style
 from robocov_app.plots.results import Pairs, Sample, plot_final_costs, plot_paired
+from robocov_app.view.legends import united
 from robocov_app.view.theme import Theme, theme_named
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
     from robocov.arrays import Array
@@ -38,7 +38,8 @@ WORDS = {
     "and the text after it denies. The path from the optimum near the ground to the centroid.",
     "beyond-targets": "RAPF's final cost with another target by that with the centroid, pair by pair.",
     "beyond-density": "Two runs from the same places, where the shading says how much each place counts: "
-    "RAPF that knows it, and RAPF that does not. Crosses are the weighted centroids of the cells.",
+    "RAPF that knows it, and RAPF that does not. Crosses are where they head: the centroids of the cells, "
+    "weighed and not.",
     "beyond-teams": "The mean time until the first robot is at a place, of robots that are not equally fast: "
     "with cells by time, by that with cells by distance, pair by pair.",
     "beyond-conditions": "The final cost where messages get lost or are late, where robots hear less far, "
@@ -153,12 +154,9 @@ def density_figure(weighed: Weighed, theme: Theme) -> Figure:
     shown, costs = weighed.pictures, weighed.costs
     environment = shown[0].record.environment
     records = [replace(each.record, environment=environment) for each in shown]
-    handles: dict[str, Artist] = {}
     with plain_style():
-        for record in records:
-            for handle in run_handles(record, theme, "paper"):
-                handles.setdefault(str(handle.get_label()), handle)
-        page, places = panels(environment, 2, WIDE, list(handles.values()), theme, above=30.0)
+        handles = united((run_handles(record, theme, "paper") for record in records), label_of)
+        page, places = panels(environment, 2, WIDE, handles, theme, above=30.0)
         titles = ("(a)  knows φ", "(b)  ignores φ")
         for title, record, cost, axes in zip(titles, records, costs, places, strict=True):
             draw_run(axes, record, theme, "paper")
@@ -171,7 +169,8 @@ def density_figure(weighed: Weighed, theme: Theme) -> Figure:
 
 
 def _paired(pairs: Sequence[Pairs], label: str, theme: Theme) -> Callable[[], Figure]:
-    return lambda: plot_paired(pairs, theme=theme, size=(WIDE, None), scale=DOTS, label=label)
+    styles = [style_of(each.controller) for each in pairs]
+    return lambda: plot_paired(pairs, theme=theme, size=(WIDE, None), scale=DOTS, label=label, styles=styles)
 
 
 def _root(values: Array) -> Array:

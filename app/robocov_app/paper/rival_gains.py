@@ -123,7 +123,7 @@ def gains_words(controller: str, grid: GainOutcomes) -> str:
     own = next((k for k, gains in enumerate(grid.gains) if dict(gains) == usual), None)
     head = f"Gains: {values}"
     if own == best:
-        head += ", which are its defaults"
+        head += ", as by default"
     sets, maps = len(grid.gains), len(set(grid.maps))
     told = f"{head}: of {sets} sets the best on {maps} maps of the tuning, mean J/J_ref {_mean(grid, best)}"
     if own is not None and own != best:

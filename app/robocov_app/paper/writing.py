@@ -268,12 +268,12 @@ def told_counts(claims: Sequence[Claim]) -> str:
     """Return in words how many claims hold, hold partly, do not hold, or are undecided."""
     words = [claim.verdict for claim in claims]
     parts = [
-        f"{words.count(word)} {text}"
-        for word, text in (
-            ("holds", "hold"),
-            ("holds partly", "hold partly"),
-            ("does not hold", "do not hold"),
-            ("undecided", "are undecided"),
+        f"{words.count(word)} {one if words.count(word) == 1 else more}"
+        for word, (one, more) in (
+            ("holds", ("holds", "hold")),
+            ("holds partly", ("holds partly", "hold partly")),
+            ("does not hold", ("does not hold", "do not hold")),
+            ("undecided", ("is undecided", "are undecided")),
         )
         if word in words
     ]

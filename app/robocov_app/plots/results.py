@@ -259,6 +259,7 @@ def plot_paired(
     *,
     scale: float | None = None,
     label: str = "ratio of final mean distances",
+    styles: Sequence[CurveStyle] | None = None,
 ) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis.
 
@@ -270,6 +271,8 @@ def plot_paired(
         As for `plot_final_costs`.
     label : str
         What the values are.
+    styles : sequence of CurveStyle or None
+        For each row; by default those of their controllers.
 
     Returns
     -------
@@ -291,8 +294,9 @@ def plot_paired(
         if axes is None:
             axes, names = rows_page(total, names, theme, size, title, scale)
         known = curve_styles(each.controller for each in pairs)
-        for each, place in zip(pairs, places, strict=True):
-            colour = tone(known[each.controller].colour(theme))
+        looks = [known[each.controller] for each in pairs] if styles is None else styles
+        for each, look, place in zip(pairs, looks, places, strict=True):
+            colour = tone(look.colour(theme))
             draw_points(axes, np.sort(each.ratios), place, colour, theme)
             ratio = each.paired.ratio
             if np.isfinite(ratio.low):

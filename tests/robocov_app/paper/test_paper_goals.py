@@ -21,6 +21,8 @@ from robocov_app.paper.goals import (
 )
 from robocov_app.paper.outcomes import Outcomes, Scenario
 from robocov_app.paper.steps import StepTimes
+from robocov_app.paper.verdicts import Claim, Criterion
+from robocov_app.paper.writing import told_counts
 from robocov_app.statistics import Interval
 
 MAPS = ("a", "b", "c", "d", "e", "f")
@@ -213,3 +215,18 @@ def test_messages_are_borne_or_not():
     assert conditions_claim(found(1.2, 1.5), 6).verdict == "does not hold"
     assert "1.5, with delay 1" in conditions_claim(found(1.2, 1.5), 6).explanation
     assert conditions_claim([], 6).verdict == "undecided"
+
+
+def test_how_many_claims_hold_is_told_in_words():
+    def claims(*verdicts):
+        inside, outside, open_ = Interval(0.5, 0.4, 0.6), Interval(2.0, 1.9, 2.1), Interval(1.0, 0.9, 1.1)
+        kinds = {"holds": inside, "not": outside, "open": open_}
+        return [
+            Claim(str(k), GOALS, "", (Criterion("", kinds[word], high=1.0),), 9, 9, "", "", 1)
+            for k, word in enumerate(verdicts)
+        ]
+
+    assert told_counts(claims("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
+    assert told_counts(claims("holds", "not", "open", "open")) == (
+        "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
+    )

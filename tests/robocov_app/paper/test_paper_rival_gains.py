@@ -96,6 +96,6 @@ def test_it_is_told_what_tuning_was_worth():
     )
     usual = gains_words("range-limited", outcomes((1.2, 1.2, 1.2), (1.8, 2.4, np.nan)))
     assert usual.startswith(
-        f"Gains: interaction_range {DEFAULTS['interaction_range']:g}, which are its defaults: of 2 sets "
+        f"Gains: interaction_range {DEFAULTS['interaction_range']:g}, as by default: of 2 sets "
     )
     assert usual.endswith("with the worst set 2.1, median ratio 0.583.")

@@ -137,6 +137,14 @@ def test_pairs_have_their_interval_and_one_is_marked() -> None:
     assert axes.get_xscale() == "log"
 
 
+def test_pairs_may_have_other_colours() -> None:
+    style = curve_styles(["mine"])["mine"]
+    own, other = (plot_paired(PAIRS, styles=styles).axes[0] for styles in (None, [style]))
+    for axes, colour in ((own, LIGHT.controllers["rapf"]), (other, style.colour(LIGHT))):
+        (points,) = (line for line in axes.lines if line.get_marker() == "o")
+        assert points.get_color() == tone(colour)
+
+
 def test_a_single_pair_has_no_interval() -> None:
     alone = Pairs("RAPF / RPF", "rapf", np.array([0.5]), paired([1.0], [2.0]))
     axes = plot_paired([alone]).axes[0]
