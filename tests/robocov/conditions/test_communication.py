@@ -215,7 +215,7 @@ def test_what_was_heard_matters(kind: type) -> None:
     neighbours = Neighbours.within(places, np.full(3, 20.0))
     heard = places[neighbours.pairs()[1]]
     nearer = heard.copy()
-    nearer[0] = [4.3, 4.0]
+    nearer[0] = [3.77, 4.0]
     controller, team = made(kind), Team.homogeneous(3)
     forces = [
         controller.decide(seen_by(kind, places, neighbours, told, 1), controller.begin(SQUARE, team)).forces
