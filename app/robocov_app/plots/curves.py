@@ -77,9 +77,16 @@ def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
 
 
 def end_label(curve: Curve, unit: str = "m") -> str:
-    """Return what stands at a curve's end: its name and its last finite value."""
+    """Return what stands at a curve's end: its name and its last finite value.
+
+    Lengths have millimetres, as in captions; what is measured in other units, and is large, four digits.
+    """
     label, _, _, values = curve
-    return f"{label}  {values[np.isfinite(values)][-1]:.3f} {unit}".rstrip()
+    last = float(values[np.isfinite(values)][-1])
+    number = f"{last:.3f}"
+    if unit != "m" and abs(last) >= 10.0:
+        number = f"{last:.4g}" if abs(last) < 1e4 else f"{last:,.0f}"
+    return f"{label}  {number} {unit}".rstrip()
 
 
 def draw_curves(

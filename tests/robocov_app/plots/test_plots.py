@@ -22,7 +22,7 @@ from matplotlib.text import Text
 from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.voronoi import partition
-from robocov_app.plots.curves import spread
+from robocov_app.plots.curves import end_label, spread
 from robocov_app.plots.page import tone
 from robocov_app.plots.runs import (
     plot_comparison,
@@ -377,3 +377,18 @@ def test_names_are_words_whatever_is_in_them(name, tmp_path):
     assert any(name in text.get_text() for text in figure.texts)
     assert not any(text.get_parse_math() for text in figure.texts)
     save_figure(plot_cost([(name, "mine", record.time, record.time)]), tmp_path / "b.svg")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (12.3456, "m", "RAPF  12.346 m"),
+        (3.14159, "s", "RAPF  3.142 s"),
+        (252.845, "J", "RAPF  252.8 J"),
+        (73.946, "%", "RAPF  73.95 %"),
+        (12345.6, "J", "RAPF  12,346 J"),
+        (2.0, "", "RAPF  2.000"),
+    ],
+)
+def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
+    assert end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words
