@@ -17,7 +17,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment.starts import DiscStart, PointsStart, Start
-from robocov.environment.swept import LEAST, in_the_way, swept_area
+from robocov.environment.swept import in_the_way, swept_area
 from robocov.errors import MapError, StartError, counted, listed
 from robocov.files.strictjson import one_line
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
@@ -218,19 +218,18 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
     """Warn of obstacles that move through what stands, or through the outer wall."""
     sound = [item for item in sketch.obstacles if item.key not in faulty and not item.geometry.is_empty]
     standing = {item.key: item.geometry for item in sound if item.shape.path is None}
+    inside = None if BOUNDARY in faulty else Polygon(sketch.boundary)
     for item in sound:
         if item.shape.path is None:
             continue
         area = swept_area(item.shape.polygon, item.shape.path)
-        met = in_the_way(area, standing)
-        names, places = [called(sketch, key) for key in met], [standing[key] for key in met]
-        if BOUNDARY not in faulty:
-            outside = area.difference(Polygon(sketch.boundary))
-            if outside.area > LEAST:
-                names, places = [*names, "the boundary"], [*places, outside]
+        met, beyond = in_the_way(area, standing, inside)
+        names, places = [called(sketch, key) for key in met], list(met.values())
+        if beyond is not None:
+            names, places = [*names, "the boundary"], [*places, beyond]
         if names:
             words = f"{called(sketch, item.key)} moves through {listed(names)}"
-            yield Problem(words, area.intersection(shapely.union_all(places)), item.key, False)
+            yield Problem(words, shapely.union_all(places), item.key, False)
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:

@@ -149,12 +149,14 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     drawn = draw_robots(axes, last[there], record.team.radius[there], fills, theme, (there + 1).tolist())
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
-        aims = cells.centroid if _heads_for_centroids(record) else record.goals[-1][working]
+        aims = record.goals[-1][working]
+        plus = are_centroids(aims, cells.centroid)
+        aims = cells.centroid if plus else aims
         places = _in_points(axes, aims)
         away = np.hypot(*(places - _in_points(axes, last[working])).T)
         apart = mark_size(places[np.isfinite(away)], 3.2, _AIM)
         # where a robot has arrived, only the ends of the cross would stick out from under its disc
-        axes.plot(*aims[away > radius].T, zorder=6, **_aim_style(record, theme, apart))
+        axes.plot(*aims[away > radius].T, zorder=6, **_aim_style(plus, theme, apart))
 
 
 def draw_robots(
@@ -226,10 +228,6 @@ def has_goals(record: Record) -> bool:
     return bool(np.isfinite(record.goals[-1]).any())
 
 
-def _heads_for_centroids(record: Record) -> bool:
-    return are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
-
-
 def _start_style(theme: Theme, size: float) -> dict[str, Any]:
     return {
         "linestyle": "none",
@@ -241,9 +239,8 @@ def _start_style(theme: Theme, size: float) -> dict[str, Any]:
     }
 
 
-def _aim_style(record: Record, theme: Theme, size: float) -> dict[str, Any]:
-    """Return a plus for centroids, and a times sign for goals of another kind."""
-    plus = _heads_for_centroids(record)
+def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
+    """Return a plus for centroids, or a times sign for goals of another kind."""
     return {
         "linestyle": "none",
         "label": CENTROID if plus else GOAL,
@@ -311,12 +308,16 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
 
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
+    aims: list[Artist] = []
+    if has_goals(record):
+        plus = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
+        aims = [Line2D([], [], **_aim_style(plus, theme, _AIM))]
     return [
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
         *([robot_handle("failed robot", wreck_colour(theme), theme)] if _failed(record).any() else []),
-        *([Line2D([], [], **_aim_style(record, theme, _AIM))] if has_goals(record) else []),
+        *aims,
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],
     ]

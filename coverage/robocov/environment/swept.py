@@ -42,13 +42,29 @@ def swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
     return shapely.union_all([polygon, *(_along(polygon, a, b) for a, b in pairwise(shifts))])
 
 
-def in_the_way(area: BaseGeometry, others: Mapping[Key, BaseGeometry]) -> tuple[Key, ...]:
-    """Return which of the others lie in an area, by more than they touch it."""
-    names, shapes = list(others), np.array(list(others.values()), dtype=object)
-    if not names:
-        return ()
-    shared = shapely.area(shapely.intersection(shapes, area))
-    return tuple(name for name, part in zip(names, shared.tolist(), strict=True) if part > LEAST)
+def in_the_way(
+    area: BaseGeometry, others: Mapping[Key, BaseGeometry], inside: BaseGeometry | None = None
+) -> tuple[dict[Key, BaseGeometry], BaseGeometry | None]:
+    """Return what of an area the others take, by more than they touch it, and what of it is not inside.
+
+    Parameters
+    ----------
+    area : geometry, m
+    others : dict of name to geometry, m
+    inside : geometry or None, m
+        Of the boundary; None for no boundary.
+
+    Returns
+    -------
+    dict of name to geometry, geometry or None
+        Of those alone that are in the way.
+    """
+    shared = {name: area.intersection(shape) for name, shape in others.items()}
+    beyond = None if inside is None else area.difference(inside)
+    return (
+        {name: part for name, part in shared.items() if part.area > LEAST},
+        beyond if beyond is not None and beyond.area > LEAST else None,
+    )
 
 
 def _along(polygon: Polygon, begin: Array, end: Array) -> BaseGeometry:

@@ -12,7 +12,7 @@ import shapely
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.environment.starts import GAP, DiscStart, PointsStart
-from robocov.environment.swept import LEAST, in_the_way, swept_area
+from robocov.environment.swept import in_the_way, swept_area
 from robocov.errors import StartError, listed
 from robocov.files.strictjson import place
 from robocov.robots import DEFAULT_RADIUS
@@ -185,11 +185,11 @@ def _path_warnings(environment: Environment) -> Iterator[str]:
         if obstacle.path is None:
             continue
         area = swept_area(obstacle.polygon, obstacle.path)
-        met = [_called(other, environment.obstacles[other].name) for other in in_the_way(area, standing)]
-        if area.difference(environment.boundary_polygon).area > LEAST:
-            met.append("the boundary")
-        if met:
-            yield f"{_called(k, obstacle.name)} moves through {listed(met)}"
+        met, beyond = in_the_way(area, standing, environment.boundary_polygon)
+        names = [_called(other, environment.obstacles[other].name) for other in met]
+        names += ["the boundary"] if beyond is not None else []
+        if names:
+            yield f"{_called(k, obstacle.name)} moves through {listed(names)}"
 
 
 def _called(k: int, name: str | None) -> str:

@@ -49,5 +49,14 @@ def test_what_is_only_touched_is_not_in_the_way() -> None:
         "beside": shapely.box(1, 0.5, 2, 1),
         "off": shapely.box(8, 8, 9, 9),
     }
-    assert in_the_way(area, others) == ("before",)
-    assert in_the_way(area, {}) == ()
+    met, beyond = in_the_way(area, others)
+    assert list(met) == ["before"] and beyond is None
+    assert met["before"].equals(others["before"])
+    assert in_the_way(area, {}) == ({}, None)
+
+
+def test_what_leaves_the_boundary_is_told() -> None:
+    area = swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
+    _, beyond = in_the_way(area, {}, shapely.box(-1, -1, 4, 1))
+    assert beyond is not None and beyond.bounds == pytest.approx((4.0, -0.5, 4.5, 0.5), abs=1e-2)
+    assert in_the_way(area, {}, shapely.box(-1, -1, 5, 1)) == ({}, None)
