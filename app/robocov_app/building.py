@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
+    from robocov.geodesic import Geodesics
 
 PICTURE_LATTICE = 256
 """Coarsest lattice for maps of distances: its cells are to be narrower than walls."""
@@ -25,7 +26,9 @@ PATIENCE = 1.0
 """Seconds without a word."""
 
 
-def built_cost(environment: Environment, lattice: int, *, quiet: bool = False) -> CoverageCost:
+def built_cost(
+    environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
+) -> CoverageCost:
     """Return the coverage cost of a map; how far it is gets told when that takes more than a second.
 
     Parameters
@@ -34,6 +37,8 @@ def built_cost(environment: Environment, lattice: int, *, quiet: bool = False) -
     lattice : int
     quiet : bool
         Tell nothing.
+    geodesics : Geodesics or None
+        The shortest paths of this map, where they are known.
 
     Raises
     ------
@@ -51,7 +56,9 @@ def built_cost(environment: Environment, lattice: int, *, quiet: bool = False) -
             if update is not None:
                 update(round(100 * done))
 
-        cost = CoverageCost(environment, lattice, progress=tell, cache=ArrayCache.of_user())
+        cost = CoverageCost(
+            environment, lattice, progress=tell, cache=ArrayCache.of_user(), geodesics=geodesics
+        )
         if update is not None:
             update(100)
     return cost
@@ -61,4 +68,6 @@ def cost_for_pictures(
     environment: Environment, cost: CoverageCost, least: int = PICTURE_LATTICE
 ) -> CoverageCost:
     """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one."""
-    return cost if cost.lattice >= least else built_cost(environment, least, quiet=True)
+    if cost.lattice >= least:
+        return cost
+    return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)

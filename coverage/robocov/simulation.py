@@ -26,7 +26,7 @@ from robocov.record import Record
 from robocov.record.recorder import Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
-from robocov.world import SINK, World
+from robocov.world import MAX_PENETRATION, World
 from robocov.world.changing_world import ChangingWorld
 from robocov.world.relocation import check_starts
 from robocov.world.solid import movers, solid_pieces
@@ -108,7 +108,7 @@ class Simulation:
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
         # who moves may lean on something, and sink in a little
-        slack = 1e-6 if velocities is None else 2.0 * SINK
+        slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
         there = None if conditions is None else conditions.working(time, len(positions))
         check_starts(environment.at(time), positions, self.team, slack, there)
         self.environment = environment

@@ -51,3 +51,7 @@ def test_pictures_want_a_fine_lattice():
     assert cost_for_pictures(ROOMS, coarse).lattice == building.PICTURE_LATTICE
     assert cost_for_pictures(ROOMS, coarse, 20).lattice == 20
     assert cost_for_pictures(ROOMS, fine) is fine
+    # the shortest paths do not depend on the lattice, and on large maps they take long
+    finer = cost_for_pictures(ROOMS, coarse, 20)
+    assert finer.geodesics is coarse.geodesics
+    assert finer(PLACE).value == built_cost(ROOMS, 20)(PLACE).value

@@ -190,6 +190,8 @@ class CoverageCost:
         done. It may raise, to give up.
     cache : ArrayCache
         Where the part of it that takes long is looked for, and kept.
+    geodesics : Geodesics
+        The shortest paths of this very environment, where another lattice on it has found them already.
 
     Attributes
     ----------
@@ -228,6 +230,7 @@ class CoverageCost:
         *,
         progress: Callable[[float], None] | None = None,
         cache: ArrayCache | None = None,
+        geodesics: Geodesics | None = None,
     ) -> None:
         whole = isinstance(lattice, (int, np.integer)) and not isinstance(lattice, bool)
         if not whole or not 1 <= lattice <= MAX_LATTICE:
@@ -236,7 +239,8 @@ class CoverageCost:
             )
         self.lattice = int(lattice)
         self.environment = environment
-        self.geodesics = Geodesics(environment, None if progress is None else partial(progress, 0.0))
+        beat = None if progress is None else partial(progress, 0.0)
+        self.geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
         self._areas = np.array([part.area for part in environment.free.geoms])
         self._masses = environment.free_masses
         self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from robocov.world.bodies import LONGEST_SUBSTEP, SINK, World
+from robocov.world.bodies import LONGEST_SUBSTEP, MAX_PENETRATION, World
 
-__all__ = ["LONGEST_SUBSTEP", "SINK", "World"]
+__all__ = ["LONGEST_SUBSTEP", "MAX_PENETRATION", "World"]

@@ -7,8 +7,8 @@ A step depends on positions and velocities alone. pymunk keeps more than that be
 contact impulses, a pending push out of an overlap, the shape of its search tree), all of which
 matters only in contact. So a step is first made as if nothing touched; if pymunk reports a contact
 it is made again from the same state with the contact memory emptied, in substeps fine enough that
-no robot sinks into a wall by more than `SINK`. That is what makes a copy of a running world go on
-identically, bit for bit.
+no robot sinks into anything by more than `MAX_PENETRATION`. That is what makes a copy of a running
+world go on identically, bit for bit.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 LONGEST_SUBSTEP = 0.02
 """Longest substep in seconds."""
 
-SINK = 1e-3
-"""How far in metres a robot may travel in one substep while it touches something."""
+MAX_PENETRATION = 1e-3
+"""Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
 
 _MOST_SUBSTEPS = 64
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
@@ -66,9 +66,12 @@ class World:
         self.team = team
         self._pieces, self._wrecks = pieces, wrecks
         self._space = pymunk.Space()
-        self._space.iterations = 20
+        # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
+        self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
         self._space.collision_slop = 1e-4
-        self._space.collision_bias = 1e-9  # the part of an overlap that is left after one second
+        # the part of an overlap that is left after a second: none after a substep; only what a moving
+        # obstacle has run over is deep, and comes out of it gradually
+        self._space.collision_bias = 1e-9 if movers else 0.0
         self._touched = False
         for ring in pieces:
             wall = pymunk.Poly(self._space.static_body, ring.tolist())
@@ -209,7 +212,7 @@ class World:
     def _substep_in_contact(self, dt: float, limit: Array) -> None:
         self._write_state()
         self._forget_contacts()
-        travel = min(SINK, 0.1 * self._smallest)
+        travel = min(MAX_PENETRATION, 0.1 * self._smallest)
         fastest = max(self._fastest, float(limit.max()))
         if self._moving is not None:
             self._moving.back()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import Environment
 from robocov.robots import Team
-from robocov.world import World
+from robocov.world import MAX_PENETRATION, World
 from robocov.world.solid import solid_pieces
 
 DT = 1 / 60
@@ -61,7 +63,7 @@ def test_limits_hold_under_any_forces(cluttered: Environment, seed: int, size: f
         speed = np.hypot(*team.velocities.T)
         assert speed.max() <= 1.0 + 1e-12
         before = team.velocities
-    assert clearance(cluttered, team.positions) > 0.1 - 2e-3
+    assert clearance(cluttered, team.positions) > 0.1 - MAX_PENETRATION
     assert before is team.velocities
 
 
@@ -83,15 +85,34 @@ def test_no_robot_enters_a_wall_however_it_is_driven(cluttered: Environment, dt:
         force = np.tile([1000 * np.cos(angle), 1000 * np.sin(angle)], (8, 1))
         for _ in range(int(6 / dt)):
             team.step(force, dt)
-            assert clearance(cluttered, team.positions) > 0.1 - 2.5e-3
+            assert clearance(cluttered, team.positions) > 0.1 - MAX_PENETRATION
 
 
-def test_robots_do_not_overlap(empty: Environment) -> None:
-    team = world(empty, 20, 1, max_acceleration=20.0)
-    for _ in range(400):
-        team.step(50.0 * (np.array([5.0, 5.0]) - team.positions), DT)
-        apart = np.hypot(*(team.positions[:, None] - team.positions[None]).transpose(2, 0, 1))
-        assert apart[~np.eye(20, dtype=bool)].min() > 0.2 - 4e-3
+@pytest.mark.parametrize(
+    ("ratio", "speed", "radii"),
+    [(1, 2, (0.1,)), (100, 2, (0.05, 0.1)), (1000, 20, (0.1, 0.15)), (10, 5, (0.1,)), (1, 20, (0.3, 0.5))],
+)
+def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
+    empty: Environment, ratio: float, speed: float, radii: tuple[float, ...]
+) -> None:
+    """Robots of any mass driven into the middle and into a corner, where light ones are between."""
+    n = 16
+    everyone = Team.homogeneous(n, max_speed=speed, max_acceleration=20.0 * speed)
+    mass = np.geomspace(1.0, ratio, n)
+    radius = np.resize(radii, n)
+    team = replace(everyone, mass=mass, radius=radius)
+    places = empty.start("uniform").sample(n, 1, radius=float(radius.max()))
+    for target in ([5.0, 5.0], [-2.0, -1.0]):
+        crowd = World(solid_pieces(empty), team, places)
+        for _ in range(int(600 / speed)):
+            crowd.step(50.0 * speed * mass[:, None] * (np.array(target) - crowd.positions), DT)
+            apart = np.hypot(*(crowd.positions[:, None] - crowd.positions[None]).transpose(2, 0, 1))
+            overlap = radius[:, None] + radius - apart - 10.0 * np.eye(n)
+            assert overlap.max() <= MAX_PENETRATION
+            room = shapely.distance(empty.free.boundary, shapely.points(crowd.positions))
+            assert shapely.contains_xy(empty.free, crowd.positions).all()
+            assert (radius - room).max() <= MAX_PENETRATION
+    assert overlap.max() > 0.0
 
 
 def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
