@@ -98,10 +98,8 @@ class Team:
             object.__setattr__(self, field.name, values)
         light, heavy = float(self.mass.min(initial=np.inf)), float(self.mass.max(initial=0.0))
         if heavy > MAX_MASS_RATIO * light:
-            raise ParameterError(
-                f"team.mass: {light:g} to {heavy:g} kg, but robots at most {MAX_MASS_RATIO:g} times as heavy as "
-                f"the lightest were wanted"
-            )
+            most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
+            raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
 
     @classmethod
     def homogeneous(
