@@ -99,9 +99,10 @@ def _guarded(name: str, rest: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except OSError as error:
-        if error.filename is not None:
-            raise
-        return _complain(f"the answer cannot be written: {error.strerror or error}")
+        reason = error.strerror or error
+        if error.filename is None:
+            return _complain(f"the answer cannot be written: {reason}")
+        return _complain(f"{os.fsdecode(error.filename)}: cannot be used: {reason}")
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
     except Exception:

@@ -97,7 +97,7 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
 
 
 def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
-    """Write which folders belong to the comparison, so that also one that is killed can be replaced."""
+    """Write which folders belong to the comparison, so that also one that is killed can be read."""
     write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
 
 

@@ -347,7 +347,8 @@ def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: boo
         *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
         *(("-g", f"{round(2 * fps)}") if streamed else ()),
         *("-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"),
-        str(path),
+        # neither an option nor an address, whatever it looks like
+        f"file:{path.absolute()}",
     ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError, shown
+from robocov.files.result_folder import settle
 from robocov.metrics.results import read_history
 from robocov.record import Record
 
@@ -60,7 +61,8 @@ def load_saved(path: Path) -> list[Saved]:
     InputError
         When there is none, or something of it cannot be read; the message names the file.
     """
-    folder = path.parent if path.name in ("run.json", "comparison.json") and path.is_file() else path
+    folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
+    settle(folder)
     if (folder / "comparison.json").is_file():
         saved = [_load_run(part) for part in _parts(folder)]
         maps = [roster_of(each.record).environment for each in saved]
@@ -116,10 +118,13 @@ def _parts(folder: Path) -> list[Path]:
     if not isinstance(content, dict) or content.get("format") != "robocov-comparison":
         raise InputError(f"{path}: not the file of a comparison")
     if not isinstance(names, list) or not all(
-        isinstance(name, str) and name and Path(name).name == name for name in names
+        isinstance(name, str) and name and Path(name).name == name != ".." for name in names
     ):
         raise InputError(f"{path}: folders: {shown(names)}, but names of folders were wanted")
     parts = [folder / name for name in names]
+    linked = next((part for part in parts if part.is_symlink()), None)
+    if linked is not None:
+        raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
     if not content.get("runs"):
         parts = [part for part in parts if (part / "run.json").is_file()]
     if not parts:

@@ -149,7 +149,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --radius 0", "team.radius: 0.0 m"),
         ("run rooms --radius nan", "team.radius: nan m"),
         ("run square --lattice 2 --robots 1 --radius 0.2 --start nowhere", "unknown start 'nowhere'"),
-        ("cost rooms --positions x.json --sites .", "--sites: '.', but the name of a file was wanted"),
+        ("cost rooms --positions x.json --sites .", ".: is a folder, but a file was wanted"),
         ("run rooms --radius 4", "no room for a robot of radius 4 m"),
         ("run rooms --lattice 1", "--lattice: 1"),
         ("run rooms --size big", "--size: 'big', but WIDTHxHEIGHT"),

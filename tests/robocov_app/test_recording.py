@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import re
 import stat
@@ -18,6 +19,7 @@ from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
+from robocov_app.demo.film import Film
 from robocov_app.recording import (
     frame_rows,
     iter_frames,
@@ -133,10 +135,10 @@ class TestSaveFrames:
         assert told == [(1, 3), (2, 3), (3, 3)]
 
     def test_a_full_disk_is_named_and_leaves_whole_frames_only(self, tmp_path, monkeypatch):
-        write = Path.write_bytes
+        write, calls = Path.write_bytes, itertools.count()
 
         def full(self, data):
-            if "000002" in self.name:
+            if next(calls) == 2:
                 write(self, data[:10])
                 raise OSError(errno.ENOSPC, "No space left on device")
             return write(self, data)
@@ -189,6 +191,16 @@ class TestSaveFilm:
         for name in ("a.mp4", "b.mp4"):
             save_film(tmp_path / name, iter_frames(record, size=(320, 180), fps=10))
         assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+    @pytest.mark.parametrize("name", ["-dash", "pipe:1", "tcp:x", "a%d b'c"])
+    def test_a_name_is_neither_an_option_nor_an_address(self, tmp_path, monkeypatch, name):
+        monkeypatch.chdir(tmp_path)
+        save_film(Path(name) / "run.mp4", plain(3))
+        assert len(read(tmp_path / name / "run.mp4")[0]) == 3
+        film = Film(Path(f"{name}.mp4"), (64, 48), patient=True)
+        film.add(pygame.Surface((64, 48)), 0.1)
+        film.close()
+        assert len(read(tmp_path / f"{name}.mp4")[0]) == 3
 
     def test_no_frames(self, tmp_path):
         with pytest.raises(ParameterError, match="frames"):

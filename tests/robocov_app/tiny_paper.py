@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from robocov.errors import OutputError
+from robocov.files.lock import locked
 from robocov_app.interruption import Interruption
 from robocov_app.paper.beyond_plan import BeyondPlan
 from robocov_app.paper.plan import Plan
 from robocov_app.paper.studying import Means
-from robocov_app.sweep.lock import locked
 
 TINY = Plan(
     name="quick",

@@ -34,6 +34,7 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
     from robocov.controllers import make_controller
+    from robocov.files.result_folder import results
     from robocov.mapfile import load_map
     from robocov_app.building import built_cost
     from robocov_app.compare import (
@@ -45,7 +46,7 @@ def command(options: Arguments) -> int:
         save_comparison_moving,
     )
     from robocov_app.interruption import Interruption
-    from robocov_app.output import cleared, finite, listed, prepared, results
+    from robocov_app.output import finite, listed
     from robocov_app.run import (
         check_layers,
         conditions_of,
@@ -70,22 +71,28 @@ def command(options: Arguments) -> int:
     conditions_of(options)
     starts_of(environment, options)
     check_layers(options)
-    target = options.out or Path(f"{Path(options.map).stem}-comparison")
+    out = options.out or Path(f"{Path(options.map).stem}-comparison")
     cost = built_cost(environment, options.lattice, quiet=options.json)
     runs: dict[str, Run] = {}
-    with results(target, overwrite=options.overwrite) as out, Interruption() as stop:
-        for name, chosen, folder in zip(names, gains, folder_names(names), strict=True):
+    parts = folder_names(names)
+    with (
+        results(out, "comparison", overwrite=options.overwrite, parts=parts) as result,
+        Interruption() as stop,
+    ):
+        begin_comparison(result.new, parts)
+        for name, chosen, part in zip(names, gains, parts, strict=True):
             record = simulated(environment, name, chosen, options, stop)
-            if not runs:
-                begin_comparison(cleared(out), folder_names(names))
-            record.save(cleared(prepared(out / folder, overwrite=options.overwrite)))
+            record.save(result.new / part)
+            result.keep()  # what took long is safe, whatever happens to the evaluation
             run = evaluated(record, cost, stop, quiet=options.json)
-            save_numbers(run, out / folder, options.lattice)
-            runs[folder] = run
+            save_numbers(run, result.new / part, options.lattice)
+            result.keep()
+            runs[part] = run
             if stop.requested:
                 break
-        save_comparison(runs, cost, out, options)
-        save_comparison_moving(runs, cost, out, options, stop)
+        save_comparison(runs, cost, result.new, options)
+        result.keep()
+        save_comparison_moving(runs, cost, result.new, options, stop)
     if options.json:
         print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, "runs": rows_of(runs)})))
     else:

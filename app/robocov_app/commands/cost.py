@@ -12,7 +12,7 @@ import tyro
 
 from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, shown
-from robocov.files.atomic import written
+from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov_app.building import built_cost, cost_for_pictures
 from robocov_app.output import finite
@@ -53,8 +53,8 @@ def command(options: Arguments) -> None:
     """Evaluate and print."""
     if not 2 <= options.lattice <= 2048:
         raise ParameterError(f"--lattice: {options.lattice}, but a whole number from 2 to 2048 was wanted")
-    if options.sites is not None and (options.sites.is_dir() or not options.sites.name):
-        raise InputError(f"--sites: {str(options.sites)!r}, but the name of a file was wanted")
+    if options.sites is not None:
+        writable(options.sites)
     if options.plot is not None:
         from robocov_app.plots.runs import check_figure_path
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -165,16 +166,18 @@ def session_of(options: Arguments) -> Session:
 
 def rendered(opening: Opening, options: Arguments) -> int:
     """Render frames of the window without a display."""
+    from robocov.files.result_folder import results
     from robocov_app.demo.film import pixels
     from robocov_app.demo.opening import HEADLESS_FPS
     from robocov_app.interruption import Interruption
-    from robocov_app.output import prepared
     from robocov_app.progress import progress
     from robocov_app.recording import kept_frames, save_film, save_frames
 
-    if options.out is not None:
-        prepared(options.out, overwrite=False)
-    with opening.window() as window, Interruption() as stop:
+    with ExitStack() as stack:
+        out = None
+        if options.out is not None:
+            out = stack.enter_context(results(options.out, overwrite=False)).new
+        window, stop = stack.enter_context(opening.window()), stack.enter_context(Interruption())
         if options.tour:
             window.do("tour")
         count = options.frames
@@ -192,11 +195,11 @@ def rendered(opening: Opening, options: Arguments) -> int:
                     update(done + 1)
 
             if options.video is not None:
-                shown = frames() if options.out is None else kept_frames(options.out, frames())
+                shown = frames() if out is None else kept_frames(out, frames())
                 save_film(options.video, shown, fps=HEADLESS_FPS)
             else:
-                assert options.out is not None
-                save_frames(options.out, frames())
+                assert out is not None
+                save_frames(out, frames())
     for target in (options.out, options.video):
         if target is not None:
             print(f"saved {target}")

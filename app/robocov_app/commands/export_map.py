@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError
+from robocov.files.atomic import writable
 from robocov.files.strictjson import one_line
 from robocov.mapfile import load_map
 from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
@@ -63,7 +64,7 @@ def command(options: Arguments) -> None:
     chosen = exporter(options.out, options.format)
     how = WriteOptions(**{field.name: getattr(options, field.name) for field in fields(WriteOptions)})
     for file in chosen.files(options.out, how):
-        if file.exists() and Path(options.map).exists() and file.samefile(options.map):
+        if writable(file).exists() and Path(options.map).exists() and file.samefile(options.map):
             raise InputError(f"{file}: the map that is read; another -o was wanted")
         if file.exists() and not options.overwrite:
             raise InputError(f"{file}: exists already; another -o, or --overwrite, was wanted")

@@ -13,6 +13,7 @@ import tyro
 
 from robocov.environment import Environment
 from robocov.errors import InputError, MapError, OutputError, ParameterError, counted
+from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.options import in_range
@@ -148,13 +149,13 @@ def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
             raise InputError(
                 f"--out: {str(out)!r}, but the name of a file was wanted (--count makes a folder)"
             )
-        if out.exists() and not overwrite:
+        if writable(out).exists() and not overwrite:
             raise InputError(f"{out}: exists already; another --out, or --overwrite, was wanted")
 
 
 def _check_ours(path: Path) -> None:
     """Make sure that no file but a map is replaced in a folder."""
-    if path.exists():
+    if writable(path).exists():
         try:
             load_map(path)
         except MapError:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError
+from robocov.files.atomic import writable
 from robocov.files.strictjson import one_line
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
@@ -138,7 +139,7 @@ def command(options: Arguments) -> None:
 
 def _require_fresh(path: Path, options: Arguments, other: str) -> None:
     """Check that `path` may be written: never the file that is read, and no other one unasked."""
-    if not path.exists():
+    if not writable(path).exists():
         return
     if options.file.exists() and path.samefile(options.file):
         raise InputError(f"{path}: the file that is read; {other} was wanted")

@@ -44,6 +44,7 @@ class Arguments:
 
 def command(options: Arguments) -> None:
     """Measure, write and print."""
+    from robocov.files.result_folder import extended
     from robocov_app.output import write_csv
     from robocov_app.saved import load_saved
 
@@ -54,11 +55,16 @@ def command(options: Arguments) -> None:
     from robocov.metrics.run_metrics import COLUMNS
 
     measured, answers = [], []
-    for saved in load_saved(options.folder):
-        run = measure(saved, options)
-        write_csv(saved.folder / "metrics.csv", ",".join(COLUMNS.values()), run.metrics.rows())
-        measured.append(run)
-        answers.append(answer_of(saved, run))
+    runs = load_saved(options.folder)
+    folder = options.folder if options.folder.is_dir() else options.folder.parent
+    with extended(folder) as result:
+        for saved in runs:
+            run = measure(saved, options)
+            target = result.new / saved.folder.relative_to(folder)
+            target.mkdir(exist_ok=True)
+            write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), run.metrics.rows())
+            measured.append(run)
+            answers.append(answer_of(saved, run))
     if options.plot is not None:
         from robocov_app.plots.figure_files import save_figure
         from robocov_app.plots.metrics import plot_metrics

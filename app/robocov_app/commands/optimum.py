@@ -14,7 +14,7 @@ import tyro
 
 from robocov.errors import InputError, ParameterError
 from robocov.files.array_cache import ArrayCache
-from robocov.files.atomic import written
+from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
@@ -135,8 +135,7 @@ def _check(options: Arguments) -> None:
     if options.seed < 0:
         raise ParameterError(f"--seed: {options.seed}, but a whole number of at least 0 was wanted")
     if options.positions is not None:
-        if options.positions.is_dir() or not options.positions.name:
-            raise InputError(f"--positions: {str(options.positions)!r}, but the name of a file was wanted")
+        writable(options.positions)
         if options.positions.exists() and not options.overwrite:
             raise InputError(f"{options.positions}: exists already; another name, or --overwrite, was wanted")
     if options.plot is not None:

@@ -143,15 +143,17 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
 
 def filmed(options: Arguments, saved: list[Saved]) -> int:
     """Make frames and a film of saved runs."""
+    from robocov.files.result_folder import results
     from robocov_app.interruption import Interruption
-    from robocov_app.output import cleared, listed, results, write_json
+    from robocov_app.output import listed, write_json
 
-    assert options.out is not None
-    _spare(options.out, options.run, saved)
-    with results(options.out, overwrite=options.overwrite) as out, Interruption() as stop:
+    out = options.out
+    assert out is not None
+    _spare(out, options.run, saved)
+    with results(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
         content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
-        write_json(cleared(out) / "replay.json", content)
-        _save_moving(options.film(), saved, out, stop)
+        write_json(result.new / "replay.json", content)
+        _save_moving(options.film(), saved, result.new, stop)
     if options.json:
         print(json.dumps({"out": str(out), "interrupted": stop.requested}))
     else:

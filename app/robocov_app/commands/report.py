@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, OutputError, ParameterError, counted
-from robocov.files.atomic import written
-from robocov_app.output import REPORT, is_report
+from robocov.files.atomic import writable, written
+from robocov.files.result_folder import REPORT, extended, is_report
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Result
@@ -55,8 +55,13 @@ def command(options: Arguments) -> None:
     with progress("runs read", total, quiet=options.json) as tell:
         page = report(results, title=options.title, theme=options.theme, tell=tell)
     data = page.html.encode("utf-8", "replace")
-    with written(target) as part:
-        part.write_bytes(data)
+    if options.out is None and results[0].kind != "sweep":
+        with extended(options.folders[0]) as result, written(result.new / REPORT) as part:
+            result.claim(REPORT)
+            part.write_bytes(data)
+    else:
+        with written(target) as part:
+            part.write_bytes(data)
     if options.json:
         counts = [
             _counts(folder, result, shown)
@@ -64,8 +69,8 @@ def command(options: Arguments) -> None:
         ]
         print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
         return
-    for result in results:
-        print(_told(result))
+    for each in results:
+        print(_told(each))
     print(f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
@@ -77,10 +82,9 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     InputError
         When there is a file that is no report, and it is not to be overwritten.
     OutputError
-        When there is no such folder, or a folder in its place.
+        When there is no such folder, or something else than a file in its place.
     """
-    if target.is_dir():
-        raise OutputError(f"{target}: cannot be written: it is a folder")
+    writable(target)
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):

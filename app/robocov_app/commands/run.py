@@ -32,11 +32,12 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
     from robocov.controllers import make_controller
+    from robocov.files.result_folder import results
     from robocov.mapfile import load_map
     from robocov_app.building import built_cost
     from robocov_app.compare import folder_names
     from robocov_app.interruption import Interruption
-    from robocov_app.output import cleared, finite, listed, results
+    from robocov_app.output import finite, listed
     from robocov_app.run import (
         check_layers,
         conditions_of,
@@ -59,19 +60,22 @@ def command(options: Arguments) -> int:
     check_layers(options)
     cost = built_cost(environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
-    with results(out, overwrite=options.overwrite) as folder, Interruption() as stop:
+    with results(out, overwrite=options.overwrite) as result, Interruption() as stop:
         record = simulated(environment, options.controller, gains, options, stop)
-        record.save(cleared(folder))  # what took long is safe, whatever happens to the evaluation
+        record.save(result.new)
+        result.keep()  # what took long is safe, whatever happens to the evaluation
         run = evaluated(record, cost, stop, quiet=options.json)
-        save_numbers(run, folder, options.lattice)
-        save_pictures(run, cost, folder, options)
-        save_run_moving(run, cost, folder, options, stop)
+        save_numbers(run, result.new, options.lattice)
+        result.keep()
+        save_pictures(run, cost, result.new, options)
+        result.keep()
+        save_run_moving(run, cost, result.new, options, stop)
     if options.json:
-        print(json.dumps(finite({"out": str(folder), "interrupted": stop.requested, **run.summary})))
+        print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, **run.summary})))
     else:
         print_summary(run)
         stopped = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stop.requested else "saved in"
-        print(f"{stopped} {folder}/: {listed(folder)}")
+        print(f"{stopped} {out}/: {listed(out)}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -55,6 +55,7 @@ class Film:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             command = film_command(path, self._size, FPS, streamed=True)
+            path.open("xb").close()  # a new file, and through no link
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,

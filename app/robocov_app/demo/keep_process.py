@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from robocov.errors import RobocovError
+from robocov.files.result_folder import ResultFolder, results
 from robocov_app.building import built_cost
 from robocov_app.compare import begin_comparison, folder_names, save_comparison
 from robocov_app.demo.kept import Job, Kept, Moments, NotKept, Retracing, records_of, remarks_on
@@ -18,7 +19,6 @@ from robocov_app.interruption import Interruption
 from robocov_app.live.messages import receive, send
 from robocov_app.live.own_process import own_streams
 from robocov_app.options import RunOptions
-from robocov_app.output import prepared
 from robocov_app.run import evaluated, save_numbers, save_pictures
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ def kept(source: BinaryIO) -> Kept | NotKept | None:
         records = heard(job, source)
         if records is None:
             return None
-        (_save_run if len(records) == 1 else _save_comparison)(records, folder, job.lattice)
+        with results(folder, overwrite=False) as result:
+            (_save_run if len(records) == 1 else _save_comparison)(records, result, job.lattice)
         remarks = dict.fromkeys(remark for record in records for remark in remarks_on(record))
         return Kept(tuple(remarks))
     except RobocovError as error:
@@ -74,31 +75,33 @@ def heard(job: Job, source: BinaryIO) -> list[Record] | None:
     return records_of(job, retracings)
 
 
-def _save_run(records: list[Record], folder: Path, lattice: int) -> None:
+def _save_run(records: list[Record], result: ResultFolder, lattice: int) -> None:
     """Write what ``robocov run`` writes."""
     (record,) = records
-    run, cost = _numbers(record, folder, lattice)
-    save_pictures(run, cost, folder, RunOptions(lattice=lattice, json=True))
+    run, cost = _numbers(record, result, "", lattice)
+    save_pictures(run, cost, result.new, RunOptions(lattice=lattice, json=True))
 
 
-def _save_comparison(records: list[Record], folder: Path, lattice: int) -> None:
+def _save_comparison(records: list[Record], result: ResultFolder, lattice: int) -> None:
     """Write what ``robocov compare`` writes."""
     names = folder_names([record.controller for record in records])
-    begin_comparison(folder, names)
+    begin_comparison(result.new, names)
     runs: dict[str, Run] = {}
     costs: list[CoverageCost] = []
     for name, record in zip(names, records, strict=True):
-        runs[name], cost = _numbers(record, prepared(folder / name, overwrite=False), lattice)
+        runs[name], cost = _numbers(record, result, name, lattice)
         costs.append(cost)
-    save_comparison(runs, costs[0], folder, RunOptions(lattice=lattice, json=True))
+    save_comparison(runs, costs[0], result.new, RunOptions(lattice=lattice, json=True))
 
 
-def _numbers(record: Record, folder: Path, lattice: int) -> tuple[Run, CoverageCost]:
+def _numbers(record: Record, result: ResultFolder, part: str, lattice: int) -> tuple[Run, CoverageCost]:
     """Evaluate a record and write its numbers; the record first, whatever happens to its evaluation."""
-    record.save(folder)
+    record.save(result.new / part)
+    result.keep()
     cost = built_cost(record.environment, lattice, quiet=True)
     run = evaluated(record, cost, Interruption(), quiet=True)
-    save_numbers(run, folder, lattice)
+    save_numbers(run, result.new / part, lattice)
+    result.keep()
     return run, cost
 
 

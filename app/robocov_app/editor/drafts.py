@@ -21,10 +21,10 @@ from typing import Any
 
 from robocov.errors import MapError, OutputError, counted
 from robocov.files.atomic import written
+from robocov.files.lock import locked
 from robocov.files.strictjson import one_line, parse, read_bytes
 from robocov_app.editor.document import Sketch, draft_document, sketch_of, sketch_text
 from robocov_app.editor.files import OnDisk
-from robocov_app.sweep.lock import locked
 
 FOLDER = "ROBOCOV_DRAFTS"
 """Environment variable with another folder for drafts; empty for none."""

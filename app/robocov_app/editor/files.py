@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import stat
-from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from robocov.errors import MapError, OutputError
-from robocov.files.atomic import written
+from robocov.files.atomic import writable, written
 from robocov.files.strictjson import one_line, read_bytes
 from robocov_app.editor.document import Sketch, parse_sketch, sketch_text
 
@@ -78,20 +76,12 @@ def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: boo
     """
     path = path.absolute()
     text = sketch_text(sketch).encode()
-    try:
-        target = path.resolve()
-        if target.is_dir():
-            raise OutputError(f"{one_line(path)}: is a folder, but a file was wanted")
-        if not over:
-            _require_same(path, before)
-        with written(target) as part:
-            part.write_bytes(text)
-            with suppress(OSError):
-                part.chmod(stat.S_IMODE(target.stat().st_mode))
-        return OnDisk(path, _digest(text), _stamp(path) or (-1, 0))
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise OutputError(f"{one_line(path)}: cannot be written: {one_line(reason)}") from None
+    writable(path)
+    if not over:
+        _require_same(path, before)
+    with written(path) as part:
+        part.write_bytes(text)
+    return OnDisk(path, _digest(text), _stamp(path) or (-1, 0))
 
 
 def state_of(before: OnDisk) -> State:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from robocov.errors import OutputError, ParameterError, shown
-from robocov.files.atomic import written
+from robocov.files.atomic import writable, written
 from robocov_app.plots.page import plain_style
 
 if TYPE_CHECKING:
@@ -71,12 +71,12 @@ def check_figure_path(path: Path) -> None:
     Raises
     ------
     OutputError
-        When there is no such folder.
+        When there is no such folder, or something else than a file in its place.
     ParameterError
         When the suffix is neither PNG, SVG nor PDF.
     """
     figure_kind(path)
-    if not path.parent.is_dir():
+    if not writable(path).parent.is_dir():
         raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 

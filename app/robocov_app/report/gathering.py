@@ -13,6 +13,7 @@ import numpy as np
 
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov.errors import InputError, RobocovError, shown
+from robocov.files.result_folder import settle
 from robocov.mapfile import from_json
 from robocov.metrics import mean_over_run
 from robocov.metrics.results import read_history, read_results
@@ -173,6 +174,7 @@ def gathered(folder: Path) -> Result:
         raise InputError(f"{folder}: there is no such folder; that of a run, comparison or sweep was wanted")
     if (folder / "study.json").is_file():
         return _of_sweep(folder)
+    settle(folder)
     if not any((folder / name).is_file() for name in ("comparison.json", "run.json")):
         raise InputError(
             f"{folder}: not the folder of a run, a comparison or a sweep "

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.errors import InputError, OutputError
 from robocov.files.atomic import written
-from robocov_app.sweep.lock import locked
+from robocov.files.lock import locked
 
 if TYPE_CHECKING:
     from robocov_app.sweep.performing import Outcome
@@ -95,8 +95,9 @@ class Ledger:
         """Remove what a sweep that was killed has left half-written."""
         for part in self._runs.glob(".*.part"):
             _remove(part)
-        for part in self.folder.glob(".*.part.*"):
-            part.unlink()
+        for pattern in (".robocov-*.part.*", ".study.*.part.json", ".results.*.part.*"):
+            for part in self.folder.glob(pattern):
+                part.unlink()
 
 
 @contextmanager

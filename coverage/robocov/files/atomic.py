@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import os
+import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from robocov.errors import OutputError
+from robocov.errors import OutputError, shown
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+_LONGEST_SUFFIX = 16
+"""Characters; what is longer is no suffix that a writer goes by."""
 
 
 @contextmanager
@@ -15,24 +28,60 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
     """Give a path beside `target` to write to; rename it to `target` when all went well, else remove it.
 
     The path has the suffix of `target`, so that writers which go by it work. Unless `durable` is
-    switched off, as for one of many frames, the file is on the disk before it gets its name.
+    switched off, as for one of many frames, the file is on the disk before it gets its name. Through a
+    link, the file that it points to is replaced, not the link; its permissions stay.
 
     Raises
     ------
     OutputError
-        When the file cannot be written (no permission, no space, no such folder); the message names `target`.
+        When the file cannot be written (no permission, no space, no such folder), or `target` is something
+        else than a file; the message names `target`.
     """
-    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    real = writable(target)
+    suffix = target.suffix if len(target.suffix) < _LONGEST_SUFFIX else ""
+    part = real.with_name(f".robocov-{secrets.token_hex(6)}.part{suffix}")
     try:
         yield part
         if durable:
             with part.open("rb") as file:
                 os.fsync(file.fileno())
-        part.replace(target)
+        with suppress(FileNotFoundError):
+            part.chmod(stat.S_IMODE(real.stat().st_mode))
+        part.replace(real)
     except OSError as error:
         with suppress(OSError):  # where the folder is none, there is no part to be removed either
             part.unlink()
-        raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise OutputError(f"{_told(target)}: cannot be written: {error.strerror or error}") from error
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def writable(target: Path) -> Path:
+    """Return the file that is replaced where `target` is written: `target`, or what it is a link to.
+
+    Raises
+    ------
+    OutputError
+        When it is there and is no regular file, or a link that leads nowhere, or cannot be looked at.
+    """
+    try:
+        real = target.resolve(strict=True) if target.is_symlink() else target
+        mode = real.stat().st_mode
+    except FileNotFoundError as error:
+        if target.is_symlink():
+            raise OutputError(f"{_told(target)}: is a link to nothing, but a file was wanted") from error
+        return target
+    except (OSError, RuntimeError, ValueError) as error:  # a circle of links was a RuntimeError before 3.13
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise OutputError(f"{_told(target)}: cannot be written: {reason}") from error
+    if not stat.S_ISREG(mode):
+        kind = next((words for test, words in _KINDS if test(mode)), "something else")
+        raise OutputError(f"{_told(target)}: is {kind}, but a file was wanted")
+    return real
+
+
+def _told(target: Path) -> str:
+    """Return a path for people: on one line."""
+    text = str(target)
+    return text if text.isprintable() else shown(text)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
 from robocov.environment.obstacle_path import ObstaclePath
 from robocov.environment.starts import DiscStart, PointsStart, StartSpec, UniformStart
-from robocov.errors import MapError, OutputError, unknown_name
+from robocov.errors import MapError, unknown_name
+from robocov.files.atomic import written
 from robocov.files.strictjson import located, one_line, parse, read_bytes, require_json
 from robocov.mapfile.density import density_document, density_from
 from robocov.mapfile.fields import TINY as _TINY
@@ -208,25 +208,11 @@ def save_map(environment: Environment, path: str | Path) -> None:
     OutputError
         When the file cannot be written; a file that was there before is then untouched.
     """
-    target = Path(path)
     document = _file_document(environment)
     from_json(document, str(path))
     text = dump_document(document).encode()
-    try:
-        # through a link, the file that it points to is replaced, not the link
-        target = target.resolve()
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-        try:
-            with temporary.open("wb") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise OutputError(f"{one_line(path)}: cannot be written: {one_line(reason)}") from None
+    with written(Path(path)) as part:
+        part.write_bytes(text)
 
 
 def bundled_maps() -> dict[str, Path]:

@@ -18,9 +18,10 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS
 from robocov.drawing import displaying_backend, drawing_backend
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, counted, shown
+from robocov.errors import InputError, OutputError, ParameterError, counted, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
+from robocov.files.result_folder import settle
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record.moments import nearest_moments
@@ -315,7 +316,7 @@ class Record:
     def save(
         self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> None:
-        """Write ``record.npz`` and ``run.json`` to `folder`; each appears whole or not at all.
+        """Write ``record.npz`` and ``run.json`` to `folder`, made where missing; each whole or not at all.
 
         Raises
         ------
@@ -324,6 +325,10 @@ class Record:
         """
         folder = Path(folder)
         arrays = {name: getattr(self, name) for name in ARRAYS}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from error
         with written(folder / "record.npz") as part, part.open("wb") as file:
             np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
         with written(folder / "run.json") as part:
@@ -342,6 +347,7 @@ class Record:
         from robocov.mapfile import from_json
 
         folder = Path(folder)
+        settle(folder)
         path = folder / "run.json"
         try:
             run = json.loads(path.read_text(encoding="utf-8"))

@@ -345,6 +345,9 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "m.json"
     link.symlink_to(tmp_path / "there" / "real.json")
+    with pytest.raises(OutputError, match="is a link to nothing"):
+        save_map(from_json(DOCUMENT), link)
+    (tmp_path / "there" / "real.json").touch()
     save_map(from_json(DOCUMENT), link)
     assert link.is_symlink()
     assert load_map(tmp_path / "there" / "real.json") == from_json(DOCUMENT)

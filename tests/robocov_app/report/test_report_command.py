@@ -15,8 +15,8 @@ from called import answer, complaint
 from drawn_run import SQUARE
 from reported_results import saved_comparison, saved_run, walk
 
+from robocov.files.result_folder import is_report, results
 from robocov_app.cli import main
-from robocov_app.output import cleared, is_report
 
 ROOT = Path(__file__).parents[3]
 
@@ -61,12 +61,12 @@ def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
 
 def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run) -> None:
     assert main(["report", str(run)]) == 0
-    cleared(run)
-    assert list(run.iterdir()) == []
     saved_run(run / "again", walk(SQUARE))
     (run / "again" / "report.html").write_text("mine")
-    cleared(run / "again")
-    assert [path.name for path in (run / "again").iterdir()] == ["report.html"]
+    for folder, left in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
+        with results(folder, overwrite=True) as result:
+            (result.new / "run.json").write_text("{}")
+        assert sorted(path.name for path in folder.glob("[!.]*")) == left
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run)
         (["nothing"], "nothing: there is no such folder"),
         (["."], ".: not the folder of a run, a comparison or a sweep"),
         (["one", "--out", "no/page.html"], "no/page.html: cannot be written: there is no folder no"),
-        (["one", "--out", "one"], "one: cannot be written: it is a folder"),
+        (["one", "--out", "one"], "one: is a folder, but a file was wanted"),
         ([], "DIR"),
     ],
 )

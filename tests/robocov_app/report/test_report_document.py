@@ -14,7 +14,7 @@ from drawn_run import HALL, ROOMS
 from reported_results import HOSTILE, Page, entry, result_of, watched
 
 from robocov.errors import ParameterError
-from robocov_app.output import is_report
+from robocov.files.result_folder import is_report
 from robocov_app.report.document import MARKS, report
 from robocov_app.report.replay import asset
 from robocov_app.saved import Saved

@@ -1,0 +1,84 @@
+"""A folder that one process works in at a time."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from robocov.errors import OutputError
+
+
+@contextmanager
+def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterator[None]:
+    """Keep other processes from the same folder; the lock ends with this process, however that ends.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of the file in it that is locked.
+    remove : bool
+        Leave no such file.
+
+    Raises
+    ------
+    OutputError
+        When another process has it, or the folder cannot be written to.
+    """
+    path = folder / name
+    while True:
+        try:
+            # not inherited by processes that are started: their lives are their own
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+        try:
+            if not _taken(descriptor):
+                raise OutputError(
+                    f"{folder}: another process is at work in this folder; wait until it has ended"
+                )
+            if _is_at(descriptor, path):
+                try:
+                    yield
+                finally:
+                    if remove:
+                        with suppress(OSError):
+                            path.unlink()
+                return
+        finally:
+            os.close(descriptor)
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Return whether an open file still has its name, which whoever had the lock before may have removed."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.lstat())
+    except OSError:
+        return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _taken(descriptor: int) -> bool:
+        """Lock the first byte of a file, if nobody has."""
+        with suppress(OSError):
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+            return True
+        return False
+
+else:
+    import fcntl
+
+    def _taken(descriptor: int) -> bool:
+        """Lock a file, if nobody has; where the file system knows no locks, go on without."""
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+        return True

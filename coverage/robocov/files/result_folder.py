@@ -1,0 +1,427 @@
+"""Folders of results: the old result or the new one at any moment, and nothing else touched.
+
+A result is made in a hidden staging folder inside its folder. To commit it, a journal is written that lists
+the files of the new result, and those of the old one that go. From the moment when the journal has its name,
+the new result counts: whoever opens the folder next does what is left to be done (`settle`). In the end the
+journal becomes the manifest, the list of the files that the result consists of. What the manifest does not
+name is somebody else's, and neither replaced nor removed. Links inside the folder are not followed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+from typing import Literal, NamedTuple, TypeAlias
+
+from robocov.errors import InputError, OutputError, shown
+from robocov.files.atomic import written
+from robocov.files.lock import locked
+
+Kind: TypeAlias = Literal["run", "comparison", "replay"]
+
+REPORT = "report.html"
+"""A page about the result, which goes with it."""
+
+_MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
+_STAGING, _LOCK = ".robocov-new", ".robocov.lock"
+
+_HEAD = {"format": "robocov-folder", "version": 1}
+
+_PICTURES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
+
+_FILES: dict[Kind, tuple[str, ...]] = {
+    "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_PICTURES),
+    "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_PICTURES),
+    "replay": ("replay.json", "run.mp4", "comparison.mp4"),
+}
+"""What a result of each kind consists of, beside ``frames/`` and the folders of a comparison's runs."""
+
+_FRAME = re.compile(r"\d{6}\.png")
+
+_HALF = re.compile(r"\.(comparison|cost|metrics|record|replay|report|run|trajectories)\.\d+\.part\.\w+")
+"""Files that earlier versions left half-written when they were killed."""
+
+_BEGINNINGS = {
+    **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
+    "record.npz": re.compile(rb"PK.{28}time\.npy", re.DOTALL),
+    "cost.csv": re.compile(rb"time_s,mean_distance_m,cost_m3,"),
+    "metrics.csv": re.compile(rb"time_s,sensed_area_m2,"),
+    REPORT: re.compile(rb'<meta name="generator" content="robocov'),
+}
+"""By what files of ours are known, in their first `_HEAD_BYTES`."""
+
+_HEAD_BYTES = 4096
+
+
+class ResultFolder:
+    """A folder while its result is being made.
+
+    Attributes
+    ----------
+    path : Path
+    new : Path
+        The hidden folder that the files of the result are written to.
+    """
+
+    def __init__(self, path: Path, owned: set[str], *, replaces: bool, part: str = "") -> None:
+        self.path = path
+        self.new = path / _STAGING / part
+        self._prefix = f"{part}/" if part else ""
+        self._owned = owned
+        self._replaces = replaces
+        with _telling(path):
+            self.new.mkdir(parents=True)
+
+    def claim(self, name: str) -> None:
+        """Count a file that is there as one of the result's, so that it may be replaced."""
+        self._owned.add(self._prefix + name)
+
+    def keep(self) -> None:
+        """Commit what is made so far, unless it is to replace a result: that is done once all is made.
+
+        Raises
+        ------
+        OutputError
+            As `commit`.
+        """
+        if not self._replaces:
+            self.commit()
+
+    def commit(self) -> None:
+        """Put what is made in the place of the earlier result; or beside it, where it replaces none.
+
+        Raises
+        ------
+        OutputError
+            When that cannot be done, or a file of somebody else is in the way.
+        """
+        with _telling(self.path):
+            staging = self.path / _STAGING
+            made = {path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()}
+            if not made:
+                return
+            for name in made:
+                _require_free(self.path, name, self._owned)
+            for folder in {(self.path / name).parent for name in made}:
+                folder.mkdir(parents=True, exist_ok=True)
+                if not os.access(folder, os.W_OK | os.X_OK):
+                    raise OutputError(f"{folder}: cannot be written to: Permission denied")
+            files = made if self._replaces else made | self._owned
+            journal = {**_HEAD, "files": sorted(files), "removed": sorted(self._owned - files)}
+            with written(staging / _JOURNAL) as part:
+                part.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
+            (staging / _JOURNAL).replace(self.path / _JOURNAL)  # from here on the new result counts
+            _carry_out(self.path)
+            self._owned, self._replaces = files, False
+            self.new.mkdir(parents=True)
+
+
+@contextmanager
+def results(
+    folder: Path, kind: Kind = "run", *, overwrite: bool, parts: Iterable[str] = ()
+) -> Iterator[ResultFolder]:
+    """Give a folder for a result, which is committed at the end; where the work fails, it is not.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is missing; if nothing comes into it, it goes again.
+    kind : {"run", "comparison", "replay"}
+    overwrite : bool
+        Replace the result that is there.
+    parts : names
+        Of the folders of a comparison's runs.
+
+    Raises
+    ------
+    InputError
+        When the folder is not empty and `overwrite` is not given, or what is in it is no result.
+    OutputError
+        When it cannot be made or written to, another process is at work in it, or a file of somebody else
+        has the name of a file of the result.
+    """
+    with _telling(folder):
+        existed = folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with _held(folder):
+            with _telling(folder):
+                earlier = _replaceable(folder, overwrite=overwrite)
+                for name in earlier or ():
+                    _inside(folder, name)
+                _require_all_free(folder, kind, earlier or set(), parts)
+            result = ResultFolder(folder, earlier or set(), replaces=earlier is not None)
+            yield result
+            result.commit()
+    finally:
+        if not existed:
+            with suppress(OSError):
+                folder.rmdir()  # fails, as it should, where there is something in it
+
+
+@contextmanager
+def extended(folder: Path) -> Iterator[ResultFolder]:
+    """Give the folder of a result, or of one run of a comparison, to which files are added.
+
+    Raises
+    ------
+    InputError
+        When there is no result in it.
+    OutputError
+        As `results`.
+    """
+    home, part = _home(folder)
+    with _held(home):
+        with _telling(home):
+            owned = _owned(home)
+        if owned is None:
+            raise InputError(f"{folder}: there is no result of robocov in it")
+        result = ResultFolder(home, owned, replaces=False, part=part)
+        yield result
+        result.commit()
+
+
+def settle(folder: Path) -> None:
+    """Complete the commit of a result that was interrupted; to be called before the result is read.
+
+    Raises
+    ------
+    InputError
+        When it cannot be known what is left to be done.
+    OutputError
+        When it cannot be done, as another process is at work in the folder or nobody may write to it.
+    """
+    if os.path.lexists(folder / _JOURNAL):
+        with locked(folder, _LOCK, remove=True), _telling(folder):
+            _carry_out(folder)
+    home, part = _home(folder, _JOURNAL)
+    if part:
+        raise InputError(f"{folder}: its replacement was interrupted; open {home} to have it completed")
+
+
+def is_report(path: Path) -> bool:
+    """Return whether a file is a page that ``robocov report`` has written."""
+    return _is_ours(path, REPORT)
+
+
+class _Listing(NamedTuple):
+    """What a manifest or a journal names: the files of the result, and those of an earlier one that go."""
+
+    files: set[str]
+    removed: set[str]
+
+
+def _listing(path: Path) -> _Listing | None:
+    """Return the content of a manifest or a journal, None where there is none."""
+    if not os.path.lexists(path):
+        return None
+    try:
+        if path.is_symlink():
+            raise ValueError("it is a link, but a file was wanted")
+        content = json.loads(path.read_bytes())
+        if {key: content[key] for key in _HEAD} != _HEAD:
+            raise ValueError(f"{shown(content['format'])}, version {shown(content['version'])}")
+        for name in (*content["files"], *content.get("removed", ())):
+            if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in name.split("/")):
+                raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
+        return _Listing(set(content["files"]), set(content.get("removed", ())))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be used: {error}") from error
+
+
+def _carry_out(folder: Path) -> None:
+    """Do what a journal says, or the rest of it; then it is the manifest."""
+    journal = _listing(folder / _JOURNAL)
+    if journal is None:
+        return
+    _synchronise(folder)
+    for name in journal.removed:
+        path = _inside(folder, name)
+        if _is_file(path):
+            path.unlink()
+    for name in journal.files:
+        source = _inside(folder, f"{_STAGING}/{name}")
+        if _is_file(source):
+            target = _inside(folder, name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            source.replace(target)
+    parents = {parent for name in journal.removed for parent in PurePosixPath(name).parents[:-1]}
+    for parent in sorted(parents, key=lambda each: len(each.parts), reverse=True):
+        with suppress(OSError):
+            (folder / parent).rmdir()  # fails, as it should, where there is something in it
+    _discard_staging(folder)
+    (folder / _JOURNAL).replace(folder / _MANIFEST)
+
+
+def _synchronise(folder: Path) -> None:
+    """Make sure that the names in a folder outlive a power failure, where the system can do that."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Lock a folder and put it in order; afterwards discard what was made and not committed."""
+    with locked(folder, _LOCK, remove=True):
+        with _telling(folder):
+            _carry_out(folder)
+            _discard_staging(folder)
+        try:
+            yield
+        finally:
+            if not os.path.lexists(folder / _JOURNAL):
+                with suppress(OSError):
+                    _discard_staging(folder)
+
+
+def _discard_staging(folder: Path) -> None:
+    if os.path.lexists(folder / _STAGING):
+        shutil.rmtree(folder / _STAGING)
+
+
+def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
+    """Return the files of the result that is to be replaced, None where the folder is empty."""
+    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}:
+        return None
+    if not overwrite:
+        raise InputError(f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted")
+    home, part = _home(folder)
+    if part:
+        raise InputError(f"{folder}: belongs to the comparison in {home}; another --out was wanted")
+    owned = _owned(folder)
+    if owned is None:
+        raise InputError(
+            f"{folder}: what is in the folder is no result of robocov, so --overwrite leaves it alone; "
+            f"another --out was wanted"
+        )
+    return owned
+
+
+def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
+    """Return the folder whose manifest (or journal) names files in this one, and the way from there."""
+    if not os.path.lexists(folder / name):
+        real = folder.resolve()
+        with suppress(InputError):
+            listing = _listing(real.parent / name)
+            if listing is not None and any(each.startswith(f"{real.name}/") for each in listing.files):
+                return real.parent, real.name
+    return folder, ""
+
+
+def _owned(folder: Path) -> set[str] | None:
+    """Return the files of the result in a folder, None where there is none."""
+    with suppress(InputError):  # one that is damaged still says whose folder it is
+        manifest = _listing(folder / _MANIFEST)
+        if manifest is not None:
+            return manifest.files
+    kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json")), None)
+    if kind is None and not os.path.lexists(folder / _MANIFEST) and not _is_remainder(folder):
+        return None
+    return _of_earlier_version(folder, kind or "run")
+
+
+def _of_earlier_version(folder: Path, kind: Kind) -> set[str]:
+    """Return the files of a result without a manifest: those that have the names of ours."""
+    names = {name for name in _FILES[kind] if _is_file(folder / name)}
+    names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name)}
+    names |= {path.name for path in folder.iterdir() if _HALF.fullmatch(path.name) and _is_file(path)}
+    names |= {f"frames/{name}" for name in _frames(folder)}
+    for part in _parts(folder) if kind == "comparison" else ():
+        names |= {
+            f"{part.name}/{name}" for name in (*(_owned(part) or ()), _MANIFEST) if _is_file(part / name)
+        }
+    return names
+
+
+def _frames(folder: Path) -> list[str]:
+    """Return the names of the pictures of a film in a folder's ``frames/``."""
+    frames = folder / "frames"
+    if frames.is_symlink() or not frames.is_dir():
+        return []
+    return [path.name for path in frames.iterdir() if _FRAME.fullmatch(path.name)]
+
+
+def _parts(folder: Path) -> list[Path]:
+    """Return the folders of the runs of a comparison without a manifest."""
+    try:
+        names = [str(name) for name in json.loads((folder / "comparison.json").read_bytes())["folders"]]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+    parts = [folder / name for name in names if Path(name).name == name != ".."]
+    return [part for part in parts if part.is_dir() and not part.is_symlink()]
+
+
+def _is_remainder(folder: Path) -> bool:
+    """Return whether a folder holds what an earlier version leaves when it is killed: files of ours alone."""
+    known = {"frames", "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
+    names = {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}
+    half = {name for name in names if _HALF.fullmatch(name)}
+    return names - half <= known and (bool(half) or any(_is_ours(folder / name) for name in _BEGINNINGS))
+
+
+def _is_ours(path: Path, name: str = "") -> bool:
+    """Return whether a file begins like ours of that name (by default its own)."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return _BEGINNINGS[name or path.name].search(file.read(_HEAD_BYTES)) is not None
+    except OSError:
+        return False
+
+
+def _is_file(path: Path) -> bool:
+    """Return whether there is a file, or a link."""
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return False
+    return stat.S_ISREG(mode) or stat.S_ISLNK(mode)
+
+
+def _require_all_free(folder: Path, kind: Kind, owned: set[str], parts: Iterable[str]) -> None:
+    """Make sure, before any work is done, that nobody else's file has the name of a file of the result."""
+    for name in (*_FILES[kind], "frames/000000.png", *(f"frames/{frame}" for frame in _frames(folder))):
+        _require_free(folder, name, owned)
+    for part in parts:
+        for name in _FILES["run"]:
+            _require_free(folder, f"{part}/{name}", owned)
+
+
+def _require_free(folder: Path, name: str, owned: set[str]) -> None:
+    path = _inside(folder, name)
+    if os.path.lexists(path) and not (name in owned and _is_file(path)):
+        raise OutputError(
+            f"{path}: is in the way, and does not belong to the result; another --out was wanted"
+        )
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """Return the path of a file in a folder; the way to it must lead through folders, and no links."""
+    path = folder
+    for step in name.split("/")[:-1]:
+        path /= step
+        if path.is_symlink():
+            raise OutputError(f"{path}: is a link, which is not followed; another --out was wanted")
+        if os.path.lexists(path) and not path.is_dir():
+            raise OutputError(f"{path}: is in the way of a folder; another --out was wanted")
+    return folder / name
+
+
+@contextmanager
+def _telling(folder: Path) -> Iterator[None]:
+    """Turn errors of the system into one line about the folder."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
