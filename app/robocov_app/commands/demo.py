@@ -166,6 +166,7 @@ def session_of(options: Arguments) -> Session:
 
 def rendered(opening: Opening, options: Arguments) -> int:
     """Render frames of the window without a display."""
+    from robocov.files.atomic import writable
     from robocov.files.result_folder import results
     from robocov_app.demo.film import pixels
     from robocov_app.demo.opening import HEADLESS_FPS
@@ -173,6 +174,8 @@ def rendered(opening: Opening, options: Arguments) -> int:
     from robocov_app.progress import progress
     from robocov_app.recording import kept_frames, save_film, save_frames
 
+    if options.video is not None:
+        writable(options.video)
     with ExitStack() as stack:
         out = None
         if options.out is not None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.Capt
     said = capsys.readouterr()
     assert str(out) in said.out
     assert "mean distance" in said.out
-    names = sorted(path.name for path in out.iterdir())
+    names = sorted(path.name for path in out.glob("[!.]*"))
     assert names == sorted(
         [
             "run.json",
@@ -104,12 +105,50 @@ def test_overwrite_removes_the_old_result_and_nothing_else(
 ) -> None:
     out = tmp_path / "run"
     answer(capsys, "run", "square", *SHORT, "--frames", "--out", str(out))
-    (out / "notes.txt").write_text("mine")
-    (out / "frames" / "notes.txt").write_text("mine")
+    mine = [out / name for name in ("notes.txt", ".x.part.zip", "frames/2024-holiday.png")]
+    for path in mine:
+        path.write_text("mine")
+    answer(capsys, "metrics", str(out))
     assert "not empty" in complaint(capsys, "run", "square", *SHORT, "--out", str(out))
     answer(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
-    assert (out / "notes.txt").read_text() == "mine"
-    assert [path.name for path in (out / "frames").iterdir()] == ["notes.txt"]
+    assert [path.read_text() for path in mine] == ["mine"] * 3
+    assert list((out / "frames").iterdir()) == [mine[2]]
+    assert not (out / "metrics.csv").exists(), "it was that of the run which is gone"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links of POSIX")
+def test_what_is_in_the_way_of_a_result_leaves_the_earlier_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
+    words = ("run", "square", *SHORT, "--video", "--frames", "--out", str(out), "--overwrite")
+    answer(capsys, "run", "square", *SHORT, "--out", str(out))
+    elsewhere.mkdir()
+    before = (out / "run.json").read_bytes()
+    (out / "run.mp4").mkdir()
+    assert "run.mp4: is in the way" in complaint(capsys, *words)
+    (out / "run.mp4").rmdir()
+    (out / "frames").symlink_to(elsewhere)
+    assert "frames: is a link, which is not followed" in complaint(capsys, *words)
+    assert (out / "run.json").read_bytes() == before
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
+    inner = tmp_path / "run" / "inner"
+    inner.mkdir()
+    (inner / "comparison.json").write_text(
+        '{"format": "robocov-comparison", "version": 1, "folders": [".."]}'
+    )
+    assert "'..'" in complaint(capsys, "metrics", str(inner))
+    answer(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
+    assert len(Record.load(tmp_path / "run")) == len(Record.load(inner)) == 61
+    (inner / "comparison.json").write_text(
+        '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
+    )
+    (inner / "on").symlink_to(tmp_path / "run")
+    assert "on: is a link" in complaint(capsys, "metrics", str(inner))
 
 
 def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,16 +9,26 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, SHORT, answer
+from called import COMMAND, SHORT, answer, complaint
+from kept_run import records_of
+from touched_run import begun, stepped
 
 from robocov.record import Record
 from robocov_app.cli import main
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="needs a limit on the size of files")
+@pytest.mark.parametrize("earlier", [False, True])
 @pytest.mark.parametrize(("limit", "file"), [(2_000, "record.npz"), (45_000, "trajectories.png")])
-def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, file: str) -> None:
+def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
+    tmp_path: Path, limit: int, file: str, *, earlier: bool
+) -> None:
     """The size of files is limited, which fails as a full disk does: in the middle of a write."""
+    before = {"run.json": '{"format": "robocov-run"}', "trajectories.png": "old", "record.npz": "old"}
+    if earlier:
+        (tmp_path / "run").mkdir()
+        for name, text in before.items():
+            (tmp_path / "run" / name).write_text(text)
     script = (
         "import resource, signal, sys\n"
         f"signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
@@ -26,7 +36,7 @@ def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, fil
         "import robocov, robocov_app.run, robocov_app.plots.runs, matplotlib.figure\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
         f"out = {str(tmp_path / 'run')!r}\n"
-        "words = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--out', out]\n"
+        "words = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--overwrite', '--out', out]\n"
         "sys.exit(main(words))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
@@ -35,9 +45,46 @@ def test_a_full_disk_leaves_no_half_written_file(tmp_path: Path, limit: int, fil
     assert len(errors) == 1
     assert "Traceback" not in done.stderr
     assert f"{file}: cannot be written" in errors[0]
-    left = [path.name for path in (tmp_path / "run").glob("*")]
-    assert file not in left
-    assert not [name for name in left if "part" in name]
+    left = {path.name: path for path in (tmp_path / "run").glob("*")}
+    if earlier:
+        assert {name: path.read_text() for name, path in left.items()} == before
+    assert earlier or file not in left
+    assert not [name for name in left if "part" in name or "new" in name]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="special files of POSIX")
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("generate --overwrite --out", "generate --plot", "export square --overwrite --format wkt --out"),
+        *("import square.wkt --overwrite --out", "import square.wkt --out o.json --overwrite --preview"),
+        *("cost square --positions p.json --sites", "cost square --positions p.json --plot"),
+        *("optimum square --overwrite --positions", "edit square --screenshot"),
+        *("demo square --frames 2 --video", "report run --overwrite --out", "metrics run --plot"),
+    ],
+)
+@pytest.mark.parametrize("name", ["pipe", "link", pytest.param("x" * 252, id="too long")])
+def test_what_cannot_be_written_is_one_line_and_stays_as_it_is(
+    words: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A named pipe, also by a link, and a name that is too long; a suffix makes it fit its command."""
+    monkeypatch.chdir(tmp_path)
+    Path("p.json").write_text("[[1, 1], [2, 2]]")
+    suffix = {"--plot": ".png", "--preview": ".png", "--screenshot": ".png", "--video": ".mp4"}
+    target = Path(name + suffix.get(words.split()[-1], ".json"))
+    if name in ("pipe", "link"):
+        os.mkfifo(target if name == "pipe" else "a pipe")
+    if name == "link":
+        target.symlink_to("a pipe")
+    if "run" in words.split():
+        (record,) = records_of(stepped(begun(), 5))
+        record.save(Path("run"))
+    elif "import" in words:
+        Path("square.wkt").write_text("POLYGON ((0 0, 9 0, 9 9, 0 9, 0 0))")
+    before = sorted(path.lstat().st_mode for path in tmp_path.iterdir())
+    said = complaint(capsys, *words.split(), str(target))
+    assert ("is a named pipe, but a file was wanted" in said) or "File name too long" in said
+    assert sorted(path.lstat().st_mode for path in tmp_path.iterdir()) == before
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")

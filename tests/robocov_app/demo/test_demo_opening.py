@@ -57,7 +57,7 @@ def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
 
 def frames_of(folder: Path, *words: str) -> list[np.ndarray]:
     assert main(["demo", "square", *SHORT, "--frames", "3", "--out", str(folder), *words]) == 0
-    paths = sorted(folder.iterdir())
+    paths = sorted(folder.glob("[!.]*"))
     assert [path.name for path in paths] == ["000000.png", "000001.png", "000002.png"]
     return [np.asarray(Image.open(path).convert("RGB")) for path in paths]
 
