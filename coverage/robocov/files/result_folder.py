@@ -291,7 +291,7 @@ def _discard_staging(folder: Path) -> None:
 
 def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
     """Return the files of the result that is to be replaced, None where the folder is empty."""
-    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}:
+    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING, _MANIFEST}:
         return None
     if not overwrite:
         raise InputError(f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted")

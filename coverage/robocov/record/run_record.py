@@ -324,6 +324,7 @@ class Record:
             When they cannot be written.
         """
         folder = Path(folder)
+        settle(folder)
         arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
             folder.mkdir(parents=True, exist_ok=True)

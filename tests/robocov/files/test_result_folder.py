@@ -139,6 +139,14 @@ def test_what_is_no_result_is_left_alone(tmp_path: Path, file: str) -> None:
     assert content(tmp_path / "project" / "run") == OLD
 
 
+def test_a_folder_that_was_emptied_can_be_used_again(tmp_path: Path) -> None:
+    saved(tmp_path, NUMBERS)
+    for name in NUMBERS:
+        (tmp_path / name).unlink()
+    saved(tmp_path, NEW, overwrite=False)
+    assert content(tmp_path) == NEW
+
+
 def test_a_file_is_no_folder(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
     with pytest.raises(OutputError, match="cannot be used for results"):
