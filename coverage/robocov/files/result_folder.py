@@ -17,7 +17,7 @@ import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, shown
 from robocov.files.atomic import written
@@ -83,13 +83,7 @@ class ResultFolder:
         self._owned.add(self._prefix + name)
 
     def keep(self) -> None:
-        """Commit what is made so far, unless it is to replace a result: that is done once all is made.
-
-        Raises
-        ------
-        OutputError
-            As `commit`.
-        """
+        """Commit what is made so far, unless it is to replace a result: that is done once all is made."""
         if not self._replaces:
             self.commit()
 
@@ -153,10 +147,12 @@ def results(
         with _held(folder):
             with _telling(folder):
                 earlier = _replaceable(folder, overwrite=overwrite)
-                for name in earlier or ():
-                    _inside(folder, name)
-                _require_all_free(folder, kind, earlier or set(), parts)
-            result = ResultFolder(folder, earlier or set(), replaces=earlier is not None)
+                owned = earlier or set()
+                own = (*_FILES[kind], "frames/000000.png", *(f"frames/{name}" for name in _frames(folder)))
+                inner = (f"{part}/{name}" for part in parts for name in _FILES["run"])
+                for name in sorted({*owned, *own, *inner}):
+                    _require_free(folder, name, owned)
+            result = ResultFolder(folder, owned, replaces=earlier is not None)
             yield result
             result.commit()
     finally:
@@ -210,27 +206,20 @@ def is_report(path: Path) -> bool:
     return _is_ours(path, REPORT)
 
 
-class _Listing(NamedTuple):
-    """What a manifest or a journal names: the files of the result, and those of an earlier one that go."""
-
-    files: set[str]
-    removed: set[str]
-
-
-def _listing(path: Path) -> _Listing | None:
-    """Return the content of a manifest or a journal, None where there is none."""
+def _listing(path: Path) -> tuple[set[str], set[str]] | None:
+    """Return the files that a manifest or a journal names, and those that go; None where there is none."""
     if not os.path.lexists(path):
         return None
     try:
-        if path.is_symlink():
-            raise ValueError("it is a link, but a file was wanted")
+        if path.is_symlink() or not path.is_file():
+            raise ValueError("it is no regular file")
         content = json.loads(path.read_bytes())
         if {key: content[key] for key in _HEAD} != _HEAD:
             raise ValueError(f"{shown(content['format'])}, version {shown(content['version'])}")
         for name in (*content["files"], *content.get("removed", ())):
             if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in name.split("/")):
                 raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
-        return _Listing(set(content["files"]), set(content.get("removed", ())))
+        return set(content["files"]), set(content.get("removed", ()))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
 
@@ -240,18 +229,19 @@ def _carry_out(folder: Path) -> None:
     journal = _listing(folder / _JOURNAL)
     if journal is None:
         return
+    files, removed = journal
     _synchronise(folder)
-    for name in journal.removed:
+    for name in removed:
         path = _inside(folder, name)
         if _is_file(path):
             path.unlink()
-    for name in journal.files:
+    for name in files:
         source = _inside(folder, f"{_STAGING}/{name}")
         if _is_file(source):
             target = _inside(folder, name)
             target.parent.mkdir(parents=True, exist_ok=True)
             source.replace(target)
-    parents = {parent for name in journal.removed for parent in PurePosixPath(name).parents[:-1]}
+    parents = {parent for name in removed for parent in PurePosixPath(name).parents[:-1]}
     for parent in sorted(parents, key=lambda each: len(each.parts), reverse=True):
         with suppress(OSError):
             (folder / parent).rmdir()  # fails, as it should, where there is something in it
@@ -313,7 +303,7 @@ def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
         real = folder.resolve()
         with suppress(InputError):
             listing = _listing(real.parent / name)
-            if listing is not None and any(each.startswith(f"{real.name}/") for each in listing.files):
+            if listing is not None and any(each.startswith(f"{real.name}/") for each in listing[0]):
                 return real.parent, real.name
     return folder, ""
 
@@ -323,7 +313,7 @@ def _owned(folder: Path) -> set[str] | None:
     with suppress(InputError):  # one that is damaged still says whose folder it is
         manifest = _listing(folder / _MANIFEST)
         if manifest is not None:
-            return manifest.files
+            return manifest[0]
     kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json")), None)
     if kind is None and not os.path.lexists(folder / _MANIFEST) and not _is_remainder(folder):
         return None
@@ -337,9 +327,8 @@ def _of_earlier_version(folder: Path, kind: Kind) -> set[str]:
     names |= {path.name for path in folder.iterdir() if _HALF.fullmatch(path.name) and _is_file(path)}
     names |= {f"frames/{name}" for name in _frames(folder)}
     for part in _parts(folder) if kind == "comparison" else ():
-        names |= {
-            f"{part.name}/{name}" for name in (*(_owned(part) or ()), _MANIFEST) if _is_file(part / name)
-        }
+        inner = (*(_owned(part) or ()), _MANIFEST)
+        names |= {f"{part.name}/{name}" for name in inner if _is_file(part / name)}
     return names
 
 
@@ -389,16 +378,8 @@ def _is_file(path: Path) -> bool:
     return stat.S_ISREG(mode) or stat.S_ISLNK(mode)
 
 
-def _require_all_free(folder: Path, kind: Kind, owned: set[str], parts: Iterable[str]) -> None:
-    """Make sure, before any work is done, that nobody else's file has the name of a file of the result."""
-    for name in (*_FILES[kind], "frames/000000.png", *(f"frames/{frame}" for frame in _frames(folder))):
-        _require_free(folder, name, owned)
-    for part in parts:
-        for name in _FILES["run"]:
-            _require_free(folder, f"{part}/{name}", owned)
-
-
 def _require_free(folder: Path, name: str, owned: set[str]) -> None:
+    """Make sure that a file of the result may be written or removed: that it is nobody else's."""
     path = _inside(folder, name)
     if os.path.lexists(path) and not (name in owned and _is_file(path)):
         raise OutputError(

@@ -195,7 +195,7 @@ def test_no_list_leads_out_of_the_folder(tmp_path: Path, which: str, name: str) 
     saved(out, OLD)
     mine.write_text("mine")
     (out / "link").symlink_to(tmp_path)
-    listed = {"format": "robocov-folder", "version": 1, "files": [name, "run.json"], "removed": [name]}
+    listed = {"format": "robocov-folder", "version": 1, "files": [name, *OLD], "removed": [name]}
     (out / which).write_text(json.dumps(listed))
     try:
         saved(out, NEW)
