@@ -87,6 +87,37 @@ def test_what_cannot_be_written_is_one_line_and_stays_as_it_is(
     assert sorted(path.lstat().st_mode for path in tmp_path.iterdir()) == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(
+            "run square --out",
+            "compare square --out",
+            "replay",
+            "report",
+            "metrics",
+            "optimum --run",
+            "check",
+        ),
+        *("generate --count 2 --out", "import", "demo square --frames 1 --out", "run"),
+    ],
+)
+def test_a_name_that_is_too_long_is_one_line(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "n" * 40 in complaint(capsys, *words.split(), "n" * 256)
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may look anywhere")
+@pytest.mark.parametrize("words", ["run square --overwrite --out", "replay", "report", "generate --out"])
+def test_a_folder_without_permission_is_one_line(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tmp_path.chmod(0)
+    try:
+        assert "ermission denied" in complaint(capsys, *words.split(), str(tmp_path / "x"))
+    finally:
+        tmp_path.chmod(0o700)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
     out = tmp_path / "run"
