@@ -53,6 +53,8 @@ class Arguments:
     """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps are, else none."""
     keep: Literal["largest", "all"] = "largest"
     """Which connected parts of the free space stay."""
+    inside: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")] = None
+    """The part of the free space that holds this place, in the map's metres, stays instead of the largest."""
     hull: bool = False
     """The boundary is the convex hull of the free space, not its outline."""
     margin: float = 0.0

@@ -86,8 +86,8 @@ def plot_import(
 ) -> Figure:
     """Plot a map as it was read and as it became, at one scale, and what was done to it in words.
 
-    In the first, free space that is not in the map any more is marked; in the second, places that were solid
-    and are free, and the narrowest passage.
+    In the first, free space that is not in the map any more is marked, with a place in each large part of it;
+    in the second, places that were solid and are free, and the narrowest passage.
 
     Parameters
     ----------
@@ -125,6 +125,7 @@ def plot_import(
         _draw(first, outside, theme.obstacle, theme.obstacle_edge)
         _draw_edges(first, compared.before, theme)
         _draw(first, compared.lost, theme.trajectory, theme.trajectory, _MARK)
+        _draw_places(first, report.others, theme)
         draw_map(second, environment, theme)
         _draw(second, compared.opened, theme.start, theme.start, _MARK)
         _draw_gap(second, compared.gap, theme)
@@ -235,6 +236,19 @@ def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: f
             outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
             style = {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
             axes.add_patch(PathPatch(outline, zorder=2, **style))
+
+
+def _draw_places(axes: Axes, places: Sequence[tuple[float, float]], theme: Theme) -> None:
+    """Write where the parts are that were left out, as the option ``--inside`` takes it."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+    for x, y in places:
+        axes.plot([x], [y], color=tone(theme.ink), marker="+", markersize=8.0, zorder=5, path_effects=halo)
+        axes.annotate(
+            f"{x:.10g} {y:.10g}", (x, y), xytext=(6, 6), textcoords="offset points", fontsize=SMALL,
+            color=tone(theme.ink), zorder=5, path_effects=halo,
+        )  # fmt: skip
 
 
 def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:

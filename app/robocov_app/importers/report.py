@@ -42,6 +42,9 @@ class ImportReport:
         By how much walls were allowed to move.
     moved_area : float, m²
         Area that was free and is not, or is and was not, for the simplification.
+    others : tuple of (x, y), m
+        A place in each of the largest parts of the free space that were left out, as `Shaping.inside` takes
+        it; empty where what was left out is not worth a word.
     """
 
     source: str
@@ -58,6 +61,7 @@ class ImportReport:
     obstacles: int = 0
     tolerance: float = 0.0
     moved_area: float = 0.0
+    others: tuple[tuple[float, float], ...] = ()
 
     def lines(self) -> list[str]:
         """Return the report for people, one fact a line."""
@@ -84,6 +88,7 @@ class ImportReport:
             "obstacles": self.obstacles,
             "tolerance_m": self.tolerance,
             "moved_area_m2": self.moved_area,
+            "other_parts_m": [list(place) for place in self.others],
             "repaired": list(self.repaired),
             "dropped": list(self.dropped),
             "changed": list(self.changed),

@@ -15,7 +15,7 @@ from robocov.environment.starts import GAP, DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, counted, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile import from_json, to_json
-from robocov.mapfile.models import SMALLEST
+from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
 from robocov_app.importers.corners import sharpened
@@ -24,6 +24,7 @@ from robocov_app.importers.report import ImportReport, square_metres
 from robocov_app.importers.simplifying import simplified
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from robocov.environment import Ring
@@ -39,6 +40,13 @@ _TINY = 0.01
 """Obstacles smaller than this, in m², are perhaps noise: many of them are worth a word."""
 
 _MANY = 10
+
+_LITTLE, _CONSIDERABLE = 0.5, 0.1
+"""Where less of the free area stays than the first, or a part of more than the second does not, it is said
+how to choose."""
+
+_OFFERED = 3
+"""So many of the largest parts that are left out are named, with a place in each."""
 
 _SOON = 50_000
 """Of maps with more vertices it takes too long to say where robots do not pass."""
@@ -58,6 +66,9 @@ class Shaping:
         what is noise in maps of that format, as single cells are in those that robots made.
     keep : str
         ``largest``: the largest connected part of the free space; ``all``: every part.
+    inside : (x, y) or None, m
+        The connected part that holds this place is kept, instead of the largest: in metres of the map, as
+        the report and the preview give them.
     hull : bool
         Whether the boundary is the convex hull of the free space, instead of its outline.
     margin : float, m
@@ -70,12 +81,13 @@ class Shaping:
     Raises
     ------
     ParameterError
-        When a value is out of range.
+        When a value is out of range, or one part and all are to be kept.
     """
 
     simplify: float | None = None
     specks: float | None = None
     keep: Literal["largest", "all"] = "largest"
+    inside: tuple[float, float] | None = None
     hull: bool = False
     margin: float = 0.0
     radius: float = DEFAULT_RADIUS
@@ -94,6 +106,14 @@ class Shaping:
             value = getattr(self, name)
             if value not in choices:
                 raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(choices)} was wanted")
+        if self.inside is not None:
+            if len(self.inside) != 2 or not all(abs(value) <= FARTHEST for value in self.inside):
+                raise ParameterError(
+                    f"inside: {shown(self.inside)}, but two numbers from {-FARTHEST:.0f} to {FARTHEST:.0f} "
+                    "(m) were wanted"
+                )
+            if self.keep == "all":
+                raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
 
 _ZERO = 1e-100
@@ -108,6 +128,7 @@ class _Told:
     dropped: list[str] = field(default_factory=list)
     changed: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    others: list[tuple[float, float]] = field(default_factory=list)
 
 
 def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
@@ -129,7 +150,9 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     outer = _valid_boundary(foreign.boundary, told)
     read = _valid(foreign.free, outer, told, where)
     least = foreign.specks if shaping.specks is None else shaping.specks
-    parts = _without_specks(_kept(read, shaping.keep, least, told, where), foreign.cell, least, told)
+    parts = _without_specks(_kept(read, shaping, least, told, where), foreign.cell, least, told)
+    if shaping.inside is not None and outer is not None and outer.contains_properly(parts[0]):
+        outer = None  # what is around the other parts is not around this one
     _require_room(parts, shaping, where)
     tolerance = shaping.simplify
     if tolerance is None:
@@ -175,6 +198,7 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         size=(round(width, digits), round(height, digits)),
         obstacles=len(environment.obstacles),
         tolerance=simple.tolerance,
+        others=tuple(told.others),
     )
     return environment, report
 
@@ -219,30 +243,61 @@ def _reason(geometry: BaseGeometry) -> str:
     return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
 
 
-def _kept(
-    free: MultiPolygon, keep: Literal["largest", "all"], specks: float, told: _Told, where: str
-) -> list[Polygon]:
+def _kept(free: MultiPolygon, shaping: Shaping, specks: float, told: _Told, where: str) -> list[Polygon]:
     """Return the parts of the free space that stay, the largest first."""
-    parts = list(free.geoms)
-    if keep == "largest":
-        kept = parts[:1]
+    parts = np.array(free.geoms, dtype=object)
+    area = shapely.area(parts)
+    if shaping.inside is not None:
+        stays = np.arange(len(parts)) == _part_around(shaping.inside, parts, where)
+    elif shaping.keep == "largest":
+        stays = np.arange(len(parts)) == 0
     else:
-        least = max(specks, min(CRUMB, parts[0].area))
-        kept = [part for part in parts if part.area >= least]
+        stays = area >= max(specks, min(CRUMB, area[0]))
+    kept: list[Polygon] = parts[stays].tolist()
+    left: list[Polygon] = parts[~stays].tolist()
     if not kept:
         raise MapError(
-            f"{where}: no part of the free space is larger than {parts[0].area:.3g} m², "
+            f"{where}: no part of the free space is larger than {area[0]:.3g} m², "
             f"but one of at least {specks:g} m² was wanted"
         )
-    left = parts[len(kept) :]
     if left:
         largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
         told.dropped.append(
             f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}"
         )
+        share, next_share = area[stays].sum() / area.sum(), left[0].area / area.sum()
+        if share < _LITTLE or next_share > _CONSIDERABLE:
+            told.others = [_place_in(part) for part in left[:_OFFERED]]
+            choices = " or ".join(
+                f"--inside {x:.10g} {y:.10g} ({square_metres(part.area, 3)})"
+                for (x, y), part in zip(told.others, left, strict=False)
+            )
+            told.notes.append(
+                f"{'only ' if share < _LITTLE else ''}{100 * share:.2g} % of the free area stays: {choices} "
+                "keeps another part, --keep all every part"
+            )
     if len(kept) > 1:
         told.notes.append(f"the free space is of {len(kept)} separate parts: robots cannot pass between them")
     return kept
+
+
+def _part_around(place: tuple[float, float], parts: NDArray[np.object_], where: str) -> int:
+    """Return which part holds a place."""
+    distance = shapely.distance(parts, shapely.Point(place))
+    nearest = int(np.argmin(distance))
+    if distance[nearest] > 0.0:
+        x, y = _place_in(parts[nearest])
+        raise MapError(
+            f"{where}: inside: {place[0]:.10g} {place[1]:.10g} is solid, but a place in the free space was "
+            f"wanted; {x:.10g} {y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
+        )
+    return nearest
+
+
+def _place_in(part: Polygon) -> tuple[float, float]:
+    """Return a place in a part, to the centimetre."""
+    point = shapely.point_on_surface(part)
+    return round(point.x, 2), round(point.y, 2)
 
 
 def _without_specks(parts: list[Polygon], cell: float | None, least: float, told: _Told) -> list[Polygon]:

@@ -46,6 +46,33 @@ def test_the_largest_part_and_its_obstacles() -> None:
     assert report.to_dict()["size_m"] == [10.0, 8.0]
 
 
+def test_the_part_around_a_place() -> None:
+    track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
+    whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21))
+    environment, report = shaped(whole, Shaping(inside=(21.0, 1.0)), "plan")
+    # the boundary is around all of the file, and not around this part
+    assert environment.boundary_polygon.equals(CLOSET)
+    (note,) = report.notes
+    assert note.startswith("only 3.3 % of the free area stays: --inside ")
+    assert note.endswith("keeps another part, --keep all every part")
+    assert len(report.others) == 2
+    for x, y in report.others:
+        assert f"--inside {x:g} {y:g} (" in note
+        assert shaped(whole, Shaping(inside=(x, y)), "plan")[1].area_kept > 50
+    wanted = r"plan: inside: 45 10 is solid, .*; 31 \S+ is one in the nearest part, 8 m away"
+    with pytest.raises(MapError, match=wanted):
+        shaped(whole, Shaping(inside=(45.0, 10.0)), "plan")
+
+
+def test_a_word_where_a_considerable_part_is_left_out() -> None:
+    _, report = shaped(foreign(CLOSET, ROOM), Shaping(), "plan")
+    assert report.notes[0].startswith(
+        "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
+    )
+    assert shaped(foreign(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
+    assert "stays" not in lines(shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")[1])
+
+
 @pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
 def test_what_is_all_but_zero_is_zero(tiny: float) -> None:
     environment, _ = shaped(foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan")
@@ -195,6 +222,8 @@ def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wa
         ({"margin": 200.0}, "margin: 200"),
         ({"radius": 0.0}, "radius: 0"),
         ({"keep": "some"}, "keep: 'some', but one of largest, all"),
+        ({"inside": (math.nan, 1.0)}, r"inside: \(nan, 1\.0\), but two numbers from -10000000 to"),
+        ({"inside": (0.0, 1.0), "keep": "all"}, "inside: keeps one part of the free space, but keep is all"),
         ({"default_start": "door"}, "default_start: 'door', but one of room, uniform"),
     ],
 )
