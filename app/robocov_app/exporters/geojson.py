@@ -9,67 +9,50 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.errors import ParameterError, RobocovError
+from robocov.errors import ParameterError, RobocovError, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
 from robocov_app.exporters.cells import not_held
 from robocov_app.exporters.coordinates import DIGITS, free_area, on_grid, rings
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
-from robocov_app.importers.georeference import local_plane
+from robocov_app.importers.georeference import LocalPlane
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from shapely.geometry.base import BaseGeometry
 
-    from robocov.arrays import Array
     from robocov.environment import Environment
 
-_FINER = 5
+_FINER = 6
 """So many more decimals have degrees: one is about a hundred kilometres."""
 
 
-class _Plane:
-    """Coordinates of the file, from metres and back."""
-
-    def __init__(self, origin: tuple[float, float] | None) -> None:
-        self.origin = origin
-        if origin is not None:
-            try:
-                self._local = local_plane(extra("pyproj", "geo"), *origin)
-            except RobocovError as error:
-                raise ParameterError(f"origin: degrees need more: {error}") from None
-
-    def outward(self, geometry: BaseGeometry) -> BaseGeometry:
-        """Return a geometry in metres as the file has it."""
-        return geometry if self.origin is None else shapely.transform(geometry, self._degrees)
-
-    def back(self, geometry: BaseGeometry) -> BaseGeometry:
-        """Return a geometry of the file in metres."""
-        return geometry if self.origin is None else shapely.transform(geometry, self._metres)
-
-    def _degrees(self, points: Array) -> Array:
-        return np.column_stack(self._local(*points.T, inverse=True))
-
-    def _metres(self, points: Array) -> Array:
-        return np.column_stack(self._local(*points.T))
-
-
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    plane = _Plane(options.origin)
-    digits = DIGITS + (_FINER if options.origin else 0) if options.digits is None else options.digits
+    origin = options.origin
+    digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
     shapes: list[tuple[str, str | None, BaseGeometry]] = [("boundary", None, environment.boundary_polygon)]
     shapes += [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
-    features, areas, lost = [], [], 0
+    features, areas, lost, across = [], [], 0, False
+    plane = None if origin is None else _plane(environment, origin)
     for kind, name, shape in shapes:
-        parts = on_grid(plane.outward(shape), digits)
+        if plane is None:
+            parts = on_grid(shape, digits)
+            areas.append(MultiPolygon(parts))
+        else:
+            # rounded in metres first, as a reader finds it: what touches there still touches
+            exact = MultiPolygon(on_grid(shape, DIGITS))
+            parts = on_grid(shapely.transform(exact, plane.degrees), digits)
+            areas.append(shapely.transform(MultiPolygon(parts), plane.metres))
+            across |= any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
         lost += not parts
-        areas.append(plane.back(MultiPolygon(parts)))
         if parts:
             features.append(_feature(kind, name, [rings(part) for part in parts]))
     notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
-    if options.origin is not None:
-        notes = [f"in degrees about longitude {options.origin[0]:g}, latitude {options.origin[1]:g}"]
+    if origin is not None:
+        notes = [f"in degrees about longitude {origin[0]:g}, latitude {origin[1]:g}"]
+    if across:
+        notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
     if lost:
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
     with written(path) as part:
@@ -82,6 +65,18 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         dropped=tuple(thing for thing in not_held(environment) if not thing.startswith("names")),
         notes=tuple(notes),
     )
+
+
+def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
+    """Return the plane about a place, if longitudes do not run all around in the map."""
+    try:
+        plane = LocalPlane(extra("pyproj", "geo"), *origin)
+    except RobocovError as error:
+        raise ParameterError(f"origin: degrees need more: {error}") from None
+    if np.ptp(plane.degrees(np.array(environment.boundary, dtype=float))[:, 0]) >= 180.0:
+        wanted = "a place farther from the pole was wanted"
+        raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
+    return plane
 
 
 def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, float]]]]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.files.atomic import written
-from robocov_app.exporters.cells import free_cells, grid_over, not_held
+from robocov_app.exporters.cells import free_cells, grid_over, lost_passages, not_held
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     grid = grid_over(environment, options.cell)
-    free, notes = free_cells(environment, grid)
+    free = free_cells(environment, grid)
     letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
     letters[:, :-1][free[::-1]] = ord(".")
     letters[:, -1] = ord("\n")
@@ -34,7 +34,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
             f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]",
             *not_held(environment),
         ),
-        notes=notes,
+        warnings=lost_passages(environment, grid, free),
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.files.atomic import written
-from robocov_app.exporters.cells import free_cells, grid_over, not_held
+from robocov_app.exporters.cells import free_cells, grid_over, lost_passages, not_held
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 from robocov_app.importers.picture import CHUNK, TITLE
 
@@ -21,7 +21,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     from PIL import Image, PngImagePlugin
 
     grid = grid_over(environment, options.cell)
-    free, notes = free_cells(environment, grid)
+    free = free_cells(environment, grid)
     texts = PngImagePlugin.PngInfo()
     texts.add_text(TITLE, environment.name)
     texts.add_text(CHUNK, json.dumps({"cell_m": grid.cell, "origin_m": list(grid.origin)}))
@@ -33,7 +33,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         environment.free_area,
         float(np.count_nonzero(free)) * grid.cell**2,
         dropped=not_held(environment),
-        notes=notes,
+        warnings=lost_passages(environment, grid, free),
     )
 
 

@@ -18,10 +18,11 @@ from scipy import ndimage
 from robocov.errors import OutputError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import one_line
-from robocov_app.exporters.cells import Grid, free_cells, grid_over, not_held
+from robocov_app.exporters.cells import Grid, free_cells, grid_over, lost_passages, not_held
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 
 if TYPE_CHECKING:
+    from robocov.arrays import BoolArray
     from robocov.environment import Environment
 
 OCCUPIED, FREE = 0.65, 0.196
@@ -49,7 +50,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         raise OutputError(f"{one_line(path)}: the name of the picture, but one for the YAML was wanted")
     text_name = _quoted(image.name, path)
     grid = grid_over(environment, options.cell)
-    free, notes = free_cells(environment, grid)
+    free = free_cells(environment, grid)
     within = grid.covered(environment.boundary_polygon)
     # a wall of one cell all around what is free
     unknown = ~(within | ndimage.binary_dilation(free, np.ones((3, 3), bool)))
@@ -57,11 +58,11 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         pixels = np.where(free, np.uint8(_WHITE), np.uint8(_BLACK))
         pixels[unknown] = _GREY
         alpha = None
-        area = float(np.count_nonzero(free)) * grid.cell**2
     else:
-        pixels, alpha, area = _graded(environment, grid, unknown, mode)
+        pixels, alpha, free = _graded(environment, grid, free, unknown, mode)
+    notes: tuple[str, ...] = ()
     if alpha is not None and image.suffix == ".pgm":
-        notes = (*notes, "a PGM of mode scale has no unknown cells: what is outside is occupied")
+        notes = ("a PGM of mode scale has no unknown cells: what is outside is occupied",)
         pixels = np.where(unknown, np.uint8(_BLACK), pixels)
         alpha = None
     _save(image, pixels[::-1], None if alpha is None else alpha[::-1], grid)
@@ -77,23 +78,33 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
             encoding="utf-8",
         )
     return ExportReport(
-        "ros", (path, image), environment.free_area, area, dropped=not_held(environment), notes=notes
+        "ros",
+        (path, image),
+        environment.free_area,
+        float(np.count_nonzero(free)) * grid.cell**2,
+        dropped=not_held(environment),
+        notes=notes,
+        warnings=lost_passages(environment, grid, free),
     )
 
 
 def _graded(
-    environment: Environment, grid: Grid, unknown: NDArray[np.bool_], mode: str
-) -> tuple[_Pixels, _Pixels | None, float]:
-    """Return pixels and opacity of mode scale or raw, (rows, columns), and the area that is mostly free."""
+    environment: Environment, grid: Grid, free: BoolArray, unknown: BoolArray, mode: str
+) -> tuple[_Pixels, _Pixels | None, BoolArray]:
+    """Return pixels and opacity of mode scale or raw, (rows, columns), and the cells that are mostly free.
+
+    A cell that is not free is occupied for sure: costmaps take what is less than sure for free.
+    """
     fine = grid.covered(environment.free, _FINER).reshape(grid.rows, _FINER, grid.columns, _FINER)
     solid = 1.0 - fine.mean(axis=(1, 3), dtype=np.float32)
+    solid[~free] = 1.0
     percent = np.rint(100.0 * solid)
-    area = float(np.count_nonzero(percent < 50.0)) * grid.cell**2
+    free = percent < 50.0
     if mode == "raw":
-        return np.where(unknown, 255, percent).astype(np.uint8), None, area
+        return np.where(unknown, 255, percent).astype(np.uint8), None, free
     dark = np.where(solid >= 1.0, 1.0, np.where(solid <= 0.0, 0.0, FREE + solid * (OCCUPIED - FREE)))
     alpha = np.where(unknown, np.uint8(0), np.uint8(255))
-    return np.rint(255.0 * (1.0 - dark)).astype(np.uint8), alpha, area
+    return np.rint(255.0 * (1.0 - dark)).astype(np.uint8), alpha, free
 
 
 def _save(path: Path, pixels: _Pixels, alpha: _Pixels | None, grid: Grid) -> None:

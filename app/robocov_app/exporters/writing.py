@@ -85,6 +85,8 @@ class ExportReport:
         Free area of what was written.
     dropped, notes : tuple of str
         What the format cannot hold (names, starts), and what is worth knowing besides; one line each.
+    warnings : tuple of str
+        What is wrong in the file: where robots cannot drive any more; one line each.
     """
 
     format: str
@@ -93,6 +95,7 @@ class ExportReport:
     area_written: float
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """Return the report for people, one fact a line."""
@@ -113,6 +116,7 @@ class ExportReport:
             "area_written_m2": self.area_written,
             "dropped": list(self.dropped),
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
 

@@ -27,6 +27,9 @@ DEGREES = "OGC:CRS84"
 _IN_DEGREES = (DEGREES, "EPSG:4326")
 _AS_THEY_ARE = "--units metres takes coordinates as they are"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
+_DIGITS = 6
+"""Decimals of metres: free space is known to a micrometre."""
+
 _EARTH = 6_371_000.0
 """Mean radius in metres, to tell degrees from metres; nothing else is computed with it."""
 
@@ -97,17 +100,16 @@ def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
     if not possible or not figures:
         return False
     points = _points(figures)
-    if not (np.abs(points) <= [180.0, 90.0]).all():
+    if not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
         return False
-    width, height = np.ptp(_unwrapped(points), axis=0)
+    width, height = np.ptp(_unwrapped(points, points[0, 0]), axis=0)
     shrunk = math.cos(math.radians(float(np.abs(points[:, 1]).max())))
     return bool(max(width * shrunk, height) * math.radians(1.0) * _EARTH <= LARGEST)
 
 
-def _unwrapped(points: Array) -> Array:
-    """Return longitudes without a jump at the antimeridian: all within 180 degrees of the first."""
-    first = points[0, 0]
-    longitude = first + (points[:, 0] - first + 180.0) % 360.0 - 180.0
+def _unwrapped(points: Array, about: float) -> Array:
+    """Return longitudes without a jump at the antimeridian: all within 180 degrees of one."""
+    longitude = about + (points[:, 0] - about + 180.0) % 360.0 - 180.0
     return np.column_stack([longitude, points[:, 1]])
 
 
@@ -148,10 +150,10 @@ def _projected(
         x, y = _points(figures)[int(np.argmin(good))].tolist()
         wanted = "longitude and latitude in degrees" if name in _IN_DEGREES else f"coordinates of {name}"
         raise MapError(f"{where}: a point at [{x:g}, {y:g}], but {wanted} were wanted ({_AS_THEY_ARE})")
-    points = _unwrapped(points)
+    points = _unwrapped(points, points[0, 0])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     longitude, latitude = origin or (float(middle[0]), float(middle[1]))
-    points = np.column_stack(local_plane(pyproj, longitude, latitude)(*points.T))
+    points = LocalPlane(pyproj, longitude, latitude).metres(points)
     longitude = (longitude + 180.0) % 360.0 - 180.0
     words = (
         f"{'degrees' if name in _IN_DEGREES else name} projected to metres about longitude {longitude:.5f}, "
@@ -160,13 +162,32 @@ def _projected(
     return _with_points(figures, points), [words]
 
 
-def local_plane(pyproj: Any, longitude: float, latitude: float) -> Any:
-    """Return pyproj's projection of longitude and latitude to metres east and north of a place.
+class LocalPlane:
+    """Metres east and north of a place on the globe, from degrees and back.
 
     Azimuthal equidistant on the ellipsoid of WGS 84 (Snyder 1987, Map Projections: A Working Manual,
     section 25): within 5 km of the place lengths are true to better than a millimetre.
+
+    Parameters
+    ----------
+    pyproj : module
+    longitude, latitude : float, degrees
     """
-    return pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
+
+    def __init__(self, pyproj: Any, longitude: float, latitude: float) -> None:
+        self._longitude = longitude
+        self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
+
+    def metres(self, degrees: Array) -> Array:
+        """Return (n, 2) m of longitudes and latitudes.
+
+        Rounded to the micrometre that free space is known to: walls that touch or share a corner still do.
+        """
+        return np.round(np.column_stack(self._project(*degrees.T)), _DIGITS)
+
+    def degrees(self, metres: Array) -> Array:
+        """Return longitudes, all within 180 degrees of the place's, and latitudes of (n, 2) m."""
+        return _unwrapped(np.column_stack(self._project(*metres.T, inverse=True)), self._longitude)
 
 
 def _pyproj(name: str, where: str) -> Any:

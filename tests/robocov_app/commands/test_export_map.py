@@ -36,6 +36,17 @@ def test_options_reach_the_format(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert json.loads(here.read_text())["origin"] == [8.4, 49.0]
 
 
+def test_closed_gaps_are_told_beside_the_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["export", "office", "-o", str(tmp_path / "office.yaml"), "--cell", "1"]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert said.err.startswith("robocov: warning: gaps close: the free space falls into ")
+    assert "warning" not in said.out
+    assert main([*words, "--overwrite", "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["warnings"] == [said.err.removeprefix("robocov: warning: ").strip()]
+
+
 def test_what_is_wrong_gets_one_line_and_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

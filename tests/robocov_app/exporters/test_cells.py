@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
-from robocov.environment import Environment, PolygonObstacle
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.environment.starts import UniformStart
 from robocov.errors import ParameterError
-from robocov_app.exporters.cells import Grid, free_cells, grid_over, not_held
+from robocov_app.exporters import WriteOptions, cells, export_map
+from robocov_app.exporters.cells import Grid, free_cells, grid_over, lost_passages, not_held
+from robocov_app.importers import ReadOptions, Shaping, import_map
 
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
 
@@ -50,8 +56,8 @@ def room(**others: object) -> Environment:
 def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
     grid = grid_over(room(), 0.25)
     assert (grid.rows, grid.columns, grid.cell, grid.origin) == (14, 22, 0.25, (0.75, 1.75))
-    free, lost = free_cells(room(), grid)
-    assert lost == ()
+    free = free_cells(room(), grid)
+    assert lost_passages(room(), grid, free) == ()
     assert free.sum() * 0.25**2 == 15
     assert not free[[0, -1]].any() and not free[:, [0, -1]].any()
     assert grid_over(room(), None).cell == 0.05
@@ -72,11 +78,80 @@ def test_cells_that_are_too_small_or_too_large() -> None:
         free_cells(room(obstacles=blocks), grid_over(room(obstacles=blocks), 20.0))
 
 
-def test_gaps_that_a_cell_closes_are_told() -> None:
+_places = st.tuples(st.floats(0.8, 6.2), st.floats(1.8, 5.2))
+_thin = st.one_of(
+    st.builds(
+        WallObstacle, st.lists(_places, min_size=2, max_size=4, unique=True).map(tuple), st.floats(0.001, 0.2)
+    ),
+    st.builds(CircleObstacle, _places, st.floats(0.001, 0.2)),
+)
+
+
+@settings(max_examples=80)
+@given(st.lists(_thin, min_size=1, max_size=6), st.floats(0.04, 0.25))
+def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], cell: float) -> None:
+    environment = room(obstacles=tuple(things))
+    grid = grid_over(environment, cell)
+    free = free_cells(environment, grid)
+    low = np.array(grid.origin)
+    boxes = [shapely.box(*(low + [c * cell, r * cell]), *(low + [(c + 1) * cell, (r + 1) * cell]))
+             for r, c in np.argwhere(~free)]  # fmt: skip
+    blocked = shapely.STRtree(boxes)
+    solid = shapely.get_parts(shapely.box(*low, *low + 100).difference(environment.free))
+    for part in solid:
+        assert len(blocked.query(part, predicate="intersects"))
+    # blocked cells hang together over their corners
+    assert ndimage.label(~free, np.ones((3, 3)))[1] <= len(solid)
+    # and free ones over their sides only: each of their islands is of one part of the free space
+    islands, count = ndimage.label(free)
+    for k in range(1, count + 1):
+        row, column = np.nonzero(islands == k)
+        x, y = (np.column_stack([column, row]) + 0.5).T * cell + low[:, None]
+        homes = [
+            part for part in environment.free.geoms if shapely.dwithin(part, shapely.points(x, y), 1e-9).any()
+        ]
+        assert len(homes) == 1
+
+
+def test_a_wall_thinner_than_a_cell_keeps_rooms_apart(tmp_path: Path) -> None:
+    upright = room(obstacles=(WallObstacle(((3.01, 2.0), (3.01, 5.0)), 0.03),))
+    slanted = room(obstacles=(WallObstacle(((1.0, 2.2), (6.0, 4.7)), 0.03),))
+    for environment in (upright, slanted):
+        for name in ("map.yaml", "map.map", "map.png", "scale.yaml", "raw.yaml"):
+            mode = name.removesuffix(".yaml") if name in ("scale.yaml", "raw.yaml") else None
+            report = export_map(environment, tmp_path / name, options=WriteOptions(cell=0.1, mode=mode))  # type: ignore[arg-type]
+            assert report.warnings == ()
+            cell = ReadOptions(cell=0.1) if name == "map.map" else ReadOptions()
+            back, _, _ = import_map(tmp_path / name, options=cell, shaping=Shaping(keep="all"))
+            assert len(back.free.geoms) == 2
+            assert back.free_area == pytest.approx(environment.free_area, rel=0.04)
+
+
+def test_gaps_that_cells_close_are_told_with_cells_that_keep_them() -> None:
     wall = PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.93), (3.0, 4.93)), name="wall")
     environment = room(obstacles=(wall,), starts={"all": UniformStart()})
-    _, lost = free_cells(environment, grid_over(environment, 0.25))
-    assert lost == ("the free space falls into 2 parts, not 1: a smaller cell keeps gaps open",)
-    assert free_cells(environment, grid_over(environment, 0.02))[1] == ()
+
+    def warnings(cell: float) -> tuple[str, ...]:
+        grid = grid_over(environment, cell)
+        return lost_passages(environment, grid, free_cells(environment, grid))
+
+    (warning,) = warnings(0.25)
+    assert warning == (
+        "gaps close: the free space falls into 2 parts, not 1; cells of 0.1 m keep it (--cell 0.1)"
+    )
+    assert warnings(0.1) == ()
     assert not_held(environment) == ("starts: all", "names of obstacles")
     assert not_held(room()) == ()
+
+
+def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    walls = (WallObstacle(((1.0, 2.2), (6.0, 2.2)), 0.01), WallObstacle(((1.0, 2.35), (6.0, 2.35)), 0.01))
+    environment = room(obstacles=walls)
+    grid = grid_over(environment, 0.4)
+    (warning,) = lost_passages(environment, grid, free_cells(environment, grid))
+    assert warning.startswith("2 separate parts of the free space are lost; cells of 0.05 m keep it")
+    monkeypatch.setattr(cells, "_MOST_TRIED", 1_000_000)
+    hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
+    grid = grid_over(hair, 0.4)
+    (warning,) = lost_passages(hair, grid, free_cells(hair, grid))
+    assert warning.endswith("not 1; no cells of which there are at most 1 million keep it")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+import functools
+from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
@@ -13,9 +15,12 @@ from shapely import Polygon
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
-from robocov.mapfile import load_map
+from robocov.generator import generated_map
+from robocov.mapfile import bundled_maps, load_map
+from robocov.robots import DEFAULT_RADIUS
 from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
 from robocov_app.importers import ReadOptions, Shaping, import_map
+from robocov_app.importers.passing import rooms
 
 ROOM = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)))
 
@@ -111,6 +116,58 @@ def test_out_and_in_again_changes_less_than_a_row_of_cells(
     export_map(back, again, options=options)
     twice, _, _ = import_map(again, options=read, shaping=Shaping(keep="all", specks=0.0))
     assert abs(twice.free_area - back.free_area) < row
+
+
+PLACES = {
+    "the equator": (-78.5, 0.0), "the north": (8.4, 49.0), "the south": (151.2, -33.9),
+    "the antimeridian": (179.9999, 60.0), "a pole": (30.0, -89.0),
+}  # fmt: skip
+WAYS: dict[str, tuple[str, WriteOptions]] = {
+    "ROS": (".yaml", WriteOptions()),
+    "MovingAI": (".map", WriteOptions()),
+    "a picture": (".png", WriteOptions()),
+    "SVG": (".svg", WriteOptions()),
+    "WKT": (".wkt", WriteOptions()),
+    "metres": (".geojson", WriteOptions()),
+    **{place: (".geojson", WriteOptions(origin=at)) for place, at in PLACES.items()},
+}
+MAPS = [*bundled_maps(), *(f"generated {kind}" for kind in ("blocks", "caves", "mazes", "polygons", "rooms"))]
+
+
+@functools.cache
+def a_map(name: str) -> Environment:
+    kind = name.removeprefix("generated ")
+    return load_map(name) if kind == name else generated_map(1, kind=kind)
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("way", WAYS)
+def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
+    environment, (suffix, options) = a_map(name), WAYS[way]
+    path = tmp_path / f"map{suffix}"
+    read = ReadOptions()
+    if "cell" in exporter(path).options:
+        # blocks stand a whole number of their own cells apart: coarser ones all err to the same side
+        options = replace(options, cell=0.02 if name == "generated blocks" else 0.05)
+        read = ReadOptions(cell=options.cell) if suffix == ".map" else read
+    report = export_map(environment, path, options=options)
+    back, _, _ = import_map(path, options=read)
+    assert back.free.is_valid
+    assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
+    assert len(rooms(back.free, DEFAULT_RADIUS)) == len(rooms(environment.free, DEFAULT_RADIUS))
+    for ring in shapely.get_rings([*back.free.geoms, *(shape.polygon for shape in back.obstacles)]):
+        assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3
+    assert report.warnings == ()
+
+
+def test_a_map_around_a_pole_is_refused(tmp_path: Path) -> None:
+    size = 130_000.0
+    corners = ((-size, -size), (size, -size), (size, size), (-size, size))
+    with pytest.raises(ParameterError, match=r"origin: \(0, 89\): longitudes run all around on the map"):
+        export_map(
+            Environment("arctic", corners), tmp_path / "a.geojson", options=WriteOptions(origin=(0, 89))
+        )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_paths_of_obstacles_are_told_to_be_dropped(tmp_path: Path) -> None:

@@ -78,17 +78,17 @@ def test_it_comes_back(tmp_path: Path, mode: str, image: str) -> None:
 
 def test_scale_and_raw_say_how_much_of_a_cell_is_solid(tmp_path: Path) -> None:
     half = Environment("half", ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)), (
-        PolygonObstacle(((0.75, 0.0), (1.5, 0.0), (1.5, 1.0), (0.75, 1.0))),
+        PolygonObstacle(((0.875, 0.0), (1.375, 0.0), (1.375, 1.0), (0.875, 1.0))),
     ))  # fmt: skip
     export_map(half, tmp_path / "raw.yaml", options=WriteOptions(cell=0.5, mode="raw"))
-    assert pixels(tmp_path / "raw.pgm")[1].tolist() == [100, 0, 50, 100, 0, 100]
+    assert pixels(tmp_path / "raw.pgm")[1].tolist() == [100, 0, 25, 100, 0, 100]
     export_map(half, tmp_path / "scale.yaml", options=WriteOptions(cell=0.5, mode="scale"))
     found = pixels(tmp_path / "scale.png")
     assert found.shape[2] == 2
     dark = 1 - found[1, :, 0] / 255
     assert dark[[1, 4]].tolist() == [0, 0]
     assert dark[3] == 1
-    assert dark[2] == pytest.approx(0.196 + 0.5 * (0.65 - 0.196), abs=0.003)
+    assert dark[2] == pytest.approx(0.196 + 0.25 * (0.65 - 0.196), abs=0.003)
 
 
 def test_names_that_yaml_would_misread_are_quoted(tmp_path: Path) -> None:
