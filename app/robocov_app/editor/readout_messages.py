@@ -1,4 +1,4 @@
-"""What a window and the process that measures its sketch say to each other."""
+"""What the process that measures a window's sketch is told."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from robocov_app.editor.document import Item, Sketch
-    from robocov_app.editor.readout import Readout
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,8 +16,6 @@ class Question:
 
     Attributes
     ----------
-    number : int
-        Counts the questions.
     rest : Sketch
         Without its obstacles.
     order : tuple of int
@@ -28,28 +25,18 @@ class Question:
     radius : float, m
     """
 
-    number: int
     rest: Sketch
     order: tuple[int, ...]
     changed: tuple[Item, ...]
     radius: float
 
     @classmethod
-    def about(cls, number: int, sketch: Sketch, radius: float, known: Mapping[int, Item]) -> Question:
+    def about(cls, sketch: Sketch, radius: float, known: Mapping[int, Item]) -> Question:
         """Return the question about a sketch for a process that knows some obstacles."""
         changed = tuple(item for item in sketch.obstacles if known.get(item.key) is not item)
         order = tuple(item.key for item in sketch.obstacles)
-        return cls(number, replace(sketch, obstacles=()), order, changed, radius)
+        return cls(replace(sketch, obstacles=()), order, changed, radius)
 
     def sketch(self, known: Mapping[int, Item]) -> Sketch:
         """Return the sketch that it is about, for a process that knows all its obstacles by now."""
         return replace(self.rest, obstacles=tuple(known[key] for key in self.order))
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What a sketch is like; or in words why that is not known."""
-
-    number: int
-    readout: Readout | None
-    trouble: str = ""

@@ -19,6 +19,7 @@ from robocov_app.editor.readout import readout
 from robocov_app.editor.readout_messages import Question
 from robocov_app.editor.readout_worker import ReadoutWorker
 from robocov_app.editor.selection import Selection
+from robocov_app.live.latest import Service
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""
@@ -93,22 +94,20 @@ def test_it_says_what_the_function_says_after_every_change():
 @settings(max_examples=20)
 @given(st.data())
 def test_what_has_changed_is_enough_to_know_the_whole(data):
-    process = readout_process.Process(None, None)
+    measuring = readout_process.Measuring()
     sketch, known = data.draw(sound_sketches(least=1)), {}
     questions = []
-    for number in range(4):
-        questions.append(Question.about(number, sketch, 0.2, known))
+    for _ in range(4):
+        questions.append(Question.about(sketch, 0.2, known))
         known = {item.key: item for item in sketch.obstacles}
         change = data.draw(changes(sketch))
         assert all(item in sketch.obstacles for item in questions[-1].changed)
         last = sketch
         sketch = sketch if change is None else change.sketch
-    answer = process.answer(questions[:2])
-    assert answer.number == 1
-    answer = process.answer(questions[2:])
-    assert (answer.number, answer.trouble) == (3, "")
-    assert answer.readout.vertices == readout(last, 0.2).vertices
-    assert answer.readout.free_area == readout(last, 0.2).free_area
+    measuring(questions[:2])
+    answer = measuring(questions[2:])
+    assert answer.vertices == readout(last, 0.2).vertices
+    assert answer.free_area == readout(last, 0.2).free_area
 
 
 def test_only_the_newest_question_counts():
@@ -143,16 +142,17 @@ def test_a_process_that_was_killed_comes_back():
 
 
 def test_what_fails_is_said_and_the_next_goes_on(monkeypatch, capsys):
-    process = readout_process.Process(None, None)
+    service = Service(readout_process.Measuring(), "the map could not be measured")
     monkeypatch.setattr(readout_process, "readout", lambda sketch, radius: 1 / 0)
-    answer = process.answer([Question.about(1, SKETCH, 0.2, {})])
-    assert answer.readout is None
-    assert answer.trouble == "the map could not be measured: division by zero"
+    reply = service.reply([(1, Question.about(SKETCH, 0.2, {}))])
+    assert (reply.number, reply.answer) == (1, None)
+    assert reply.trouble == "the map could not be measured: division by zero"
     assert "ZeroDivisionError" in capsys.readouterr().err
     monkeypatch.undo()
     known = {item.key: item for item in SKETCH.obstacles}
-    answer = process.answer([Question.about(2, SKETCH, 0.2, known)])
-    assert answer.readout.vertices == readout(SKETCH, 0.2).vertices
+    reply = service.reply([(2, Question.about(SKETCH, 0.2, known))])
+    assert (reply.number, reply.trouble) == (2, "")
+    assert reply.answer.vertices == readout(SKETCH, 0.2).vertices
 
 
 def test_nothing_is_there_before_one_asks():
