@@ -23,7 +23,7 @@ class Arguments:
 
     map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
     """A map JSON, which need not be there yet; the name of a bundled map, of which a copy is opened; or a
-    file of a foreign format, which is imported. Without it an empty sheet."""
+    file of a foreign format, which is imported as you choose. Without it an empty sheet."""
     background: Path | None = None
     """A picture to put under the map, such as a scanned floor plan."""
     theme: Literal["light", "dark"] | None = None

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robocov.environment import Point
     from robocov_app.editor.asking import ListQuestion, Question
     from robocov_app.editor.document import Owner, Sketch
+    from robocov_app.editor.importing import ImportQuestion
     from robocov_app.editor.paper import Paper
     from robocov_app.editor.problems import Problem
     from robocov_app.editor.readout import Readout
@@ -92,7 +93,7 @@ class Desk:
         Where the mouse is.
     moves_since : float or None, s
         Since when obstacles that move are shown moving.
-    asked : Question, ListQuestion or None
+    asked : Question, ListQuestion, ImportQuestion or None
         What is waiting for an answer.
     problem : Problem or None
         The one that is shown with its words.
@@ -114,7 +115,7 @@ class Desk:
         self.recent: list[str] = []
         self.readout: Readout | None = None
         self.problem: Problem | None = None
-        self.asked: Question | ListQuestion | None = None
+        self.asked: Question | ListQuestion | ImportQuestion | None = None
         self.message = ""
         self.trouble = False
         self.pixel = 0.01

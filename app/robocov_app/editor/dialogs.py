@@ -12,6 +12,8 @@ from robocov_app.demo.overlays import CommandList, card, dim, wrapped
 from robocov_app.demo.typed import parted
 from robocov_app.editor.actions import told_actions
 from robocov_app.editor.asking import ROWS, FileQuestion, ListQuestion, Question
+from robocov_app.editor.import_view import ImportView
+from robocov_app.editor.importing import ImportQuestion
 from robocov_app.editor.typed import COMMANDS, GHOST
 from robocov_app.view.fonts import label, shortened, text_width
 from robocov_app.view.theme import LIGHT, mix
@@ -39,7 +41,8 @@ class Dialogs:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._boxes: list[tuple[pygame.Rect, int]] = []
-        self._drawn: Question | ListQuestion | None = None  # what the boxes are of
+        self._drawn: Question | ListQuestion | ImportQuestion | None = None  # what the boxes are of
+        self._import = ImportView()
         self._opened_by = ""
 
     @property
@@ -58,6 +61,8 @@ class Dialogs:
         asked, self._opened_by = self._desk.asked, ""
         if isinstance(asked, Question):
             self._key_of_question(asked, name)
+        elif isinstance(asked, ImportQuestion):
+            self._key_of_import(asked, name)
         elif asked is not None:
             self._key_of_list(asked, name)
 
@@ -85,6 +90,32 @@ class Dialogs:
         elif name in ("return", "enter"):
             self._accept(asked)
 
+    def _key_of_import(self, asked: ImportQuestion, name: str) -> None:
+        if name == "escape":
+            asked.close()
+            self._desk.asked = None
+        elif name in ("up", "shift+tab", "down", "tab"):
+            asked.move(-1 if name in ("up", "shift+tab") else 1)
+        elif name in ("left", "right"):
+            asked.turn(-1 if name == "left" else 1)
+        elif name in ("backspace", "ctrl+backspace", "delete"):
+            asked.erase(all_of_it=name != "backspace")
+        elif name == "ctrl+v":
+            asked.type("".join(self._desk.pasteboard.get().splitlines()[:1]))
+        elif name in ("return", "enter"):
+            asked.accepted = True
+
+    def _click_on_import(self, asked: ImportQuestion, pixel: tuple[int, int]) -> None:
+        row, key, place = self._import.at(pixel)
+        if key:
+            self._key_of_import(asked, key)
+        elif row is not None:
+            if row == asked.chosen:
+                asked.turn(1)
+            asked.chosen = row
+        elif place is not None:
+            asked.keep_inside(place)
+
     def _accept(self, asked: ListQuestion) -> None:
         text = asked.accept()
         if text is not None:
@@ -98,7 +129,7 @@ class Dialogs:
     def letters(self, text: str) -> None:
         """Take letters."""
         asked = self._desk.asked
-        if isinstance(asked, ListQuestion) and text != self._opened_by:
+        if not isinstance(asked, Question) and asked is not None and text != self._opened_by:
             asked.type(text)
         self._opened_by = ""
 
@@ -107,7 +138,9 @@ class Dialogs:
         asked, hit = self._desk.asked, self._hit(pixel)
         if asked is not self._drawn:
             return
-        if isinstance(asked, Question):
+        if isinstance(asked, ImportQuestion):
+            self._click_on_import(asked, pixel)
+        elif isinstance(asked, Question):
             if hit is not None and hit >= 0:
                 self._give(asked.answers[hit].call)
         elif asked is not None:
@@ -120,7 +153,7 @@ class Dialogs:
     def wheel(self, amount: int) -> None:
         """Move through a list."""
         asked = self._desk.asked
-        if isinstance(asked, ListQuestion):
+        if isinstance(asked, ListQuestion | ImportQuestion):
             asked.move(-amount)
 
     def hover(self, pixel: tuple[int, int]) -> None:
@@ -140,6 +173,9 @@ class Dialogs:
         asked = self._desk.asked
         self._boxes, self._drawn = [], asked
         if asked is None:
+            return
+        if isinstance(asked, ImportQuestion):
+            self._import.draw(screen, asked, layout.scale, theme)
             return
         dim(screen, theme)
         if isinstance(asked, Question):

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
+from robocov_app.editor import import_process
 from robocov_app.editor.asking import Answer, FileQuestion, Picker, Question
 from robocov_app.editor.background import picture_laid
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.drafts import opened_elsewhere
 from robocov_app.editor.edits import underlaid
 from robocov_app.editor.files import ChangedError
+from robocov_app.editor.importing import ImportQuestion
 from robocov_app.editor.paper import SUFFIX, Paper
 from robocov_app.editor.settings import MOST_RECENT
+from robocov_app.live.latest import DirectWorker, LatestWorker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from robocov_app.editor.desk import Desk
     from robocov_app.editor.drafts import Draft
+    from robocov_app.editor.import_process import Imported
+    from robocov_app.editor.importing import Worker
+    from robocov_app.importers import Importer
+
+_PATIENCE = 2.0
+"""Seconds after which an import with settings that have changed since is given up."""
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
@@ -36,11 +46,20 @@ class Documents:
         Where drafts are kept.
     fit : callable
         Shows the whole map.
+    patient : bool
+        Imports are waited for.
     """
 
-    def __init__(self, desk: Desk, drafts: Path | None, fit: Callable[[], object]) -> None:
-        self.desk, self.drafts, self._fit = desk, drafts, fit
+    def __init__(
+        self, desk: Desk, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
+    ) -> None:
+        self.desk, self.drafts, self._fit, self._patient = desk, drafts, fit, patient
         self.leaving = False
+
+    def close(self) -> None:
+        """End what is going on beside the window."""
+        if isinstance(self.desk.asked, ImportQuestion):
+            self.desk.asked.close()
 
     def deeds(self) -> dict[str, Callable[[], object]]:
         """Return what the actions do, by their names."""
@@ -88,11 +107,12 @@ class Documents:
     def _leave_for_good(self) -> None:
         self.leaving = True
 
-    def _put(self, paper: Paper) -> None:
+    def _put(self, paper: Paper, words: str = "") -> None:
         self.desk.put(paper)
         self._fit()
         if paper.path is not None:
             self.remember(paper.path)
+        self.desk.say(words)
 
     # opening
 
@@ -137,20 +157,26 @@ class Documents:
             return
         if opened_elsewhere(self.drafts, path):
             raise MapError(f"{path.name}: another editor has it open")
-        paper, words, report = opened(path, self.drafts)
+        found = opened(path, self.drafts)
+        if isinstance(found, Paper):
+            self.leave(lambda: self._put(found, heading(found)))
+        else:
+            self.ask_import(path, found)
 
-        def put() -> None:
-            self._put(paper)
-            self.desk.say(words)
-            self.show_report(path, report)
+    def ask_import(self, path: Path, importer: Importer) -> None:
+        """Ask how a foreign file is to be imported, and show what would come of it."""
 
-        self.leave(put)
+        def put(imported: Imported) -> None:
+            sketch = Sketch.from_environment(imported.environment)
+            paper = Paper(sketch, self.drafts, saved=False, stem=path.stem)
+            self.leave(lambda: self._put(paper, f"imported: {path.name}, not saved yet"))
 
-    def show_report(self, path: Path, report: Sequence[str]) -> None:
-        """Show what an import has done."""
-        if report:
-            answers = (Answer("All right", "a", _nothing),)
-            self.desk.asked = Question(f"Imported {path.name}", "\n".join(report), answers)
+        self.desk.asked = ImportQuestion(path, importer, self._import_worker(), put)
+
+    def _import_worker(self) -> Worker:
+        if self._patient:
+            return DirectWorker(import_process.SERVICE)
+        return LatestWorker("robocov_app.editor.import_process", "imports", patience=_PATIENCE)
 
     def recover(self, draft: Draft) -> None:
         """Go on with work that was left behind.
@@ -246,14 +272,22 @@ class Documents:
             self.desk.asked = Question("Replace the file?", f"{path} is there already.", answers)
             return None
         report = export_map(self.desk.sketch.environment(), path)
-        said = [f"exported: {', '.join(str(file) for file in report.files)}", *report.dropped]
+        said = [
+            f"exported: {', '.join(str(file) for file in report.files)}",
+            *report.warnings,
+            *report.dropped,
+        ]
         return "; ".join(said)
 
     # what happens on the disk
 
     def look(self) -> None:
-        """Ask what to do when something else has changed or removed the file."""
+        """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
         desk = self.desk
+        if isinstance(asked := desk.asked, ImportQuestion) and (imported := asked.poll()) is not None:
+            asked.close()
+            desk.asked = None
+            desk.attempt(lambda: asked.call(imported))
         if desk.asked is not None:
             return
         state = desk.paper.look(desk.now)
@@ -335,8 +369,8 @@ def _from_map(path: Path, of: Path | None) -> str:
     return path.as_posix()
 
 
-def opened(path: Path, drafts: Path | None) -> tuple[Paper, str, list[str]]:
-    """Return the document of a file, what to tell, and what importing it has done, if it was imported.
+def opened(path: Path, drafts: Path | None) -> Paper | Importer:
+    """Return the document of a file; or the format of one that has to be imported.
 
     Raises
     ------
@@ -344,18 +378,25 @@ def opened(path: Path, drafts: Path | None) -> tuple[Paper, str, list[str]]:
         When it cannot be read.
     """
     if path.suffix.lower() == SUFFIX and not path.exists():
-        return Paper.new(drafts, path), f"a new map, {path.name}: 10 x 10 m; B draws another boundary", []
+        return Paper.new(drafts, path)
     try:
-        paper = Paper.opened(path, drafts)
+        return Paper.opened(path, drafts)
     except MapError as error:
-        if path.suffix.lower() == SUFFIX and _is_map(path):
-            raise
-        imported = _imported(path, drafts)
-        if imported is None:
-            raise error from None
-        return imported
-    words = f"{paper.title}: opened as a copy" if paper.path is None else f"opened: {paper.title}"
-    return paper, words, []
+        if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
+            from robocov_app.importers import detect
+
+            with suppress(MapError):
+                return detect(path)
+        raise error from None
+
+
+def heading(paper: Paper) -> str:
+    """Return what is said of a document that was opened."""
+    if paper.path is None:
+        return f"{paper.title}: opened as a copy"
+    if not paper.path.exists():
+        return f"a new map, {paper.path.name}: 10 x 10 m; B draws another boundary"
+    return f"opened: {paper.title}"
 
 
 def _is_map(path: Path) -> bool:
@@ -364,21 +405,6 @@ def _is_map(path: Path) -> bool:
             return b"robocov-map" in file.read(4096)
     except OSError:
         return True
-
-
-def _imported(path: Path, drafts: Path | None) -> tuple[Paper, str, list[str]] | None:
-    """Return a foreign map as a document without a file, None where no importer knows it."""
-    from robocov_app.importers import detect, import_map
-
-    if not path.is_file():
-        return None
-    try:
-        detect(path)
-    except MapError:
-        return None
-    environment, report, _ = import_map(path)
-    paper = Paper(Sketch.from_environment(environment), drafts, saved=False, stem=path.stem)
-    return paper, f"imported: {path.name}, not saved yet", report.lines()
 
 
 def _nothing() -> None:

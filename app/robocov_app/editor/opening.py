@@ -11,7 +11,7 @@ from robocov_app.demo.opening import display, fitting, screen_scale
 from robocov_app.demo.settings import loaded, save_settings, settings_file
 from robocov_app.editor.asking import Answer, Question
 from robocov_app.editor.desk import Desk
-from robocov_app.editor.documents import lay_under, opened
+from robocov_app.editor.documents import heading, lay_under, opened
 from robocov_app.editor.drafts import discarded, drafts_folder, left_behind, opened_elsewhere
 from robocov_app.editor.paper import Paper
 from robocov_app.editor.pasteboard import OwnPasteboard, SystemPasteboard
@@ -98,7 +98,8 @@ class EditorOpening:
         if self.path is not None and not self.headless and opened_elsewhere(drafts, self.path):
             raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
         # what is wrong with the file is told before a window flashes up
-        paper, words, report = (Paper.new(drafts), "", []) if self.path is None else opened(self.path, drafts)
+        found = Paper.new(drafts) if self.path is None else opened(self.path, drafts)
+        paper = found if isinstance(found, Paper) else Paper.new(drafts)
         ended = False
         readings = DirectReadings() if self.headless else ReadoutWorker()
         try:
@@ -107,13 +108,13 @@ class EditorOpening:
                 settings, trouble = loaded(EditorSettings, file)
                 desk = self._desk(paper, readings, settings)
                 window = self._opened(desk, settings, drafts)
-                desk.say(trouble or words)
-                if self.path is not None:
-                    window.documents.show_report(self.path, report)
-                    if paper.path is not None:
-                        window.documents.remember(paper.path)
+                desk.say(trouble or (heading(paper) if self.path is not None and paper is found else ""))
+                if paper.path is not None:
+                    window.documents.remember(paper.path)
                 if not self.headless:
                     offer(window, left_behind(drafts))
+                if self.path is not None and not isinstance(found, Paper):
+                    window.documents.ask_import(self.path, found)
                 try:
                     yield window
                     save_settings(settings_of(window, settings, self.scale), file)

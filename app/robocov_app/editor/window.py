@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from robocov_app.editor.arena import Arena
 from robocov_app.editor.deeds import deeds
 from robocov_app.editor.dialogs import Commands, Dialogs, Menu
 from robocov_app.editor.documents import Documents
+from robocov_app.editor.importing import ImportQuestion
 from robocov_app.editor.keyboard import Keyboard
 from robocov_app.editor.menus import offered
 from robocov_app.editor.panel import TABS, Panel
@@ -33,7 +35,6 @@ from robocov_app.view.theme import theme_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from robocov.environment import Environment
     from robocov_app.editor.desk import Desk
@@ -74,7 +75,7 @@ class EditorWindow:
         self.windowed: tuple[int, int] | None = None
         self.screen = shown(size)
         self.arena = Arena(desk)
-        self.documents = Documents(desk, drafts, self.arena.fit)
+        self.documents = Documents(desk, drafts, self.arena.fit, patient=patient)
         self.panel = Panel(desk, self.do)
         self.palette = Commands()
         self.dialogs = Dialogs(desk)
@@ -112,6 +113,7 @@ class EditorWindow:
         if self.trial is not None:
             self.trial.close()
         self.team.close()
+        self.documents.close()
         self.desk.snapper.close()
 
     def frame(self, seconds: float) -> None:
@@ -334,8 +336,13 @@ class EditorWindow:
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
         if event.type == pygame.QUIT:
+            if isinstance(self.desk.asked, ImportQuestion):
+                self.dialogs.key("escape")
             if not self.dialogs.open:
                 self.do("quit")
+        elif event.type == pygame.DROPFILE:
+            if not self.dialogs.open and self.trial is None:
+                self.desk.attempt(lambda: self.documents.open(Path(event.file)))
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.KEYDOWN and self.menu is not None:

@@ -41,6 +41,7 @@ __all__ = [
     "detect",
     "import_map",
     "importer",
+    "read_map",
     "shaped",
 ]
 
@@ -119,6 +120,18 @@ def import_map(
     ParameterError
         When the format is unknown, or an option is given that it does not have.
     """
+    foreign = read_map(path, format=format, options=options)
+    environment, report = shaped(foreign, shaping, one_line(path))
+    return environment, report, foreign
+
+
+def read_map(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002 - as the option is called
+    options: ReadOptions = ReadOptions(),
+) -> ForeignMap:
+    """Return the foreign map at `path` as it was read; parameters and errors are those of `import_map`."""
     path = Path(path)
     chosen = detect(path) if format is None else importer(format)
     strange = [name for name in options.given() if name not in chosen.options]
@@ -127,6 +140,4 @@ def import_map(
         raise ParameterError(
             f"--{strange[0]}: no option of the format {chosen.name}, whose options are: {known}"
         )
-    foreign = chosen.read(path, options)
-    environment, report = shaped(foreign, shaping, one_line(path))
-    return environment, report, foreign
+    return chosen.read(path, options)

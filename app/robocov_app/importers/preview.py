@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.environment.passages import Gap, narrowest_gap
+from robocov_app.importers.comparison import Comparison, compare
 from robocov_app.plots.arena import draw_map, map_handles
 from robocov_app.plots.figure_files import check_figure_path, save_figure
 from robocov_app.plots.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.environment import Environment
+    from robocov.environment.passages import Gap
     from robocov_app.importers.foreign import ForeignMap
     from robocov_app.importers.report import ImportReport
 
@@ -41,14 +41,8 @@ _MARK = 0.55
 _MOST_LINES = 12
 """Of the report; what is beyond is counted."""
 
-_MOST_VERTICES = 20_000
-"""Of a map whose narrowest passage is looked for: that takes seconds then."""
-
 _RING = 20.0
 """Size of the ring around a passage that is too short to be seen, in points."""
-
-_SLIVER = 2.0
-"""What is narrower than this, in tolerances, is a wall that moved, and nothing that was lost."""
 
 
 def preview(
@@ -101,7 +95,7 @@ def plot_import(
     matplotlib Figure
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
-    compared = _compared(foreign, environment, report)
+    compared = compare(foreign, environment, report)
     captions = (
         ("as read", f"{_number(report.vertices_read)} vertices, {_number(compared.before.area)} m² free"),
         ("as imported", f"{_number(report.vertices_kept)} vertices, {_number(compared.after.area)} m² free"),
@@ -137,38 +131,6 @@ def plot_import(
             y = page.size[1] - (_LINE * k + 16) * s
             page.text(line, left, y, points=SMALL, colour=theme.faint)
         return page.figure
-
-
-@dataclass(frozen=True, eq=False)
-class _Compared:
-    """Free space as it was read and as it became, and what differs; areas in metres."""
-
-    before: BaseGeometry
-    after: BaseGeometry
-    lost: BaseGeometry
-    opened: BaseGeometry
-    region: BaseGeometry
-    gap: Gap | None
-
-    @property
-    def bounds(self) -> Box:
-        x, y, right, top = self.region.bounds
-        return x, y, right, top
-
-
-def _compared(foreign: ForeignMap, environment: Environment, report: ImportReport) -> _Compared:
-    before, after = foreign.free, environment.free
-    if not before.is_valid:
-        before = shapely.make_valid(before, method="structure", keep_collapsed=False)
-    everything = [before, after, environment.region.polygon, foreign.boundary or before]
-    return _Compared(
-        before,
-        after,
-        lost=_changed(before, after, report.tolerance),
-        opened=_changed(after, before, report.tolerance),
-        region=shapely.GeometryCollection(everything).convex_hull,
-        gap=narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
-    )
 
 
 def _laid_out(
@@ -212,17 +174,6 @@ def _arena(page: Page, box: Box, bounds: Box) -> Axes:
     axes.set_ylim(bounds[1], bounds[3])
     axes.set_axis_off()
     return axes
-
-
-def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> BaseGeometry:
-    """Return what is in the first and not in the second, without the slivers along walls that moved."""
-    parts = shapely.get_parts(shapely.difference(first, second))
-    parts = np.array([part for part in parts if isinstance(part, Polygon) and part.area > 0.0], dtype=object)
-    if not len(parts):
-        return shapely.MultiPolygon()
-    # of a long strip this is its width
-    width = 2.0 * shapely.area(parts) / shapely.length(parts)
-    return shapely.MultiPolygon(parts[width > max(_SLIVER * tolerance, 1e-3) / 2].tolist())
 
 
 def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
@@ -299,7 +250,7 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 9999.5 else f"{value:,.0f}".replace(",", "\u202f")
 
 
-def _handles(environment: Environment, theme: Theme, compared: _Compared) -> list[Artist]:
+def _handles(environment: Environment, theme: Theme, compared: Comparison) -> list[Artist]:
     """Return the legend's entries for what is drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

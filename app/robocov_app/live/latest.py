@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
+import time
 import traceback
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, Generic, TypeAlias, TypeVar
@@ -46,10 +48,20 @@ class LatestWorker(Generic[_Answer]):
     teller : callable or None
         Gives for each new process what turns a question into what that one is told; None tells it as it is.
         It is called on a thread, for the questions in their order.
+    patience : float, s
+        A process that has worked longer on an older question than that is ended for a newer one.
     """
 
-    def __init__(self, module: str, doing: str, teller: Callable[[], _Tell] | None = None) -> None:
-        self._module, self._doing, self._teller = module, doing, teller
+    def __init__(
+        self,
+        module: str,
+        doing: str,
+        teller: Callable[[], _Tell] | None = None,
+        *,
+        patience: float = math.inf,
+    ) -> None:
+        self._module, self._doing, self._teller, self._patience = module, doing, teller, patience
+        self._since = 0.0
         self._number = 0
         self._answered = 0
         self._talk: _Talk | None = None
@@ -62,10 +74,13 @@ class LatestWorker(Generic[_Answer]):
 
     def put(self, question: object) -> None:
         """Ask; an older question that is not answered yet is not wanted any more."""
+        now = time.monotonic()
+        if not self.busy:
+            self._since = now
         talk = self._talk
-        if talk is None or talk.ended:
-            if talk is not None:
-                talk.close()
+        if talk is None or talk.ended or now - self._since > self._patience:
+            self.close()
+            self._since = now
             talk = self._talk = _Talk(self._module, self._teller() if self._teller else None)
         self._number += 1
         talk.ask(self._number, question)
@@ -187,3 +202,31 @@ class Service:
                 self._questions.append(question)
                 self._asked.notify()
         os._exit(0)
+
+
+class DirectWorker(Generic[_Answer]):
+    """A `LatestWorker` that answers at once: for pictures without a display, and for tests."""
+
+    busy = False
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._reply = Reply(0, None)
+
+    @property
+    def trouble(self) -> str:
+        """Why the last question was not answered."""
+        return self._reply.trouble
+
+    def put(self, question: object) -> None:
+        """Ask."""
+        self._reply = self._service.reply([(0, question)])
+
+    def poll(self) -> _Answer | None:
+        """Return the answer, once."""
+        answer: _Answer | None = self._reply.answer
+        self._reply = Reply(0, None, self._reply.trouble)
+        return answer
+
+    def close(self) -> None:
+        """There is nothing to end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from robocov_app.editor import edits
 from robocov_app.editor.asking import FileQuestion, Picker, Question
 from robocov_app.editor.drafts import FOLDER as DRAFTS
 from robocov_app.editor.drafts import left_behind
+from robocov_app.editor.importing import ImportQuestion
 from robocov_app.editor.opening import EditorOpening, offer
 from robocov_app.editor.paper import Paper
 
@@ -347,13 +349,18 @@ def test_a_broken_file_is_told_before_a_window_opens(places: Path, capsys) -> No
     assert main(["edit", str(places / "draft.json"), "--screenshot", str(target)]) == 0
 
 
-def test_a_map_of_another_format_is_imported_with_its_report(places: Path) -> None:
+def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> None:
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
     with opening(places, places / "flat.json").window() as window:
+        asked = window.desk.asked
+        assert isinstance(asked, ImportQuestion) and asked.path.name == "flat.json"
+        asked.accepted = True
+        end = time.monotonic() + 60.0
+        while window.desk.asked is not None and time.monotonic() < end:
+            window.frame(0.01)
         assert window.desk.paper.path is None and window.desk.paper.unsaved
-        assert window.desk.asked is not None and "flat.json" in window.desk.asked.title
-        assert window.desk.sketch.boundary is not None
+        assert window.desk.sketch.environment().free_area == 12.0
         window.documents.leaving = True
 
 

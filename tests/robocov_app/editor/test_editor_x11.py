@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import COMMAND
+from PIL import Image
 from x11_hands import MARKS, PATIENCE, Hands, ended, invisible_display, run_window, said
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
@@ -202,3 +203,28 @@ def test_copies_go_from_one_window_to_another(display: str, tmp_path: Path) -> N
             assert ended(second.process) == 0, said(second.process)
     (pasted,) = load_map(tmp_path / "second.json").obstacles
     assert set(pasted.vertices) == {(1, 1), (3, 1), (3, 3), (1, 3)}
+
+
+def test_a_picture_is_imported_with_the_room_that_was_clicked(display: str, tmp_path: Path) -> None:
+    walls = np.zeros((100, 200), dtype=np.uint8)
+    walls[10:90, 10:110] = walls[10:90, 120:190] = 255
+    Image.fromarray(walls).save(tmp_path / "plan.png")
+    with edited(display, tmp_path, tmp_path / "plan.png") as hands:
+        hands.type("0.1")
+
+        def left_out() -> tuple[float, float]:
+            """Return the middle of what is red, px; (0, 0) for nothing."""
+            red, green, blue = np.moveaxis(hands.shot(), 2, 0)
+            found = np.argwhere((red > 180) & (green < 160) & (blue < 160))
+            return (0.0, 0.0) if len(found) < 1000 else (np.median(found[:, 1]), np.median(found[:, 0]))
+
+        hands.until(lambda: left_out()[0], "room that is left out")
+        x, y = left_out()
+        hands.click(x, y)
+        hands.until(lambda: 0 < left_out()[0] < x - 50, "other room that is left out")
+        hands.key("Return", "ctrl+s")
+        hands.key("Return")
+        hands.until((tmp_path / "plan.json").exists, "saved map")
+        hands.key("ctrl+q")
+        assert ended(hands.process) == 0, said(hands.process)
+    assert load_map(tmp_path / "plan.json").free_area == pytest.approx(56.0)
