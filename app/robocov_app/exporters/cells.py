@@ -72,7 +72,7 @@ class Grid:
         """Return the cells amid what lies outside of polygons and is too thin to have a centre in it.
 
         The grid-intersection digitization of thin things (Klette and Rosenfeld 2004, Digital Geometry,
-        section 2.3): of each interval outside of the polygons on a line of centres, along rows and along
+        chapter 2): of each interval outside of the polygons on a line of centres, along rows and along
         columns, one cell. These and the cells with their centre outside hang together, over their corners,
         where what is outside does.
         """
@@ -84,7 +84,9 @@ class Grid:
             # on each line they go in and out by turns
             ends = np.flatnonzero((np.arange(len(line)) - np.searchsorted(line, line)) % 2)
             ends = ends[:-1] if len(ends) and ends[-1] == len(line) - 1 else ends
-            ends = ends[(line[ends] == line[ends + 1]) & (np.ceil(at[ends]) == np.ceil(at[ends + 1]))]
+            # where they contain one centre it is that cell, however both ways of counting have rounded
+            narrow = np.ceil(at[ends + 1]) - np.ceil(at[ends]) <= 1
+            ends = ends[(line[ends] == line[ends + 1]) & narrow]
             middle = np.rint((at[ends] + at[ends + 1]) / 2).astype(np.intp)
             cells[line[ends], middle] = True
         return found

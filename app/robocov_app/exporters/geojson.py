@@ -50,7 +50,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
             features.append(_feature(kind, name, [rings(part) for part in parts]))
     notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
     if origin is not None:
-        notes = [f"in degrees about longitude {origin[0]:g}, latitude {origin[1]:g}"]
+        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
     if across:
         notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
     if lost:
