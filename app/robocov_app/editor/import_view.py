@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 _COLUMN, _ROW, _LINE, _ABOVE = 300, 25, 17, 40
 """Pixels at scale 1: of the options, of a row of them, of a line of the report, above each map."""
 
-_MOST_LINES = 7
+_FEWEST_LINES = 7
+"""Of the report there is room for so many, and for more below maps that are wide."""
 
 _MARK = 150
 """Opacity of what is marked, of 255."""
@@ -68,14 +69,17 @@ class ImportView:
         screen.fill(mix(theme.panel, theme.ink, 0.15), (edge, inner.top, max(1, round(scale)), inner.height))
         right = pygame.Rect(edge + round(16 * scale), inner.top, 0, inner.height)
         right.width = inner.right - right.left
-        lines = self._draw_report(screen, asked, right, scale, theme)
-        right.height -= round((_LINE * (lines + 1) + 14) * scale)
+        maps = right.copy()
+        maps.height -= round((_LINE * (_FEWEST_LINES + 1) + 14) * scale)
         if asked.imported is not None:
-            self._draw_maps(screen, asked, asked.imported, right, scale, theme)
+            maps = self._draw_maps(screen, asked, asked.imported, maps, scale, theme)
         else:
             self._cameras = []
             words = label("nothing to show" if asked.trouble else "reading…", round(13 * scale), theme.faint)
-            screen.blit(words, words.get_rect(center=right.center))
+            screen.blit(words, words.get_rect(center=maps.center))
+        below = maps.bottom + round(14 * scale)
+        said = pygame.Rect(right.left, below, right.width, right.bottom - below)
+        self._draw_report(screen, asked, said, scale, theme)
 
     # options
 
@@ -152,23 +156,22 @@ class ImportView:
 
     def _draw_report(
         self, screen: pygame.Surface, asked: ImportQuestion, box: pygame.Rect, scale: float, theme: Theme
-    ) -> int:
-        """Draw the report, or what is wrong, at the foot of a box; return how many lines it has."""
+    ) -> None:
+        """Draw the report, or what is wrong; and at the foot of the box what can be done."""
         small = round(11.5 * scale)
         said = asked.imported.report.lines() if asked.imported is not None else []
         ink = mix(theme.panel, theme.ink, 0.85)
         if asked.trouble:
             said, ink = [asked.trouble], theme.trajectory
         lines = [line for each in said for line in wrapped(each, small, box.width)]
-        if len(lines) > _MOST_LINES:
-            lines = [*lines[: _MOST_LINES - 1], f"and {len(lines) - _MOST_LINES + 1} lines more"]
+        most = int(box.height / (_LINE * scale)) - 1
+        if len(lines) > most:
+            lines = [*lines[: most - 1], f"and {len(lines) - most + 1} lines more"]
         hint = "importing…" if asked.busy and asked.imported is not None else _HINT
         words = label(shortened(hint, round(11 * scale), box.width), round(11 * scale), theme.faint)
         screen.blit(words, words.get_rect(bottomleft=box.bottomleft))
-        top = box.bottom - round(_LINE * (_MOST_LINES + 1) * scale)
         for k, line in enumerate(lines):
-            screen.blit(label(line, small, ink), (box.left, top + round(_LINE * k * scale)))
-        return _MOST_LINES
+            screen.blit(label(line, small, ink), (box.left, box.top + round(_LINE * k * scale)))
 
     def _draw_maps(
         self,
@@ -178,7 +181,8 @@ class ImportView:
         box: pygame.Rect,
         scale: float,
         theme: Theme,
-    ) -> None:
+    ) -> pygame.Rect:
+        """Draw them at the top of a box; return where they are."""
         low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
         aspect, above, gap = (high_x - low_x) / (high_y - low_y), round(_ABOVE * scale), round(20 * scale)
         columns = columns_for(2, aspect, box.size, above)
@@ -209,6 +213,7 @@ class ImportView:
                 veil = pygame.Surface(view[2:], pygame.SRCALPHA)
                 veil.fill((*theme.panel, 140))
                 screen.blit(veil, view[:2])
+        return pygame.Rect(box.topleft, (box.width, corners[1][1] + above + high - box.top))
 
     def _draw_captions(
         self,
