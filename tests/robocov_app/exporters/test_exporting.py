@@ -155,7 +155,8 @@ def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
     assert back.free.is_valid
     assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
     assert len(rooms(back.free, DEFAULT_RADIUS)) == len(rooms(environment.free, DEFAULT_RADIUS))
-    for ring in shapely.get_rings([*back.free.geoms, *(shape.polygon for shape in back.obstacles)]):
+    drawn = [back.boundary_polygon, *(shape.polygon for shape in back.obstacles), *back.free.geoms]
+    for ring in shapely.get_rings(drawn):
         assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3
     assert report.warnings == ()
 
