@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-import numpy as np
+from pydantic import Field
 
 from robocov.environment import CircleObstacle
-from robocov.errors import InputError, shown
+from robocov.errors import InputError
+from robocov.files.documents import Document, read_document, wanted
 from robocov.files.result_folder import settle
 from robocov.metrics.results import read_history
 from robocov.record import Record
@@ -18,6 +18,21 @@ from robocov.record import Record
 if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
+
+
+class ComparisonDocument(Document):
+    """The content of ``comparison.json``.
+
+    Attributes
+    ----------
+    folders : list of str
+        Of the runs, in that of the comparison.
+    runs : list of dict
+        Their figures; none as long as the comparison goes on.
+    """
+
+    folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), wanted("the name of a folder")]]
+    runs: list[dict[str, Any]] = Field([])
 
 
 class Saved(NamedTuple):
@@ -80,12 +95,8 @@ def load_saved(path: Path) -> list[Saved]:
 def roster_of(record: Record) -> Roster:
     """Return who is who in a record of a session in the window; in others, robots are numbered from 1."""
     environment, session = record.environment, record.session
-    plain = Roster(environment, tuple(range(1, len(record.team) + 1)), {})
-    try:
-        numbers = tuple(int(number) for number in session["robots"])
-        failed = {int(number): (float(x), float(y)) for number, (x, y) in session["failed"].items()}
-    except (KeyError, TypeError, ValueError, AttributeError):
-        return plain
+    numbers = tuple(session.get("robots", range(1, len(record.team) + 1)))
+    failed = {int(number): (x, y) for number, (x, y) in session.get("failed", {}).items()}
     wrecks = {wreck_name(number): number for number in failed}
     standing = tuple(
         shape
@@ -98,7 +109,7 @@ def roster_of(record: Record) -> Roster:
         or len(known) != len(numbers) + len(failed)
         or len(environment.obstacles) - len(standing) != len(failed)
     ):
-        return plain
+        return Roster(environment, tuple(range(1, len(record.team) + 1)), {})
     return Roster(replace(environment, obstacles=standing), numbers, failed)
 
 
@@ -110,22 +121,12 @@ def wreck_name(number: int) -> str:
 def _parts(folder: Path) -> list[Path]:
     """Return the folders of a comparison's runs; of one that was killed, those that are there."""
     path = folder / "comparison.json"
-    try:
-        content: Any = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    names = content.get("folders") if isinstance(content, dict) else None
-    if not isinstance(content, dict) or content.get("format") != "robocov-comparison":
-        raise InputError(f"{path}: not the file of a comparison")
-    if not isinstance(names, list) or not all(
-        isinstance(name, str) and name and Path(name).name == name != ".." for name in names
-    ):
-        raise InputError(f"{path}: folders: {shown(names)}, but names of folders were wanted")
-    parts = [folder / name for name in names]
+    content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
+    parts = [folder / name for name in content.folders]
     linked = next((part for part in parts if part.is_symlink()), None)
     if linked is not None:
         raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
-    if not content.get("runs"):
+    if not content.runs:
         parts = [part for part in parts if (part / "run.json").is_file()]
     if not parts:
         raise InputError(f"{path}: there is no run in it")
@@ -133,17 +134,5 @@ def _parts(folder: Path) -> list[Path]:
 
 
 def _load_run(folder: Path) -> Saved:
-    record = Record.load(folder)
-    path = folder / "record.npz"
-    if not len(record) or not len(record.team):
-        raise InputError(f"{path}: it is empty")
-    for name in ("time", "positions", "velocities", "forces"):
-        if not np.isfinite(getattr(record, name)).all():
-            raise InputError(f"{path}: {name}: not all of it are finite numbers")
-    if record.time.ndim != 1 or (np.diff(record.time) <= 0).any():
-        raise InputError(f"{path}: time: ascending numbers were wanted")
-    return Saved(folder, record, _load_history(folder / "cost.csv"))
-
-
-def _load_history(path: Path) -> CostHistory | None:
-    return read_history(path) if path.exists() else None
+    history = folder / "cost.csv"
+    return Saved(folder, Record.load(folder), read_history(history) if history.exists() else None)

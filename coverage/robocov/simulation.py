@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable, Iterator
 from copy import deepcopy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,9 @@ from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.conditions.communication import Inbox
 from robocov.conditions.perception import Perception, of_working
-from robocov.controllers import CONTROLLERS, informed
+from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller
+from robocov.controllers.faults import fault_of
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.observation import Decision, Observations, Snapshot
@@ -113,6 +112,7 @@ class Simulation:
         check_starts(environment.at(time), positions, self.team, slack, there)
         self.environment = environment
         self.controller = controller
+        self._built_in = type(controller) in CONTROLLERS.values()
         self.dt = dt
         self._conditions = conditions
         walls, moving = solid_pieces(environment), movers(environment)
@@ -130,6 +130,12 @@ class Simulation:
         self._steps = 0
         self._law = self._asked(lambda: informed(controller, environment.standing))
         self._memory = self._asked(lambda: self._law.begin(environment.region, self.team))
+        self._scanning: Scanning | None = self._asked(lambda: getattr(controller, "scanning", None))
+        if not isinstance(self._scanning, Scanning | None):
+            raise ParameterError(
+                f"controller {controller.name!r}: scanning: {shown(self._scanning)}, "
+                f"but a Scanning was wanted"
+            )
         self._snapshot: Snapshot | None = None
 
     def __repr__(self) -> str:
@@ -194,7 +200,10 @@ class Simulation:
         return self._snapshot
 
     def _decide(self, seen: Observations) -> Decision:
-        decision = self._asked(lambda: self._law.decide(seen, self._memory))
+        # a user's controller may change what it is given, and is asked again by copies of the run
+        ours = self._built_in or not remembers(self.controller)
+        memory = self._memory if ours else _copied(self._memory)
+        decision = self._asked(lambda: self._law.decide(seen, memory))
         return checked_decision(decision, len(self.team), self.controller.name, seen.time)
 
     def _asked(self, question: Callable[[], Any]) -> Any:
@@ -204,15 +213,10 @@ class Simulation:
         except RobocovError:
             raise
         except (Exception, SystemExit) as error:
-            if type(self.controller) in CONTROLLERS.values():
+            if self._built_in:
                 raise
-            frames = traceback.extract_tb(error.__traceback__)
-            home = str(Path(__file__).parent)
-            theirs = [frame for frame in frames if not frame.filename.startswith(home)] or frames
-            raise ParameterError(
-                f"controller {self.controller.name!r}: {type(error).__name__}: {error} "
-                f"({Path(theirs[-1].filename).name}, line {theirs[-1].lineno}) at {self.time:.3f} s"
-            ) from error
+            where, when = f"controller {self.controller.name!r}", f" at {self.time:.3f} s"
+            raise fault_of(where, error, when) from error
 
     def observe(self) -> Observations:
         """Return what each robot knows now."""
@@ -244,7 +248,7 @@ class Simulation:
 
     def _scanned(self, positions: Array) -> Scans | None:
         """Return a scan of each robot, in the steps in which the controller wants one."""
-        scanning: Scanning | None = getattr(self.controller, "scanning", None)
+        scanning = self._scanning
         if scanning is None or self._steps % scanning.every(self.dt):
             return None
         distances, hit = self._sensor.scans(positions, scanning.rays, self.team.sensing_range)
@@ -401,6 +405,14 @@ class Simulation:
         if controller is None and len(twin.team) == len(self.team):
             twin._memory = deepcopy(self._memory)
         return twin
+
+
+def _copied(memory: Any) -> Any:
+    """Return a copy of what a user's controller remembers; itself where there is no way to copy it."""
+    try:
+        return deepcopy(memory)
+    except Exception:
+        return memory
 
 
 def check_dt(dt: float) -> None:

@@ -18,9 +18,10 @@ from shapely import GeometryCollection, LineString, Polygon
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.environment.starts import DiscStart, PointsStart
 from robocov.errors import MapError
+from robocov.files.documents import check_header
 from robocov.files.strictjson import located, one_line, parse, require_json
 from robocov.mapfile import density_of, dump_document, from_json, to_json
-from robocov.mapfile.models import FARTHEST, LARGEST, check_header
+from robocov.mapfile.models import FARTHEST, FORMAT, LARGEST, VERSION
 from robocov_app.editor.annotations import annotated, taken_apart
 from robocov_app.editor.background import Background
 from robocov_app.editor.plane import DECIMALS as DECIMALS
@@ -256,7 +257,7 @@ def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> 
     """
     where = one_line(where)
     require_json(document, where)
-    check_header(document, where)
+    check_header(document, where, FORMAT, VERSION)
     reader = PartReader(where)
     members = reader.members(document, (), _KEYS)
     boundary = members.get("boundary")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from robocov.conditions.parameters import (
     FAILING,
+    LIMITS,
     LOSS,
     POSITION,
     QUANTITIES,
@@ -20,6 +21,7 @@ from robocov.conditions.parameters import (
 
 __all__ = [
     "FAILING",
+    "LIMITS",
     "LOSS",
     "POSITION",
     "QUANTITIES",

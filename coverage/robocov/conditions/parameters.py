@@ -26,7 +26,7 @@ SOON = 1e-9
 
 _LONGEST = 1e6
 
-_LIMITS: dict[str, tuple[float, float, str, str]] = {
+LIMITS: dict[str, tuple[float, float, str, str]] = {
     # smallest, largest, unit, what it is called in run.json
     "loss": (0.0, 1.0, "", "loss"),
     "delay": (0.0, 1e3, "s", "delay_s"),
@@ -36,9 +36,10 @@ _LIMITS: dict[str, tuple[float, float, str, str]] = {
     "sensing_noise": (0.0, 1e3, "m", "sensing_noise_m"),
     "failure_rate": (0.0, 1e3, "1/s", "failure_rate_per_s"),
 }
-QUANTITIES = tuple(_LIMITS)
+"""What each condition that is a number may be."""
+QUANTITIES = tuple(LIMITS)
 """The conditions that are numbers."""
-UNITS = {name: unit for name, (_, _, unit, _) in _LIMITS.items()}
+UNITS = {name: unit for name, (_, _, unit, _) in LIMITS.items()}
 
 
 class Failure(NamedTuple):
@@ -234,7 +235,7 @@ class Conditions:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the conditions as plain JSON, units in the key names."""
-        plain: dict[str, Any] = {key: getattr(self, name) for name, (*_, key) in _LIMITS.items()}
+        plain: dict[str, Any] = {key: getattr(self, name) for name, (*_, key) in LIMITS.items()}
         plain["failures"] = [{"robot": each.robot, "time_s": each.time} for each in self.failures]
         plain["joins"] = [
             {
@@ -256,7 +257,7 @@ class Conditions:
             When a key is missing or a value cannot be used.
         """
         try:
-            given: dict[str, Any] = {name: plain[key] for name, (*_, key) in _LIMITS.items()}
+            given: dict[str, Any] = {name: plain[key] for name, (*_, key) in LIMITS.items()}
             given["failures"] = tuple(Failure(each["robot"], each["time_s"]) for each in plain["failures"])
             given["joins"] = tuple(
                 Join(each["robot"], each["time_s"], each["place_m"]) for each in plain["joins"]
@@ -312,7 +313,7 @@ def _decimal(text: str) -> float | None:
 
 
 def _quantity(name: str, value: object) -> float | None:
-    low, high, unit, _ = _LIMITS[name]
+    low, high, unit, _ = LIMITS[name]
     if value is None and name == "message_rate":
         return None
     number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)

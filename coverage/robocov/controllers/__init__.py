@@ -3,6 +3,10 @@
 A controller is named in one of three ways: a built-in name (``rapf``), a name that an installed
 package offers in the entry-point group ``robocov.controllers``, or a class in a file
 (``mine.py:MyController``).
+
+To find one of the latter two runs its code. So `controller_kind` and `make_controller` are for names that
+somebody has typed: on a command line, in a study file, in a program. A name that stands in a file of
+results is only looked up in `CONTROLLERS`, and shown by `short_name`.
 """
 
 from __future__ import annotations
@@ -10,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import importlib.abc
 import importlib.util
+import os
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -19,6 +24,7 @@ from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, Information, information_of, informed
 from robocov.controllers.dispersion import Dispersion
+from robocov.controllers.faults import MODULE, fault_of
 from robocov.controllers.gains import gain_values, gains_of, with_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.howard import Howard
@@ -62,6 +68,7 @@ __all__ = [
     "informed",
     "make_controller",
     "remembers",
+    "short_name",
 ]
 
 CONTROLLERS: dict[str, type[Any]] = {
@@ -87,6 +94,15 @@ def remembers(controller: object) -> bool:
     return type(controller) not in _FORGETFUL
 
 
+def short_name(controller: str) -> str:
+    """Return what a controller of any name is called, without loading it.
+
+    >>> short_name("rapf"), short_name("somewhere/mine.py:Mine")
+    ('RAPF', 'Mine')
+    """
+    return str(getattr(CONTROLLERS.get(controller), "label", controller.rpartition(":")[2]))
+
+
 def controller_kinds() -> dict[str, type[Any]]:
     """Return all controller classes by name: built in, then those that installed packages offer.
 
@@ -109,10 +125,8 @@ def _offered(only: str | None = None) -> dict[str, type[Any]]:
             kinds[entry.name] = _named(entry.load(), entry.name)
         except (Exception, SystemExit) as error:
             if only is not None:
-                raise ParameterError(
-                    f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded: "
-                    f"{type(error).__name__}: {error}"
-                ) from error
+                where = f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded"
+                raise fault_of(where, error) from error
     return kinds
 
 
@@ -126,7 +140,7 @@ def _named(kind: type[Any], name: str) -> type[Any]:
 
 
 def controller_kind(name: str, *, source: tuple[str, str] | None = None) -> type[Any]:
-    """Return the controller class called `name`, or the class of ``file.py:ClassName``.
+    """Return the controller class called `name`, or the class of ``file.py:ClassName``; this runs its code.
 
     Parameters
     ----------
@@ -190,11 +204,11 @@ def _kind_in_file(name: str, source: tuple[str, str] | None) -> type[Any]:
         raise ParameterError(
             f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted"
         )
-    path = Path(file).resolve() if source is None else Path(source[0])
+    path = Path(os.path.realpath(file)) if source is None else Path(source[0])
     if source is None and not path.is_file():
         raise ParameterError(f"controller {shown(name)}: there is no file {file}")
     # a name of its own for each file, so that two files called mine.py do not replace each other
-    module_name = f"robocov_user_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    module_name = f"{MODULE}{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
     loader = None if source is None else _Text(*source)
     spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
     if spec is None or spec.loader is None:
@@ -204,9 +218,7 @@ def _kind_in_file(name: str, source: tuple[str, str] | None) -> type[Any]:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise ParameterError(
-            f"controller {shown(name)}: {file} cannot be run: {type(error).__name__}: {error}"
-        ) from error
+        raise fault_of(f"controller {shown(name)}: {file} cannot be run", error) from error
     kinds = {
         key: value
         for key, value in vars(module).items()

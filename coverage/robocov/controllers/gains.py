@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-from robocov.errors import ParameterError, shown, unknown_name
+from robocov.controllers.faults import fault_of
+from robocov.errors import ParameterError, RobocovError, shown, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -60,9 +61,9 @@ class Gain:
             return None
         also = ", or null for no limit," if self.optional else ""
         wanted = f"but a number from {self.low:g} to {self.high:g} {self.unit}{also} was wanted"
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
-        if not self.low <= value <= self.high:
+        if not self.low <= value <= min(self.high, sys.float_info.max):
             raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
         return float(value)
 
@@ -186,7 +187,7 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     Raises
     ------
     ParameterError
-        On an unknown gain (with the nearest name) or a value out of range.
+        On an unknown gain (with the nearest name) a value out of range, or a class that raises something.
     """
     known = gains_of(kind)
     where = getattr(kind, "name", kind.__name__)
@@ -198,7 +199,7 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     given = {name: known[name].validated(value, where) for name, value in values.items()}
     try:
         return kind(**given)
-    except TypeError as error:
-        raise ParameterError(
-            f"{where}: cannot be made: {error}; a default for every field was wanted"
-        ) from error
+    except RobocovError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise fault_of(f"controller {where!r} cannot be made", error) from error

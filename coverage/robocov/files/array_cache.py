@@ -12,14 +12,14 @@ import io
 import os
 import struct
 import time
-import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import platformdirs
 
-from robocov.errors import OutputError
+from robocov.errors import InputError, OutputError
+from robocov.files.array_file import opened_arrays
 from robocov.files.atomic import written
 
 if TYPE_CHECKING:
@@ -85,6 +85,8 @@ class ArrayCache:
         """Return the arrays that were saved under a key, read-only, None if there are none that are whole."""
         path = self._path(key)
         try:
+            if path.stat().st_size > self.limit:
+                return None
             data = path.read_bytes()
         except OSError:
             return None
@@ -96,9 +98,9 @@ class ArrayCache:
             return None
         # what was written whole can be read, except by a numpy that knows less than the writer's
         try:
-            with np.load(io.BytesIO(payload), allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-        except (ValueError, OSError, EOFError, zipfile.BadZipFile):
+            with opened_arrays(io.BytesIO(payload), path.name, self.limit) as file:
+                arrays = {name: file.read(name) for name in file.headers}
+        except InputError:
             return None
         for array in arrays.values():
             array.setflags(write=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import Field, ValidationError
 
 from robocov.errors import unknown_name
+from robocov.files.documents import check_header
 from robocov.files.mistakes import MOST_LISTED, Mistake, place, refusal
 from robocov.files.strictjson import shown_json
 from robocov.mapfile import density_models
@@ -202,7 +203,7 @@ def validate(document: object, where: str) -> MapModel:
     MapError
         One line with the first structural error, and how many more there are.
     """
-    check_header(document, where)
+    check_header(document, where, FORMAT, VERSION)
     try:
         return MapModel.model_validate(document)
     except ValidationError as error:
@@ -234,28 +235,6 @@ def _refusal(error: ValidationError, where: str) -> MapError:
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     listed = [_mistake(detail) for detail in details[:MOST_LISTED]]
     return refusal(where, listed, len(details) - len(listed))
-
-
-def check_header(document: object, where: str) -> None:
-    """Refuse what is not a map, or is one of another version, before its content is looked at.
-
-    Raises
-    ------
-    MapError
-    """
-    if not isinstance(document, dict):
-        what = f"{shown_json(document)}, but a JSON object with a map was wanted"
-        raise refusal(where, [Mistake.at((), what)])
-    found = document.get("format")
-    if found != FORMAT:
-        state = shown_json(found) if "format" in document else "missing"
-        raise refusal(where, [Mistake.at(("format",), f'{state}, but "{FORMAT}" was wanted')])
-    version = document.get("version")
-    if type(version) is not int or version != VERSION:
-        state = shown_json(version) if "version" in document else "missing"
-        newer = type(version) is int and version > VERSION
-        advice = "; it needs a newer robocov" if newer else ""
-        raise refusal(where, [Mistake.at(("version",), f"{state}, but {VERSION} was wanted{advice}")])
 
 
 _CHOICES: dict[str, dict[str, type[Model]]] = {

@@ -243,9 +243,11 @@ def read_history(path: Path) -> CostHistory:
         raise InputError(f"{path}: line 1: the header {','.join(_HISTORY)} was wanted")
     rows = np.empty((len(lines) - 1, len(names)))
     for k, line in enumerate(lines[1:]):
+        cells = line.split(",")
         try:
-            rows[k] = [float(cell) for cell in line.split(",")]
-        except ValueError:
+            # a single number would do for all columns
+            rows[k] = [float(cells[column]) for column in range(max(len(cells), len(names)))]
+        except (ValueError, IndexError):
             raise InputError(
                 f"{path}: line {k + 2}: {shown(line)}, but {len(names)} numbers were wanted"
             ) from None

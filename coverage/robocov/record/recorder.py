@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robocov.controllers import gain_values
+from robocov.errors import ParameterError, shown
 from robocov.record.run_record import ARRAYS, Record
 
 if TYPE_CHECKING:
@@ -51,11 +53,18 @@ class Recorder:
         self._environment, self._team, self._controller, self._dt = environment, team, controller, dt
         self._start, self._seed = start, seed
         self._gains = gain_values(getattr(controller, "law", controller))
+        for gain, value in self._gains.items():
+            number = isinstance(value, int | float) and abs(value) <= sys.float_info.max
+            if not (value is None or isinstance(value, str) or number):
+                raise ParameterError(
+                    f"controller {self._name!r}: {gain}: {shown(value)}, but a finite number was wanted, for "
+                    f"the record"
+                )
         self._time: list[float] = []
         self._rows: dict[str, list[Array]] = {name: [] for name in ARRAYS[1:]}
 
     def add(self, snapshot: Snapshot) -> None:
-        """Append one moment."""
+        """Append one moment; its arrays are copied."""
         seen, decision = snapshot.seen, snapshot.decision
         self._time.append(seen.time)
         goals = decision.goals if decision.goals is not None else np.full_like(seen.positions, np.nan)
@@ -66,7 +75,7 @@ class Recorder:
             ("goals", goals),
             ("obstacle_points", seen.obstacle_points),
         ):
-            self._rows[name].append(row)
+            self._rows[name].append(row.copy())
 
     def record(self) -> Record:
         """Return what was collected so far."""

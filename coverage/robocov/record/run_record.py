@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
@@ -15,11 +15,12 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions
-from robocov.controllers import CONTROLLERS
+from robocov.controllers import short_name
 from robocov.drawing import displaying_backend, drawing_backend
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, shown
 from robocov.extras import extra
+from robocov.files.array_file import opened_arrays
 from robocov.files.atomic import written
 from robocov.files.result_folder import settle
 from robocov.observation import Decision, Observations, Snapshot
@@ -44,6 +45,9 @@ _COLUMNS = {
 """What the columns of data frames are called; `Record.to_pandas` explains them."""
 
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+
+_LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
+"""Largest numbers in the arrays that are finite throughout, s, m, m/s and N."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,17 +103,20 @@ class Record:
 
     @cached_property
     def working(self) -> BoolArray:
-        """Which robots were there and had not failed, (T, n) bool."""
-        if self.conditions is None:
-            return np.ones(self.positions.shape[:2], dtype=bool)
-        return self.conditions.working(self.time, len(self.team))
+        """Which robots were there and had not failed, (T, n) bool; read-only."""
+        return self._of_robots(Conditions.working)
 
     @cached_property
     def present(self) -> BoolArray:
-        """Which robots were there, whether they worked or had failed, (T, n) bool."""
-        if self.conditions is None:
-            return np.ones(self.positions.shape[:2], dtype=bool)
-        return self.conditions.present(self.time, len(self.team))
+        """Which robots were there, whether they worked or had failed, (T, n) bool; read-only."""
+        return self._of_robots(Conditions.present)
+
+    def _of_robots(self, which: Callable[[Conditions, Array, int], BoolArray]) -> BoolArray:
+        there = np.ones(self.positions.shape[:2], dtype=bool)
+        if self.conditions is not None:
+            there = which(self.conditions, self.time, len(self.team))
+        there.setflags(write=False)
+        return there
 
     def __len__(self) -> int:
         return len(self.time)
@@ -343,47 +350,70 @@ class Record:
         Raises
         ------
         InputError
-            When the folder holds no run, or one that cannot be read; the message names the file.
+            When the folder holds no run, or one that cannot be read: the file, the place in it, the value and
+            what was wanted.
+
+        Notes
+        -----
+        Data runs no code: the controller is not loaded, only named.
         """
         from robocov.mapfile import from_json
+        from robocov.record.run_document import read_run
 
         folder = Path(folder)
         settle(folder)
+        for file in ("run.json", "record.npz"):
+            if not (folder / file).is_file():
+                raise InputError(f"{folder}: not the folder of a run (there is no {file})")
         path = folder / "run.json"
+        run = read_run(path)
+        environment = from_json(run.map, f"{path}: map")
+        conditions = None
         try:
-            run = json.loads(path.read_text(encoding="utf-8"))
-            # opened here: numpy leaves a file that is no archive open
-            with (folder / "record.npz").open("rb") as file, np.load(file, allow_pickle=False) as saved:
-                arrays = {name: np.asarray(saved[name], dtype=float) for name in ARRAYS}
-            name = run["controller"]["name"]
-            record = cls(
-                environment=from_json(run["map"], f"{path}: map"),
-                team=Team.from_dict(run["team"]),
-                controller=name,
-                label=str(getattr(CONTROLLERS.get(name), "label", name.rpartition(":")[2])),
-                gains=run["controller"]["gains"],
-                start=run["start"],
-                seed=run["seed"],
-                dt=float(run["dt_s"]),
-                session=dict(run.get("session", {})),
-                conditions=Conditions.from_dict(run["conditions"]) if run.get("conditions") else None,
-                **arrays,
-            )
-        except FileNotFoundError as error:
+            team = Team.from_dict(run.team.model_dump())
+            if run.conditions is not None:
+                conditions = Conditions.from_dict(run.conditions.model_dump())
+                conditions.check_team(len(team))
+        except ParameterError as error:
+            raise InputError(f"{path}: {error}") from error
+        return cls(
+            environment=environment,
+            team=team,
+            controller=run.controller.name,
+            label=short_name(run.controller.name),
+            gains=run.controller.gains,
+            start=run.start,
+            seed=run.seed,
+            dt=run.dt_s,
+            session=run.session.model_dump(exclude_unset=True),
+            conditions=conditions,
+            **_arrays_of(folder / "record.npz", len(team)),
+        )
+
+
+def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
+    """Return the arrays of a record of so many robots, which are checked before and after they are read."""
+    with path.open("rb") as file, opened_arrays(file, str(path)) as saved:
+        for name in ARRAYS:
+            if name not in saved.headers:
+                raise InputError(f"{path}: there is no array {name}")
+            (shape, dtype), moments = saved.headers[name], saved.headers["time"].shape
+            wanted = moments if name == "time" else (*moments, robots, 2)
+            if dtype != np.float64 or shape != wanted or len(moments) != 1 or moments == (0,):
+                shape_wanted = "(T,)" if name == "time" else wanted
+                found, needed = f"{shape} of {dtype}", f"{shape_wanted} of float64"
+                raise InputError(f"{path}: {name} has shape {found}, but {needed} was wanted")
+        arrays = {name: saved.read(name) for name in ARRAYS}
+    for name, largest in _LARGEST.items():
+        values = arrays[name]
+        good = np.abs(values) <= largest
+        if not good.all():
             raise InputError(
-                f"{folder}: not the folder of a run (there is no {Path(error.filename).name})"
-            ) from error
-        except InputError:
-            raise
-        except Exception as error:
-            raise InputError(f"{folder}: the run cannot be read: {type(error).__name__}: {error}") from error
-        shape = (len(record.time), len(record.team), 2)
-        for name in ARRAYS[1:]:
-            if arrays[name].shape != shape:
-                raise InputError(
-                    f"{folder / 'record.npz'}: {name} has shape {arrays[name].shape}, but {shape} was wanted"
-                )
-        return record
+                f"{path}: {name}: {values[~good][0]:g}, but finite numbers up to {largest:g} were wanted"
+            )
+    if (np.diff(arrays["time"]) <= 0.0).any():
+        raise InputError(f"{path}: time: ascending numbers were wanted")
+    return arrays
 
 
 def versions() -> dict[str, str]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 DEFAULT_RADIUS = 0.1
 """Radius of a robot in metres where nothing else is said."""
 
-_LIMITS: dict[str, tuple[float, float, bool]] = {
+LIMITS: dict[str, tuple[float, float, bool]] = {
     # name: smallest, largest, may be infinite
     "radius": (1e-3, 1e3, False),
     "mass": (1e-6, 1e6, False),
@@ -26,6 +26,7 @@ _LIMITS: dict[str, tuple[float, float, bool]] = {
     "sensing_range": (0.0, 1e5, True),
     "communication_range": (0.0, 1e5, True),
 }
+"""What each parameter may be."""
 MAX_MASS_RATIO = 1000.0
 """Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
 
@@ -39,6 +40,11 @@ UNITS = {
     "communication_range": "m",
 }
 _KEY_UNITS = {"m": "m", "kg": "kg", "m/s": "m_per_s", "m/s²": "m_per_s2", "N s/m": "n_s_per_m"}
+
+
+def json_key(name: str) -> str:
+    """Return what a parameter is called in ``run.json``, with its unit."""
+    return f"{name}_{_KEY_UNITS[UNITS[name]]}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +86,7 @@ class Team:
         size = np.atleast_1d(np.asarray(self.radius, dtype=float)).shape[0]
         for field in fields(self):
             values = frozen(np.atleast_1d(np.asarray(getattr(self, field.name), dtype=float)))
-            low, high, infinite = _LIMITS[field.name]
+            low, high, infinite = LIMITS[field.name]
             if values.shape != (size,):
                 raise ParameterError(
                     f"team.{field.name}: {values.shape} values, but one for each of {size} robots was wanted"
@@ -163,7 +169,7 @@ class Team:
         for field in fields(self):
             values = [None if np.isinf(x) else float(x) for x in getattr(self, field.name)]
             same = all(x == values[0] for x in values)
-            plain[f"{field.name}_{_KEY_UNITS[UNITS[field.name]]}"] = values[0] if same else values
+            plain[json_key(field.name)] = values[0] if same else values
         return plain
 
     @classmethod
@@ -179,7 +185,7 @@ class Team:
             n = int(plain["robots"])
             arrays = []
             for field in fields(cls):
-                value = plain[f"{field.name}_{_KEY_UNITS[UNITS[field.name]]}"]
+                value = plain[json_key(field.name)]
                 column = value if isinstance(value, list) else [value] * n
                 arrays.append(np.array([np.inf if x is None else float(x) for x in column]))
         except (KeyError, TypeError, ValueError) as error:

@@ -77,7 +77,7 @@ class ChangingWorld:
 
     @property
     def working(self) -> BoolArray:
-        """Which robots are there and have not failed, (n,) bool."""
+        """Which robots are there and have not failed, (n,) bool; read-only."""
         return self._working
 
     @property
@@ -159,8 +159,8 @@ class ChangingWorld:
             )
 
     def _protect(self) -> None:
-        self._positions.setflags(write=False)
-        self._velocities.setflags(write=False)
+        for array in (self._positions, self._velocities, self._working):
+            array.setflags(write=False)
 
 
 def only(team: Team, rows: IntArray) -> Team:

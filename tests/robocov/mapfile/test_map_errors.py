@@ -69,7 +69,7 @@ STRUCTURAL = [
     (changed("boundry", 1), "unknown key 'boundry': did you mean 'boundary'?"),
     (changed("format", "geojson"), 'format: "geojson", but "robocov-map" was wanted'),
     (changed("format", DELETED), "format: missing"),
-    (changed("version", 2), "version: 2, but 1 was wanted; it needs a newer robocov"),
+    (changed("version", 2), "version: 2, but 1 was wanted; it was written by a newer robocov"),
     (changed("version", 0), "version: 0, but 1 was wanted"),
     (changed("version", True), "version: true, but 1 was wanted"),
     (changed("version", DELETED), "version: missing"),

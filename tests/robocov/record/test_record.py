@@ -3,18 +3,21 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from robocov.conditions import Conditions
 from robocov.controllers import Rapf, Rpf, gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.atomic import written
 from robocov.mapfile import from_json
 from robocov.metrics import sample_moments
+from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record
 from robocov.record.recorder import Recorder
 from robocov.robots import Team
@@ -101,33 +104,239 @@ def test_a_stopped_run_is_a_shorter_run(empty: Environment) -> None:
     np.testing.assert_array_equal(part.positions, whole.positions[: len(part)])
 
 
+def edited(*path: str | int, to: object = None):
+    """Return what changes one value of a ``run.json``, or takes it away where it is to be nothing."""
+
+    def spoil(folder: Path) -> None:
+        run = json.loads((folder / "run.json").read_text())
+        holder = run
+        for step in path[:-1]:
+            holder = holder.setdefault(step, {}) if isinstance(holder, dict) else holder[step]
+        if to is None:
+            del holder[path[-1]]
+        else:
+            holder[path[-1]] = to
+        (folder / "run.json").write_text(json.dumps(run))
+
+    return spoil
+
+
+def with_arrays(**changes):
+    """Return what changes arrays of a ``record.npz``, by functions of what is there."""
+
+    def spoil(folder: Path) -> None:
+        with np.load(folder / "record.npz") as found:
+            arrays = {name: changes[name](found[name]) if name in changes else found[name] for name in found}
+        np.savez(
+            folder / "record.npz", **{name: values for name, values in arrays.items() if values is not None}
+        )
+
+    return spoil
+
+
+CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.0)),)).to_dict()
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda folder: (folder / "run.json").unlink(), "not the folder of a run"),
-        (lambda folder: (folder / "record.npz").unlink(), "there is no record.npz"),
-        (lambda folder: (folder / "run.json").write_text("{"), "the run cannot be read"),
-        (lambda folder: (folder / "run.json").write_text("{}"), "the run cannot be read"),
-        (lambda folder: (folder / "record.npz").write_bytes(b"PK\x03\x04 no"), "the run cannot be read"),
-        (lambda folder: np.savez(folder / "record.npz", time=np.zeros(3)), "the run cannot be read"),
+        (lambda folder: (folder / "run.json").unlink(), "not the folder of a run (there is no run.json)"),
+        (lambda folder: (folder / "record.npz").unlink(), "not the folder of a run (there is no record.npz)"),
+        (lambda folder: (folder / "run.json").write_text("{"), "run.json:1:2: end of file: not JSON: "),
+        (
+            lambda folder: (folder / "run.json").write_text("[1]"),
+            "run.json: [1], but a JSON object with a run",
+        ),
+        (lambda folder: (folder / "run.json").write_text("[" * 99), "run.json:1:"),
+        (edited("format", to="robocov-map"), 'run.json: format: "robocov-map", but "robocov-run" was wanted'),
+        (
+            edited("version", to=99),
+            "run.json: version: 99, but 1 was wanted; it was written by a newer robocov",
+        ),
+        (edited("version", to=True), "run.json: version: true, but 1 was wanted"),
+        (edited("dt_s"), "run.json: dt_s: missing"),
+        (edited("dt_s", to=-1), "run.json: dt_s: -1, but a number above 0 (s) was wanted"),
+        (edited("dt_s", to="0.02"), 'run.json: dt_s: "0.02", but a number above 0 (s) was wanted'),
+        (edited("seed", to=-3), "run.json: seed: -3, but a whole number from 0, or null, was wanted"),
+        (
+            edited("start", to=["corner"]),
+            'run.json: start: ["corner"], but the name of a start, or null, was',
+        ),
+        (edited("lattice", to=1), "run.json: lattice: 1, but a whole number from 2 to 2048 was wanted"),
+        (edited("map", "boundary", 0, 0, to="x"), "run.json: map: boundary[0][0]: "),
+        (edited("map", to=[]), "run.json: map: [], but an object was wanted"),
+        (edited("controller", to="rapf"), 'run.json: controller: "rapf", but an object was wanted'),
+        (edited("controller", "name", to=3), "run.json: controller.name: 3, but a name was wanted"),
+        (
+            edited("controller", "gains", "k_rep", to=[1.0]),
+            "run.json: controller.gains.k_rep: [1.0], but a number, a word or null was wanted",
+        ),
+        (
+            edited("team", "robots", to=10**12),
+            "run.json: team.robots: 1000000000000, but a whole number from 1",
+        ),
+        (edited("team", "mass_kg"), "run.json: team.mass_kg: missing"),
+        (
+            edited("team", "radius_m", to=-1),
+            "run.json: team.radius_m: -1, but a number from 0.001 to 1000, or one for each of 4 robots, was",
+        ),
+        (
+            edited("team", "radius_m", to=[0.1] * 3),
+            "run.json: team.radius_m: [0.1, 0.1, 0.1], but a number from",
+        ),
+        (edited("team", "mass_kg", to=[1, 1, 1, "1"]), "run.json: team.mass_kg: "),
+        (edited("team", "mass_kg", to=[1, 1, 1, 1e6]), "run.json: team.mass: 1 to 1e+06 kg, but robots at most"),
+        (
+            edited("conditions", to={**CONDITIONS, "loss": 2}),
+            "run.json: conditions.loss: 2, but a number from 0",
+        ),
+        (
+            edited("conditions", to={**CONDITIONS, "failures": [{"robot": 0, "time_s": 1}]}),
+            "run.json: conditions.failures[0].robot: 0, but the number of a robot, from 1, was wanted",
+        ),
+        (
+            edited("conditions", to={**CONDITIONS, "failures": [{"robot": 9, "time_s": 1}]}),
+            "run.json: conditions.failures[0]: robot 9, but one of 1 to 4 was wanted",
+        ),
+        (
+            edited("conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "place_m": [1]}]}),
+            "run.json: conditions.joins[0].place_m: [1], but a point [x, y] was wanted",
+        ),
+        (edited("session", to=[1]), "run.json: session: [1], but an object was wanted"),
+        (
+            edited("session", "control_dt_s", to="often"),
+            'run.json: session.control_dt_s: "often", but a number',
+        ),
+        (edited("session", "robots", to="1234"), 'run.json: session.robots: "1234", but a list was wanted'),
+        (edited("session", "failed", to={"x": [1.0, 1.0]}), "run.json: session.failed.x: "),
+        (
+            edited("session", "failed", to={"4": [1.0]}),
+            'run.json: session.failed["4"]: [1.0], but a point [x, y]',
+        ),
+        (
+            edited("session", "touched", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
+            'run.json: session.touched[0].to_s: "soon", but a number from 0 (s) was wanted',
+        ),
+        (
+            lambda folder: (folder / "record.npz").write_bytes(b"PK\x03\x04 no"),
+            "record.npz: cannot be read: ",
+        ),
+        (with_arrays(goals=lambda values: None), "record.npz: there is no array goals"),
+        (
+            with_arrays(forces=lambda values: values[:, :3]),
+            "record.npz: forces has shape (101, 3, 2) of float64, but (101, 4, 2) of float64 was wanted",
+        ),
+        (
+            with_arrays(time=lambda values: values[None]),
+            "record.npz: time has shape (1, 101) of float64, but (T,)",
+        ),
+        (
+            with_arrays(goals=lambda values: values.astype("f4")),
+            "record.npz: goals has shape (101, 4, 2) of float32",
+        ),
+        (
+            with_arrays(**{name: lambda values: values[:0] for name in ARRAYS}),
+            "record.npz: time has shape (0,) of float64, but (T,) of float64 was wanted",
+        ),
+        (with_arrays(time=lambda values: 0 * values), "record.npz: time: ascending numbers were wanted"),
+        (
+            with_arrays(positions=lambda values: values * 1e9),
+            "e+09, but finite numbers up to 1e+07 were wanted",
+        ),
+        (
+            with_arrays(velocities=lambda values: values * np.nan),
+            "record.npz: velocities: nan, but finite numbers up to 1e+300 were wanted",
+        ),
     ],
 )
 def test_a_spoilt_folder_is_refused_in_one_line(record: Record, tmp_path: Path, spoil, message: str) -> None:
     record.save(tmp_path)
     spoil(tmp_path)
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError) as caught:
         Record.load(tmp_path)
     assert "\n" not in str(caught.value)
-    assert str(tmp_path) in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path))
+    assert message in str(caught.value)
 
 
-def test_arrays_that_do_not_fit_the_team_are_refused(record: Record, tmp_path: Path) -> None:
+def test_what_later_versions_may_add_is_passed_over(record: Record, tmp_path: Path) -> None:
+    """And what earlier ones did not write yet may be missing."""
     record.save(tmp_path)
-    arrays = {name: getattr(record, name) for name in ARRAYS}
-    arrays["forces"] = arrays["forces"][:, :3]
-    np.savez(tmp_path / "record.npz", **arrays)
-    with pytest.raises(InputError, match="forces has shape"):
-        Record.load(tmp_path)
+    for path in (("mood",), ("controller", "label"), ("team", "colour_rgb"), ("session", "weather")):
+        edited(*path, to={"fine": [1, None]})(tmp_path)
+    for name in ("lattice", "versions", "summary", "starts_m", "duration_s"):
+        edited(name)(tmp_path)
+    with_arrays()(tmp_path)
+    with np.load(tmp_path / "record.npz") as found:
+        np.savez_compressed(tmp_path / "record.npz", **found, moods=np.arange(3))
+    again = Record.load(tmp_path)
+    assert again.positions.tobytes() == record.positions.tobytes()
+    assert again.session == {"weather": {"fine": [1, None]}}
+
+
+def test_a_run_names_its_controller_and_nobody_loads_it(record: Record, tmp_path: Path) -> None:
+    replace(record, controller="somewhere/mine.py:Mine").save(tmp_path)
+    again = Record.load(tmp_path)
+    assert (again.controller, again.label) == ("somewhere/mine.py:Mine", "Mine")
+
+
+def test_who_worked_is_nobodys_to_change(record: Record) -> None:
+    """A view of it is in each moment."""
+    there = replace(record, conditions=Conditions(failures=((1, 0.5),)))
+    for mask in (there.working, there.present, there.snapshot(3).working, record.working):
+        with pytest.raises(ValueError, match="read-only"):
+            mask[...] = False
+
+
+@dataclass(frozen=True)
+class Reusing:
+    """Gives what it remembers as forces, goals and terms, and changes it in place."""
+
+    name = label = "reusing"
+    summary = ""
+
+    def begin(self, region: object, team: Team) -> np.ndarray:
+        return np.zeros((len(team), 2))
+
+    def decide(self, seen: Observations, memory: np.ndarray) -> Decision:
+        memory += 0.01
+        return Decision(memory, memory, {"attraction": memory}, memory=memory)
+
+
+class TestReusedArrays:
+    """A controller may use the same array for all of its decisions."""
+
+    def test_every_moment_is_recorded_as_it_was(self, empty: Environment) -> None:
+        record = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02).run(0.2)
+        steps = 0.01 * np.arange(1, 12)
+        for values in (record.forces, record.goals):
+            np.testing.assert_allclose(values, np.broadcast_to(steps[:, None, None], values.shape))
+
+    def test_what_was_given_to_the_recorder_may_change(self, empty: Environment) -> None:
+        simulation = Simulation(empty, Rapf(), empty.start().sample(2))
+        recorder = Recorder(empty, simulation.team, simulation.controller, simulation.dt)
+        decision = Decision(np.ones((2, 2)), np.ones((2, 2)))
+        recorder.add(Snapshot(simulation.observe(), decision))
+        decision.forces[:] = decision.goals[:] = 7.0
+        assert (recorder.record().forces == 1.0).all()
+        assert (recorder.record().goals == 1.0).all()
+
+    def test_snapshots_stay_as_they_were(self, empty: Environment) -> None:
+        simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
+        kept = [(snapshot, deepcopy(snapshot)) for snapshot in simulation.snapshots(0.1)]
+        for snapshot, then in kept:
+            np.testing.assert_array_equal(snapshot.decision.forces, then.decision.forces)
+            np.testing.assert_array_equal(snapshot.decision.terms["attraction"], then.decision.forces)
+
+    def test_a_copy_goes_on_the_same_also_after_the_decision(self, empty: Environment) -> None:
+        simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
+        simulation.step()
+        assert simulation.snapshot.decision.forces.max() == pytest.approx(0.02)
+        for twin in (simulation.copy(), simulation.changed(), simulation.remembering(simulation.memory)):
+            twin.step()
+            assert twin.snapshot.decision.forces.max() == pytest.approx(0.03)
+        simulation.step()
+        assert simulation.snapshot.decision.forces.max() == pytest.approx(0.03)
 
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path) -> None:

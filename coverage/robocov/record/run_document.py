@@ -1,0 +1,134 @@
+"""The content of ``run.json``, version 1, as pydantic models."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Field, ValidationInfo, WrapValidator, create_model
+from pydantic_core import PydanticCustomError
+
+from robocov.conditions import LIMITS as CONDITION_LIMITS
+from robocov.files.documents import Document, read_document, wanted
+from robocov.robots.team import LIMITS, json_key
+from robocov.robots.teamfile import MOST_ROBOTS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FORMAT = "robocov-run"
+VERSION = 1
+
+Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
+Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
+Number: TypeAlias = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted("the number of a robot, from 1,")]
+Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
+Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
+
+
+def _number(low: float, high: float, *, null: bool) -> tuple[Any, str]:
+    """Return the type of a number, and what messages say was wanted."""
+    number: Any = Annotated[float, Field(ge=low, le=high)]
+    return number | None if null else number, f"a number from {low:g} to {high:g}{' or null' if null else ''}"
+
+
+def _for_each_robot(low: float, high: float, *, null: bool) -> Any:
+    """Return the type of a value that all robots share, or of a list with one for each."""
+    number, words = _number(low, high, null=null)
+
+    def checked(value: Any, handler: Any, info: ValidationInfo) -> Any:
+        robots = info.data.get("robots")
+        try:
+            if not isinstance(value, list) or robots in (None, len(value)):
+                return handler(value)
+        except ValueError:
+            pass
+        raise PydanticCustomError("wanted", f"{words}, or one for each of {robots} robots,")
+
+    either: Any = number | list[number]  # type: ignore[valid-type]
+    return Annotated[either, WrapValidator(checked)]
+
+
+_robots = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted(f"a whole number from 1 to {MOST_ROBOTS}")]
+_of_teams: dict[str, Any] = {
+    json_key(name): (_for_each_robot(low, high, null=null), ...) for name, (low, high, null) in LIMITS.items()
+}
+TeamDocument: Any = create_model("TeamDocument", __base__=Document, robots=(_robots, ...), **_of_teams)
+
+
+class FailureDocument(Document):
+    """When a robot fails."""
+
+    robot: Number
+    time_s: Time
+
+
+class JoinDocument(FailureDocument):
+    """When a robot joins, and where."""
+
+    place_m: Point | None
+
+
+_of_conditions: dict[str, Any] = {
+    key: (Annotated[number, wanted(words)], ...)
+    for name, (low, high, _, key) in CONDITION_LIMITS.items()
+    for number, words in [_number(low, high, null=name == "message_rate")]
+} | {"failures": (list[FailureDocument], ...), "joins": (list[JoinDocument], ...), "seed": (Seed, ...)}
+ConditionsDocument: Any = create_model("ConditionsDocument", __base__=Document, **_of_conditions)
+
+
+class ControllerDocument(Document):
+    """The controller: its name, which nobody loads, and its gains."""
+
+    name: Annotated[str, Field(min_length=1), wanted("a name")]
+    gains: dict[str, Annotated[float | str | bool | None, wanted("a number, a word or null")]]
+
+
+class TouchDocument(Document):
+    """From when to when which robots were moved by hand."""
+
+    from_s: Time
+    to_s: Time
+    robots: list[Number]
+
+
+class SessionDocument(Document):
+    """Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`."""
+
+    began_at_s: Time = 0.0
+    start_velocities_m_per_s: list[Point] = Field([])
+    robots: list[Number] = Field([])
+    failed: dict[Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")], Point] = (
+        Field({})
+    )
+    touched: list[TouchDocument] = Field([])
+    control_dt_s: Seconds = 1.0
+    repeatable: bool = True
+
+
+class RunDocument(Document):
+    """A run: all that is needed to repeat it, and its summary."""
+
+    map: dict[str, Any]
+    controller: ControllerDocument
+    team: TeamDocument
+    start: Annotated[str | None, wanted("the name of a start, or null,")]
+    starts_m: list[Point] = Field([])
+    seed: Annotated[Seed | None, wanted("a whole number from 0, or null,")]
+    dt_s: Seconds
+    duration_s: Time = 0.0
+    lattice: Annotated[int | None, Field(ge=2, le=2048), wanted("a whole number from 2 to 2048")] = None
+    conditions: ConditionsDocument | None = None
+    session: SessionDocument = SessionDocument()
+    versions: dict[str, str] = Field({})
+    summary: dict[str, Any] = Field({})
+
+
+def read_run(path: Path) -> RunDocument:
+    """Return the content of a file ``run.json``.
+
+    Raises
+    ------
+    InputError
+        When it is none; the message names the file, the place in it, the value and what was wanted.
+    """
+    return read_document(path, RunDocument, FORMAT, VERSION)

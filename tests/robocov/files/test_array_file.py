@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov.errors import InputError
+from robocov.files.array_file import opened_arrays
+
+MANY = 1_600_000_000
+"""Bytes that an array claims to have."""
+
+
+def saved(**arrays: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def read(content: bytes, most: int = 1_000_000_000) -> dict[str, np.ndarray]:
+    with opened_arrays(io.BytesIO(content), "x.npz", most) as file:
+        return {name: file.read(name) for name in file.headers}
+
+
+def claimed(size: int) -> bytes:
+    """Return the header of an array of so many bytes."""
+    head = io.BytesIO()
+    header = {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
+    np.lib.format.write_array_header_1_0(head, header)
+    return head.getvalue()
+
+
+def squeezed(path: Path, arrays: int) -> None:
+    """Write a file of some arrays of nothing but zeros, each of `MANY` bytes, which all are really there."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    head = packer.compress(claimed(MANY)) + packer.flush(zlib.Z_FULL_FLUSH)
+    million = packer.compress(bytes(1_000_000)) + packer.flush(zlib.Z_FULL_FLUSH)
+    stream = head + million * (MANY // 1_000_000) + packer.flush()
+    with zipfile.ZipFile(path, "w") as archive:
+        for k in range(arrays):
+            archive.writestr(f"a{k}.npy", stream + bytes(7_000_000 - len(stream)))
+        for entry in archive.filelist:
+            entry.compress_type, entry.file_size = zipfile.ZIP_DEFLATED, MANY + len(claimed(MANY))
+
+
+def test_it_reads_what_numpy_writes() -> None:
+    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.asfortranarray(np.eye(3)), "c": np.array([], "i4")}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    for content in (saved(**arrays), buffer.getvalue()):
+        found = read(content)
+        assert list(found) == list(arrays)
+        for name, values in arrays.items():
+            np.testing.assert_array_equal(found[name], values)
+            assert found[name].dtype == values.dtype
+
+
+def patched(content: bytes, **changes: object) -> bytes:
+    """Return a zip file whose directory says something else of its last entry."""
+    buffer = io.BytesIO(content)
+    with zipfile.ZipFile(buffer, "a") as archive:
+        for name, value in changes.items():
+            setattr(archive.filelist[-1], name, value)
+        archive._didModify = True  # type: ignore[attr-defined]
+    return buffer.getvalue()
+
+
+TWO = saved(a=np.zeros(20_000), b=np.ones(20_000))
+
+
+def test_what_one_patches_is_read_without_the_patch() -> None:
+    assert sorted(read(patched(TWO))) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not a zip file"),
+        (TWO[:-30], "not a zip file"),
+        (TWO[:200] + b"x" + TWO[201:], "CRC"),
+        (saved(a=np.array([print], dtype=object)), "'a' holds objects"),
+        (patched(TWO, file_size=MANY), "many"),
+        (patched(TWO, file_size=150_000), "'b' of shape (20000,) does not take 150000 bytes"),
+        (patched(TWO, compress_size=161_000), "'b' overlaps what comes after it"),
+        (patched(TWO, header_offset=0, filename="a.npy"), "overlaps what comes after it"),
+        (patched(TWO, compress_type=99), "compression"),
+        (patched(TWO, flag_bits=1), "encrypted"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_none_is_refused_in_one_line(content: bytes, message: str) -> None:
+    with pytest.raises(InputError, match=r"^x\.npz: cannot be read: .+$") as caught:
+        read(content)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -4)}", "{" * 60_000, "[]", "print(1)"],
+)
+def test_a_header_that_is_none_is_refused(header: str) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        text = f"{header}\n".encode()
+        archive.writestr("a.npy", b"\x93NUMPY\x02\x00" + len(text).to_bytes(4, "little") + text + bytes(32))
+    with pytest.raises(InputError, match=r"^x\.npz: cannot be read: "):
+        read(buffer.getvalue())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+@pytest.mark.parametrize("hostile", ["zeros", "entries"])
+def test_a_file_that_would_take_gigabytes_is_refused_at_once(tmp_path: Path, hostile: str) -> None:
+    """35 MB that would be 8 GB; a directory of 250,000 entries. In a process of its own."""
+    path = tmp_path / "x.npz"
+    if hostile == "zeros":
+        squeezed(path, 5)
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("a.npy", b"")
+            archive.filelist *= 250_000
+    assert path.stat().st_size > 10_000_000
+    script = (
+        "import resource, sys, time\n"
+        "from robocov.errors import InputError\n"
+        "from robocov.files.array_file import opened_arrays\n"
+        "usage = lambda: resource.getrusage(resource.RUSAGE_SELF)\n"
+        "before = usage()\n"
+        "try:\n"
+        "    with open(sys.argv[1], 'rb') as file, opened_arrays(file, 'x') as found:\n"
+        "        [found.read(name) for name in found.headers]\n"
+        "except InputError:\n"
+        "    after = usage()\n"
+        "    print(after.ru_utime - before.ru_utime, after.ru_maxrss - before.ru_maxrss)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True, check=True)
+    seconds, grown = map(float, done.stdout.split())
+    unit = 1 if sys.platform == "darwin" else 1024
+    assert grown * unit < 100e6
+    assert seconds < 1.0
