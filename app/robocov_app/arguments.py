@@ -21,6 +21,10 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     ),
     (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
     (
+        r"^Error parsing (\S+): no type matching \{None\}\|(INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
+        lambda match: f"{match[1]}: {match[3]}, but a {'whole ' * (match[2] == 'INT')}number was wanted",
+    ),
+    (
         r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
         lambda match: f"{match[2]}: {match[1]}, but one of {_choices(match[3])} was wanted",
     ),

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
+TRACEBACK = "ROBOCOV_TRACEBACK"
+"""Environment variable; where it is not empty, errors are shown with all that led to them."""
+
+_LONGEST = 1000
+"""Characters of an error that are told."""
+
 COMMANDS = {
     # name: (module, one line)
     "demo": ("demo", "the interactive window: watch, touch, compare, go back in time"),
@@ -105,7 +111,11 @@ def _guarded(name: str, rest: list[str]) -> int:
         return _complain(f"{os.fsdecode(error.filename)}: cannot be used: {reason}")
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
-    except Exception:
+    except Exception as error:
+        from robocov.controllers.faults import users_fault
+
+        if fault := users_fault(error):
+            return _complain(str(fault))
         traceback.print_exc()
         print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
         return FAILED
@@ -145,8 +155,12 @@ def _prepare_output() -> None:
 
 
 def _complain(message: str) -> int:
-    # names of files and gains may hold line breaks; an error is one line all the same
-    print(f"robocov: error: {' '.join(message.splitlines())}", file=sys.stderr)
+    if os.environ.get(TRACEBACK):
+        traceback.print_exc()
+    # names of files and gains may hold line breaks, or thousands of characters; an error is one line
+    line = " ".join(message.splitlines())
+    line = line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
+    print(f"robocov: error: {line}", file=sys.stderr)
     return BAD_INPUT
 
 

@@ -207,7 +207,7 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
             continue
         try:
             gains[name] = json.loads(value)
-        except json.JSONDecodeError as error:
+        except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
             raise ParameterError(
                 f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
             ) from error

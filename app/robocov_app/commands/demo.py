@@ -109,6 +109,7 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the window, or render it."""
+    from robocov.controllers import controller_kinds
     from robocov_app.demo.opening import Opening
     from robocov_app.view.picture import checked_layers
 
@@ -123,7 +124,7 @@ def command(options: Arguments) -> int:
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
         headless=options.headless,
-        laws=options.controllers,
+        laws=(*controller_kinds(), *options.controllers),
         lattice=options.lattice,
     )
     if options.headless:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from robocov.errors import InputError, ParameterError
+from robocov.errors import InputError, ParameterError, listed
 from robocov_app.options import RunOptions, parsed_size
 
 if TYPE_CHECKING:
@@ -29,13 +30,16 @@ class Arguments:
     """A saved run or comparison again: in the window, or headlessly as frames and a film.
 
     In the window the run is the past: go back and forth in it, go on from any moment of it with other
-    gains, another controller or a wall in the way.
+    gains, another controller or a wall in the way. A run of a controller that is none of robocov's is shown
+    from its record, and the controller is loaded only where --controller names it.
 
     Example: robocov replay rooms-rapf --video --film-speed 1 --show distances --out rooms-film
     """
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
     """The folder of a run or a comparison."""
+    controller: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE.py:Class ...")] = ()
+    """Controllers of your own that may be loaded to go on with their runs in the window."""
     frames: bool = False
     """Save every film frame as a PNG, and open no window."""
     video: bool = False
@@ -65,6 +69,8 @@ class Arguments:
         self.film()
         if self.headless and self.out is None:
             raise ParameterError("--out: a folder for frames and film was wanted")
+        if self.headless and self.controller:
+            raise ParameterError("--controller: neither --frames nor --video was wanted beside it")
         if not self.headless:
             for name, given in (("--out", self.out is not None), ("--json", self.json)):
                 if given:
@@ -108,19 +114,27 @@ def command(options: Arguments) -> int:
 
 def watched(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
+    from robocov.controllers import controller_kind
     from robocov.mapfile import bundled_maps, load_map
     from robocov_app.demo.opening import NO_DISPLAY, Opening
-    from robocov_app.demo.replayed import LostLaw, replayed_session
+    from robocov_app.demo.replayed import replayed_session
     from robocov_app.view.picture import checked_layers
 
+    for controller in options.controller:
+        controller_kind(controller)
+        kind = controller.rpartition(":")[2]
+        if not any(each.record.controller.rpartition(":")[2] == kind for each in saved):
+            names = listed([each.record.controller for each in saved])
+            raise ParameterError(
+                f"--controller: {controller}, but the controller of a run was wanted: {names}"
+            )
     try:
-        session = replayed_session(saved)
+        session = replayed_session(saved, options.controller)
     except InputError as error:
         where = str(options.run)
         raise InputError(str(error) if where in str(error) else f"{where}: {error}") from error
     same = (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
-    laws = [law.name for law in session.scenario.laws if not isinstance(law, LostLaw)]
     opening = Opening(
         session,
         name,
@@ -129,7 +143,7 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
         size=options.window_size(),
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
-        laws=tuple(laws),
+        laws=options.controller,
     )
     try:
         with opening.window() as window:
@@ -164,8 +178,9 @@ def filmed(options: Arguments, saved: list[Saved]) -> int:
 
 def _spare(out: Path, source: Path, saved: list[Saved]) -> None:
     """Make sure that no saved run is replaced by its own film."""
+    target = os.path.realpath(out)
     for folder in (source, *(each.folder for each in saved)):
-        if folder.resolve().is_relative_to(out.resolve()):
+        if Path(os.path.realpath(folder)).is_relative_to(target):
             raise InputError(f"--out: {out}: another folder than that of the run was wanted")
 
 

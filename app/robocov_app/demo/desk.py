@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.controllers import controller_kinds
+from robocov.controllers import CONTROLLERS
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
@@ -16,7 +16,7 @@ from robocov_app.demo.typed import command
 from robocov_app.output import free_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from robocov.controllers.gains import Value
     from robocov_app.demo.costs import Costs
@@ -43,8 +43,8 @@ class Desk:
         Where things are saved.
     map_name : str
         What the user calls the map: a bundled name or a path.
-    extra_laws : names of controllers
-        Beside those that are there anyway: of the user's files.
+    laws : names of controllers
+        To choose from beside the built-in ones: installed ones, and those of the user's files.
 
     Attributes
     ----------
@@ -66,11 +66,11 @@ class Desk:
         shown: set[str],
         folder: Path,
         map_name: str = "",
-        extra_laws: tuple[str, ...] = (),
+        laws: Iterable[str] = (),
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
         self.map_name = map_name
-        self.laws = list(dict.fromkeys([*controller_kinds(), *extra_laws]))
+        self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
         self.tools = toolbox()
         self.tool: Tool = self.tools["hand"]
         self.active = 0

@@ -88,7 +88,7 @@ class Opening:
     headless : bool
         Draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes.
     laws : names of controllers
-        Beside those that are there anyway.
+        To choose from beside the built-in ones.
     """
 
     def __init__(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.controllers import controller_kind
+from robocov.controllers import controller_kind, short_name
 from robocov.errors import ParameterError
 from robocov_app.demo.actions import all_actions
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
@@ -25,7 +25,7 @@ from robocov_app.demo.scenario import MOST_PANES
 from robocov_app.view.theme import LIGHT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.widgets import Widgets
@@ -113,8 +113,9 @@ class Panel(Paged):
 
     def _controllers(self, widgets: Widgets, y: float) -> float:
         desk, session, rect = self.desk, self.desk.session, widgets.rect
-        now = [session.circumstances(lane).law.name for lane in session.lanes]
-        labels = law_labels([*desk.laws, *now])
+        laws = [session.circumstances(lane).law for lane in session.lanes]
+        now = [law.name for law in laws]
+        labels = law_labels(desk.laws, {law.name: law.label for law in laws})
         names = {label: name for name, label in labels.items()}
         count = len(now)
 
@@ -222,18 +223,25 @@ def short_names(files: list[str]) -> dict[str, str]:
     return {file: name if names.count(name) == 1 else file for file, name in zip(files, names, strict=True)}
 
 
-def law_labels(names: Iterable[str]) -> dict[str, str]:
+def law_labels(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]:
     """Return what controllers are called in the menu, by their names; no two are called the same.
 
-    >>> law_labels(["rapf", "lloyd"])
-    {'rapf': 'RAPF', 'lloyd': 'LA'}
+    Parameters
+    ----------
+    names : names of controllers
+        To choose from. A user's are loaded for it.
+    shown : dict of name to label
+        Those at work, which may be of a saved run: they are not loaded.
+
+    >>> law_labels(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
+    {'rapf': 'RAPF', 'lloyd': 'LA', 'theirs.py:Mine': 'Mine'}
     """
     found: dict[str, str] = {}
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys([*names, *shown]):
         try:
-            label = str(controller_kind(name).label)
-        except ParameterError:  # of a saved run, and gone since
-            label = name.rpartition(":")[2]
+            label = shown[name] if name in shown else str(controller_kind(name).label)
+        except ParameterError:  # its file has changed since
+            label = short_name(name)
         file = Path(name.rpartition(":")[0]).name
         tried = (label, f"{label} ({file})", f"{label} ({name})")
         found[name] = next(each for each in tried if each not in found.values())

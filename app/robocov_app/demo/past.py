@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from copy import deepcopy
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.sensor import RangeSensor
 from robocov.simulation import DEFAULT_DT
+from robocov.voronoi.weighted_cells import weighted_partition
 from robocov.world.solid import movers, solid_pieces
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ class _Explaining:
         self._perception = None if conditions is None else Perception(conditions, circumstances.team, dt)
         self._sensor = _sensor_in(circumstances.solid)
         self._team = circumstances.team
+        self._by_time = circumstances.law.gains.get("cells") == "time" and self._team.mixed_speeds
         self._controller: Controller | None = None
         with suppress(ParameterError):  # what a saved run was made with may be gone
             self._controller = informed(circumstances.law.made(), circumstances.solid.standing)
@@ -79,8 +82,13 @@ class _Explaining:
             seen, _ = self._perception.known(seen, inbox, np.ones(len(state.positions), dtype=bool))
         decision = self._decision(seen, state)
         if state.recorded is not None and not _agree(decision, state.recorded):
-            # the controller is not what it was
+            # the controller is not what it was, or not loaded
             decision = state.recorded
+            if self._by_time:
+                cells = weighted_partition(
+                    state.positions, self._team.max_speed, self._region, density=self._density
+                )
+                decision = replace(decision, cells=cells)
         return Snapshot(seen, decision, None if self._perception is None else state.positions)
 
     def _decision(self, seen: Observations, state: State) -> Decision:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from robocov.controllers import informed, remembers
+from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.observation import Decision
 from robocov_app.demo.curves import Event
@@ -39,7 +39,7 @@ _OF_A_MOMENT = 1500
 
 @dataclass(frozen=True)
 class LostLaw(Law):
-    """A controller that is not there any more, or does not take its gains: its runs can be looked at.
+    """A controller that is not loaded, or does not take its gains: its runs can be looked at.
 
     Attributes
     ----------
@@ -97,10 +97,17 @@ class _Nobody:
         raise AssertionError
 
 
-def replayed_session(saved: Sequence[Saved]) -> Session:
+def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) -> Session:
     """Return a session whose past is a saved run, or the runs of a comparison side by side.
 
     Its beginning is looked at, and it plays.
+
+    Parameters
+    ----------
+    saved : sequence of Saved
+    controllers : sequence of str
+        Those that may be loaded beside the built-in ones, so that their runs can be gone on with: names
+        that the user has typed, never ones of the runs themselves.
 
     Raises
     ------
@@ -113,7 +120,7 @@ def replayed_session(saved: Sequence[Saved]) -> Session:
     rosters = [roster_of(record) for record in records]
     first, dt = records[0], control_dt(records[0])
     limits, environment = Limits.of(first.team, rosters[0].numbers), rosters[0].environment
-    laws = [law_of(record) for record in records]
+    laws = [law_of(record, controllers) for record in records]
     casts = [
         Circumstances(environment, law, limits, roster.numbers, roster.failed)
         for law, roster in zip(laws, rosters, strict=True)
@@ -149,10 +156,8 @@ def replayed_session(saved: Sequence[Saved]) -> Session:
 
 def control_dt(record: Record) -> float:
     """Return the control period, s; moments of a record may be farther apart than that."""
-    dt = record.session.get("control_dt_s")
-    if isinstance(dt, float) and dt > 0.0 and abs(record.dt / dt - round(record.dt / dt)) < 1e-6:
-        return dt
-    return record.dt
+    dt = float(record.session.get("control_dt_s", record.dt))
+    return dt if abs(record.dt / dt - round(record.dt / dt)) < 1e-6 else record.dt
 
 
 def _paced(record: Record) -> Record:
@@ -169,9 +174,20 @@ def _paced(record: Record) -> Record:
     )
 
 
-def law_of(record: Record) -> Law:
-    """Return the controller of a record, also where it is not there any more."""
-    law = Law(record.controller, dict(record.gains))
+def law_of(record: Record, controllers: Sequence[str] = ()) -> Law:
+    """Return the controller of a record: a built-in one, or the one of `controllers` that is called as it."""
+    kind = record.controller.rpartition(":")[2]
+    known = [name for name in controllers if name.rpartition(":")[2] == kind]
+    if record.controller in (*CONTROLLERS, *known):
+        law = Law(record.controller, dict(record.gains))
+    elif known:
+        law = Law(known[0], dict(record.gains))
+    else:
+        name = f"FILE.py:{kind}" if kind != record.controller else kind
+        reason = (
+            f"{record.label} is none of robocov's controllers; to go on, open it with --controller {name}"
+        )
+        return LostLaw(record.controller, dict(record.gains), record.label, reason)
     try:
         law.made()
         gains = {name: value for name, value in law.gains.items() if value != law.known[name].default}
@@ -311,14 +327,10 @@ def _put(lane: Lane, saved: Saved, history: History) -> None:
 
 def _events_of(record: Record) -> list[Event]:
     """Return when robots were dragged."""
-    found = []
-    for touched in record.session.get("touched", ()):
-        try:
-            robots = ", ".join(str(int(number)) for number in touched["robots"])
-            found.append(Event(float(touched["to_s"]), "hand", f"robot {robots} was dragged"))
-        except (KeyError, TypeError, ValueError):  # whoever wrote that, it was not us
-            return []
-    return found
+    return [
+        Event(touched["to_s"], "hand", f"robot {', '.join(map(str, touched['robots']))} was dragged")
+        for touched in record.session.get("touched", ())
+    ]
 
 
 def _fixed(array: Array) -> Array:

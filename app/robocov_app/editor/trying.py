@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pygame
 
+from robocov.controllers import controller_kinds
 from robocov.environment import Environment
 from robocov_app.demo.costs import LATTICE, DirectCosts, WorkerCosts
 from robocov_app.demo.desk import Desk as DemoDesk
@@ -40,7 +41,7 @@ class TrialDesk(DemoDesk):
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
         self._tried, self._title = session.environment, title
-        super().__init__(session, costs, shown, folder, title)
+        super().__init__(session, costs, shown, folder, title, controller_kinds())
 
     def open_map(self, name: str) -> None:
         """Begin anew on another map, or on the one that is tried."""

@@ -155,6 +155,6 @@ def _rows(results: Results) -> Iterator[dict[str, Any]]:
 
 def _law(controller: str, gains: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return what tells laws apart: the controller and the values of all its gains."""
-    from robocov.controllers import controller_kind, gains_of
+    from robocov.controllers import CONTROLLERS, gains_of
 
-    return (controller, *(gains[name] for name in gains_of(controller_kind(controller))))
+    return (controller, *(gains[name] for name in gains_of(CONTROLLERS.get(controller))))

@@ -195,6 +195,9 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
         ("--frames", "--out: a folder for frames and film was wanted"),
         ("--out film", "--out: --frames or --video was wanted beside it"),
         ("--json", "--json: --frames or --video was wanted beside it"),
+        ("--frames --out film --controller a.py:A", "--controller: neither --frames nor --video was wanted"),
+        ("--controller gone.py:Mine", "controller 'gone.py:Mine': there is no file gone.py"),
+        ("--controller lloyd", "--controller: lloyd, but the controller of a run was wanted: rapf"),
         ("--size 480x320", "--size: 480, but a number from 900 to 7680 pixels wide was wanted"),
         ("--frames --out film --fps 0", "--fps: 0, but a number from 1 to 240 was wanted"),
         ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
@@ -218,16 +221,19 @@ def arrays(folder: Path, **changes) -> None:
     ("spoil", "message"),
     [
         (shutil.rmtree, "{run}: not the folder of a run or a comparison (there is no run.json and no comp"),
-        (lambda run: (run / "run.json").write_text("{"), "{run}: the run cannot be read: JSONDecodeError"),
+        (lambda run: (run / "run.json").write_text("{"), "{run}/run.json:1:2: end of file: not JSON: "),
         (
             lambda run: (run / "record.npz").unlink(),
             "{run}: not the folder of a run (there is no record.npz)",
         ),
-        (lambda run: edited(run / "run.json", session=[1]), "{run}: the run cannot be read: TypeError"),
+        (
+            lambda run: edited(run / "run.json", session=[1]),
+            "{run}/run.json: session: [1], but an object was wanted",
+        ),
         (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: ascending numbers were wanted"),
         (
             lambda run: arrays(run, velocities=np.full((61, 3, 2), np.nan)),
-            "{run}/record.npz: velocities: not all of it are finite numbers",
+            "{run}/record.npz: velocities: nan, but finite numbers up to 1e+300 were wanted",
         ),
         (
             lambda run: arrays(
@@ -238,7 +244,7 @@ def arrays(folder: Path, **changes) -> None:
                     for name in "positions velocities forces goals obstacle_points".split()
                 },
             ),
-            "{run}/record.npz: it is empty",
+            "{run}/record.npz: time has shape (0,) of float64",
         ),
         (
             lambda run: (run / "cost.csv").write_text("t,J\n"),
@@ -249,6 +255,12 @@ def arrays(folder: Path, **changes) -> None:
                 "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n0,1,2,3\n1,2,3\n"
             ),
             "{run}/cost.csv: line 3: '1,2,3', but 4 numbers were wanted",
+        ),
+        (
+            lambda run: (run / "cost.csv").write_text(
+                "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n7\n"
+            ),
+            "{run}/cost.csv: line 2: '7', but 4 numbers were wanted",
         ),
         (lambda run: (run / "cost.csv").write_bytes(b"\xff\xfe"), "{run}/cost.csv: cannot be read"),
         (lambda run: edited(run / "run.json", dt_s=0.1), "{run}/record.npz: time: moments 0.1 s apart"),
@@ -262,11 +274,25 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda both: (both / "comparison.json").write_text("["), "{both}/comparison.json: cannot be read"),
-        (lambda both: (both / "comparison.json").write_text("[]"), "{both}/comparison.json: not the file"),
         (
-            lambda both: edited(both / "comparison.json", folders=["../run"]),
-            "{both}/comparison.json: folders: ['../run'], but names of folders were wanted",
+            lambda both: (both / "comparison.json").write_text("["),
+            "{both}/comparison.json:1:2: end of file: not JSON: ",
+        ),
+        (
+            lambda both: (both / "comparison.json").write_text("[]"),
+            "{both}/comparison.json: [], but a JSON object with a comparison was",
+        ),
+        (
+            lambda both: edited(both / "comparison.json", folders=["rpf", "../run"]),
+            '{both}/comparison.json: folders[1]: "../run", but the name of a folder was wanted',
+        ),
+        (
+            lambda both: edited(both / "comparison.json", folders=[".."]),
+            '{both}/comparison.json: folders[0]: "..", but the name of a folder was wanted',
+        ),
+        (
+            lambda both: edited(both / "comparison.json", version=99),
+            "{both}/comparison.json: version: 99, but 1 was wanted; it was written by a newer robocov",
         ),
         (
             lambda both: edited(both / "comparison.json", folders=["gone"]),

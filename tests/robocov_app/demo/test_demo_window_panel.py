@@ -33,7 +33,7 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     (tmp_path / "also").mkdir()
     (tmp_path / "also/mine.py").write_text(own)
     names = [f"{tmp_path / 'mine.py'}:Mine", f"{tmp_path / 'also/mine.py'}:Mine"]
-    assert law_labels(["rapf", *names]) == {
+    assert law_labels(["rapf", *names], {}) == {
         "rapf": "RAPF",
         names[0]: "RAPF (mine.py)",
         names[1]: f"RAPF ({names[1]})",

@@ -1,0 +1,165 @@
+"""Folders of results come from anybody: to read them runs no code of theirs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from called import complaint
+from swept import ROOM, controller
+
+from robocov.mapfile import save_map
+from robocov.metrics.results import read_results
+from robocov.record import Record
+from robocov_app.cli import main
+from robocov_app.demo.replayed import LostLaw
+from robocov_app.demo.session import Session
+from robocov_app.demo.window import Window
+from robocov_app.drawing_backend import record_html, record_png
+from robocov_app.paper.plan import Contender
+from robocov_app.paper.reading import read_outcomes
+from robocov_app.sweep.study_file import read_study
+
+SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")
+SMALL = ("--size", "320x240", "--fps", "2", "--film-speed", "1")
+STUDY = """
+maps = ["room.json"]
+controllers = ["mine.py:Mine"]
+robots = 2
+duration = 0.5
+dt = 0.05
+lattice = 8
+"""
+EVIL = "from pathlib import Path\nPath({marker!r}).touch()\n"
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run, a comparison and a sweep of controllers whose code has become evil since."""
+    folder = tmp_path_factory.mktemp("shared")
+    save_map(ROOM, folder / "room.json")
+    name = controller(folder, "")
+    (folder / "study.toml").write_text(STUDY)
+    (folder / "ours.toml").write_text(STUDY.replace("mine.py:Mine", "lloyd"))
+    room = str(folder / "room.json")
+    # an installed package may offer a controller, too
+    offered = folder / "offered-1.0.dist-info"
+    offered.mkdir()
+    (offered / "METADATA").write_text("Metadata-Version: 2.1\nName: offered\nVersion: 1.0\n")
+    (offered / "entry_points.txt").write_text("[robocov.controllers]\nplanted = planted:Mine\n")
+    (folder / "planted.py").write_text((folder / "mine.py").read_text())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        for command in (
+            ["run", room, "--controller", name, "--out", str(folder / "run")],
+            ["run", room, "--controller", "planted", "--out", str(folder / "offered")],
+            ["compare", room, "--controllers", "lloyd", name, "planted", "--out", str(folder / "both")],
+        ):
+            assert main([*command, *SHORT]) == 0
+        words = ["sweep", str(folder / "study.toml"), "--out", str(folder / "sweep"), "--workers", "1"]
+        assert main(words) == 0
+    for path in ("run/run.json", "both/Mine/run.json"):
+        run = json.loads((folder / path).read_text())
+        run["controller"]["source"] = EVIL.format(marker=str(folder / "marker"))
+        (folder / path).write_text(json.dumps(run))
+    for path in ("mine.py", "planted.py"):
+        text = (folder / path).read_text()
+        (folder / path).write_text(EVIL.format(marker=str(folder / "marker")) + text)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def nothing_ran_yet(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (shared / "marker").unlink(missing_ok=True)
+    monkeypatch.syspath_prepend(shared)
+    monkeypatch.delitem(sys.modules, "planted", raising=False)
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
+    """What windows show that nobody sees, after they were used for some seconds."""
+    sessions: list[Session] = []
+
+    def run(window: Window) -> None:
+        for tab in ("show", "robot", "parameters"):
+            window.panel.show_tab(tab)
+            window.do("robot:next")
+            for _ in range(10):
+                window.frame(1 / 30)
+        for deed in ("live", "step", "restart", "first", "branch", "more", "save:run"):
+            window.do(deed)
+            window.frame(1 / 30)
+        sessions.append(window.desk.session)
+        window.close()
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setenv("ROBOCOV_SETTINGS", "")
+    monkeypatch.setattr(Window, "run", run)
+    return sessions
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("replay", "run"),
+        ("replay", "offered"),
+        ("replay", "both"),
+        ("replay", "run", "--frames", *SMALL, "--out", "film"),
+        ("replay", "both", "--frames", *SMALL, "--out", "film"),
+        ("report", "run", "offered", "both", "sweep", "--out", "report.html"),
+        ("metrics", "run"),
+        ("metrics", "both", "--plot", "metrics.png"),
+        ("optimum", "--run", "both", "--restarts", "1", "--lattice", "8"),
+        ("sweep", "ours.toml", "--dry-run", "--out", "sweep"),
+    ],
+    ids=" ".join,
+)
+def test_no_command_runs_the_code_of_results(
+    shared: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    windows: list[Session],
+    words: tuple[str, ...],
+) -> None:
+    monkeypatch.chdir(shared)
+    made = ("film", "report.html", "metrics.png")
+    status = main([str(tmp_path / word) if word in made else word for word in words])
+    assert not (shared / "marker").exists()
+    assert status == 0 or words[0] == "sweep"  # which may not take over a folder of another study
+    for session in windows:
+        lost = [isinstance(lane.law, LostLaw) for lane in session.lanes]
+        assert lost == ([False, True, True] if words[1] == "both" else [True])
+
+
+def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(shared)
+    for folder in ("run", "offered", "both/Mine", "both/planted"):
+        record = Record.load(shared / folder)
+        record.snapshot(3), record.cells(3), record.to_json(), repr(record)
+        record_html(record), record_png(record)
+    results = read_results(shared / "sweep")
+    assert results.record(0).controller == results.to_pandas()["controller"][0] == "mine.py:Mine"
+    contenders = (Contender("ours", "ours", "lloyd", {}),)
+    read_outcomes(shared / "sweep", read_study(shared / "ours.toml"), contenders, {})
+    assert not (shared / "marker").exists()
+
+
+def test_who_opens_a_run_may_load_its_controller(
+    shared: Path,
+    windows: list[Session],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = controller(tmp_path, "", "safe.py")
+    assert main(["replay", str(shared / "run"), "--controller", name]) == 0
+    (session,) = windows
+    assert session.lanes[0].law.name == name
+    assert session.live and session.end == 0.0, "it has begun anew"
+    assert not (shared / "marker").exists()
+    capsys.readouterr()
+    message = complaint(capsys, "replay", str(shared / "run"), "--controller", name.replace("Mine", "Other"))
+    assert "safe.py: unknown class 'Other' (known: Mine)" in message
