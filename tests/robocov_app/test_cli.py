@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import SHORT, answer, complaint
+from drawn_run import ROOMS, run_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -273,3 +274,37 @@ def test_an_out_that_cannot_be_a_folder(tmp_path: Path, capsys: pytest.CaptureFi
     file.write_text("")
     line = complaint(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
     assert line.startswith(f"{file / 'x'}: cannot be used for results: Not a directory")
+
+
+LONG = "x" * 300
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (f"report run --out {LONG}", f"{LONG}: File name too long"),
+        (f"report {LONG}", f"{LONG}: "),
+        (f"metrics {LONG}", f"{LONG}/comparison.json: File name too long"),
+        (f"generate --width 1 --kind {LONG * 20}", "--kind: 'xxx"),
+        ("replay run --frames --out loop", "loop: "),
+        ("replay loop", "loop: "),
+        (
+            "run square --controller loop/mine.py:Mine",
+            "controller 'loop/mine.py:Mine': there is no file loop/",
+        ),
+        ("run square --robots 1.5", "--robots: '1.5', but a whole number was wanted"),
+        (f"sweep a --workers {'9' * 5000}", "--workers: '999"),
+        ("sweep a --workers 1.5", "--workers: '1.5', but a whole number was wanted"),
+        ("generate --width ten", "--width: 'ten', but a number was wanted"),
+    ],
+    ids=range(11),
+)
+def test_odd_command_lines_end_in_one_short_line(
+    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "run").mkdir()
+    run_of(ROOMS, 2).save(tmp_path / "run")
+    said = complaint(capsys, *words.split())
+    assert said.startswith(message) and len(said) < 1100

@@ -173,6 +173,90 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
+    ("body", "part"),
+    [
+        (
+            "def __post_init__(self): raise ValueError('no')",
+            "'Mine' cannot be made: ValueError: no (mine.py, line 7)",
+        ),
+        ("def __post_init__(self): exit(0)", "'Mine' cannot be made: SystemExit: 0 (mine.py, line 7)"),
+        (
+            "def __post_init__(self): raise TypeError('no')",
+            "'Mine' cannot be made: TypeError: no (mine.py, line 7)",
+        ),
+        (
+            "def __init__(self): 1 / 0",
+            "'Mine' cannot be made: ZeroDivisionError: division by zero (mine.py, line 7)",
+        ),
+        ("k: float", "'Mine' cannot be made: TypeError: "),
+        (
+            "k: list = []",
+            "mine.py cannot be run: ValueError: mutable default <class 'list'> for field k is not",
+        ),
+        ("k: float = float('inf')", "mine.py:Mine': k: inf, but a finite number was wanted"),
+        (
+            "label = property(lambda self: 1 / 0)",
+            "your own: ZeroDivisionError: division by zero (mine.py, line 7)",
+        ),
+        (
+            "scanning = property(lambda self: 1 / 0)",
+            "'Mine': ZeroDivisionError: division by zero (mine.py, line 7)",
+        ),
+        ("scanning = 5", "controller 'Mine': scanning: 5, but a Scanning was wanted"),
+        (
+            "def begin(self, region, team): exit(1)",
+            "controller 'Mine': SystemExit: 1 (mine.py, line 7) at 0.000 s",
+        ),
+        (
+            "def decide(self, seen, memory): return 3",
+            "controller 'Mine': decide gave 3, but a Decision was wanted",
+        ),
+    ],
+)
+def test_a_class_that_fails_is_named_with_its_line(
+    body: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine, out = tmp_path / "mine.py", tmp_path / "run"
+    base = "class Base:\n def begin(self, region, team): pass\n def decide(self, seen, memory): pass\n"
+    head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
+    mine.write_text(f"{base}{head}    {body}\n")
+    words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
+    assert part in complaint(capsys, *words)
+    assert not out.exists()
+
+
+def test_all_that_led_to_an_error_is_shown_where_it_is_wanted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOCOV_TRACEBACK", "1")
+    assert main(["run", "square", "--set", "k_rap=1"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("Traceback") and said.splitlines()[-1].startswith(
+        "robocov: error: rapf: unknown gain"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("9" * 5000, "--set k_rep: '99999"),
+        ("9" * 4000, "rapf.k_rep: 99999"),
+        ("[" * 100_000, "--set k_rep: '[[["),
+        ("[" * 9 + "]" * 9, "rapf.k_rep: [[[[[[[[[]]]]]]]]], but a number from"),
+        ("NaN", "rapf.k_rep: nan, but a number from"),
+        ("-Infinity", "rapf.k_rep: -inf, but a number from"),
+        ("1e999", "rapf.k_rep: inf, but a number from"),
+        ('{"a": 1}', "rapf.k_rep: {'a': 1}, but a number from"),
+        ("", "--set k_rep: '', but a number (or null), or a word, was wanted"),
+    ],
+    ids=range(9),
+)
+def test_a_gain_of_no_use_is_refused(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(capsys, "run", "square", "--set", f"k_rep={value}")
+    assert said.startswith(message) and len(said) < 200
+
+
+@pytest.mark.parametrize(
     ("law", "part"),
     [
         (
