@@ -300,7 +300,7 @@ def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
 def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
     """Return the folder whose manifest (or journal) names files in this one, and the way from there."""
     if not os.path.lexists(folder / name):
-        real = folder.resolve()
+        real = Path(os.path.realpath(folder))  # which takes links that go round in circles
         with suppress(InputError):
             listing = _listing(real.parent / name)
             if listing is not None and any(each.startswith(f"{real.name}/") for each in listing[0]):
