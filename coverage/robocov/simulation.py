@@ -18,7 +18,7 @@ from robocov.controllers.faults import fault_of
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.decisions import checked_decision, given_forces
+from robocov.observation.decisions import checked_decision, detached, given_forces
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.scans import Scanning, Scans
 from robocov.record import Record
@@ -200,11 +200,12 @@ class Simulation:
         return self._snapshot
 
     def _decide(self, seen: Observations) -> Decision:
-        # a user's controller may change what it is given, and is asked again by copies of the run
+        # a user's controller may change what it is given, and use again what it gave
         ours = self._built_in or not remembers(self.controller)
         memory = self._memory if ours else _copied(self._memory)
-        decision = self._asked(lambda: self._law.decide(seen, memory))
-        return checked_decision(decision, len(self.team), self.controller.name, seen.time)
+        made = self._asked(lambda: self._law.decide(seen, memory))
+        decision = checked_decision(made, len(self.team), self.controller.name, seen.time)
+        return decision if self._built_in else detached(decision, self.controller.name)
 
     def _asked(self, question: Callable[[], Any]) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""

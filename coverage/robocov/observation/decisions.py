@@ -14,7 +14,7 @@ from robocov.observation.observations import Decision
 
 
 def checked_decision(made: Any, count: int, controller: str, time: float) -> Decision:
-    """Return the decision, with arrays of its own, when it is one that can be carried out and recorded.
+    """Return the decision when it is one that can be carried out and recorded.
 
     Parameters
     ----------
@@ -37,10 +37,8 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
     decision: Decision = made
     forces = _rows(decision.forces, count, f"{where}: forces")
     goals = None if decision.goals is None else _rows(decision.goals, count, f"{where}: goals")
-    if not isinstance(decision.terms, Mapping):
-        raise ParameterError(f"{where}: terms: {shown(decision.terms)}, but a dict of forces was wanted")
-    terms = {name: np.array(term) for name, term in decision.terms.items()}
-    decision = replace(decision, forces=forces, goals=goals, terms=terms)
+    if forces is not decision.forces or goals is not decision.goals:
+        decision = replace(decision, forces=forces, goals=goals)
     if not np.isfinite(forces).all():
         robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
         raise ParameterError(
@@ -48,6 +46,28 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
             f"at {time:.3f} s, but finite newtons were wanted"
         )
     return decision
+
+
+def detached(decision: Decision, controller: str) -> Decision:
+    """Return a checked decision with arrays of its own: a user's controller may use its arrays again.
+
+    Parameters
+    ----------
+    decision : Decision
+    controller : str
+        Its name.
+
+    Raises
+    ------
+    ParameterError
+        When its terms are none.
+    """
+    if not isinstance(decision.terms, Mapping):
+        wanted = "but a dict of forces was wanted"
+        raise ParameterError(f"controller {controller!r}: terms: {shown(decision.terms)}, {wanted}")
+    terms = {name: np.array(term) for name, term in decision.terms.items()}
+    goals = None if decision.goals is None else decision.goals.copy()
+    return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
 
 
 def given_forces(values: Array | None, count: int, what: str) -> Array | None:
@@ -67,9 +87,9 @@ def given_forces(values: Array | None, count: int, what: str) -> Array | None:
 
 
 def _rows(values: Any, count: int, what: str) -> Array:
-    """Return two numbers for each robot as an array of its own: whoever gave them may change theirs."""
+    """Return two numbers for each robot as an array, the same one where it is one already."""
     try:
-        array = np.array(values, dtype=np.float64)
+        array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise ParameterError(f"{what}: {shown(values)}, but numbers were wanted") from None
     if array.shape != (count, 2):

@@ -141,7 +141,7 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": [".."]}'
     )
-    assert "'..'" in complaint(capsys, "metrics", str(inner))
+    assert 'folders[0]: "..", but the name of a folder' in complaint(capsys, "metrics", str(inner))
     answer(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
     assert len(Record.load(tmp_path / "run")) == len(Record.load(inner)) == 61
     (inner / "comparison.json").write_text(
