@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.controllers import gain_values, gains_of
 from robocov.controllers.gains import Option, Value, with_gains
-from robocov.errors import ParameterError, RobocovError, shown, unknown_name
+from robocov.errors import ParameterError, shown, unknown_name
 from robocov.files.strictjson import place
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class Gains:
         choices = []
         for k, given in enumerate(wanted):
             values = {name: _value(known, name, value, (*path, k, name)) for name, value in given.items()}
-            choices.append(_choice(kind, values, (*path, k)))
+            choices.append(gain_values(with_gains(kind, values)))
         once(choices, path)
         return cls(tuple(choices))
 
@@ -196,19 +196,9 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
         for row in product(*lists.values())
         for sample in samples
     ]
-    choices = [_choice(kind, values, path) for values in combined]
+    choices: list[Choice] = [gain_values(with_gains(kind, values)) for values in combined]
     once(choices, (*path, "samples"))  # as of a range that is narrower than the digits of a sample
     return Gains(tuple(choices), ranges)
-
-
-def _choice(kind: type[Any], values: Mapping[str, Value], path: Place) -> Choice:
-    """Return a value for every gain, as the controller takes them."""
-    try:
-        return gain_values(with_gains(kind, values))
-    except RobocovError:
-        raise
-    except Exception as error:  # a class of a user's may check its fields in its own way
-        raise ParameterError(f"{place(path)}: {type(error).__name__}: {error}") from error
 
 
 def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: Place) -> Value:

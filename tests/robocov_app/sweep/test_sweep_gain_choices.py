@@ -129,7 +129,11 @@ WRONG = [
         "gains.x.attraction_limit.high: None, but a number was wanted",
     ),
     (Rapf, {"k_rep": Range(1.0, 1.0000001)}, "gains.x.samples[1]: {'k_rep': 1.0, "),
-    (Picky, {"k": [1, 2]}, "gains.x: ValueError: not two"),
+    (
+        Picky,
+        {"k": [1, 2]},
+        "controller 'Picky' cannot be made: ValueError: not two (test_sweep_gain_choices.py",
+    ),
     (object, {"k": 1}, "gains.x: 'k', but the controller has no gains"),
 ]
 
