@@ -18,9 +18,7 @@ from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
-from robocov.robots.team import LIMITS
 from robocov_app.building import PATIENCE, built_cost
-from robocov_app.options import in_range
 from robocov_app.output import finite
 from robocov_app.progress import progress
 from robocov_app.weighing import density_kind, weighed_lines
@@ -134,8 +132,6 @@ def _check(options: Arguments) -> None:
     ):
         if not least <= number <= most:
             raise ParameterError(f"{name}: {number}, but a whole number from {least} to {most} was wanted")
-    if options.radius is not None:
-        in_range("--radius", options.radius, *LIMITS["radius"][:2], "m")
     if options.seed < 0:
         raise ParameterError(f"--seed: {options.seed}, but a whole number of at least 0 was wanted")
     if options.positions is not None:
