@@ -27,9 +27,6 @@ LIMITS: dict[str, tuple[float, float, bool]] = {
     "communication_range": (0.0, 1e5, True),
 }
 """What each parameter may be."""
-MAX_MASS_RATIO = 1000.0
-"""Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
-
 UNITS = {
     "radius": "m",
     "mass": "kg",
@@ -102,10 +99,6 @@ class Team:
                     f"but a number from {low:g} to {high:g}{also} was wanted"
                 )
             object.__setattr__(self, field.name, values)
-        light, heavy = float(self.mass.min(initial=np.inf)), float(self.mass.max(initial=0.0))
-        if heavy > MAX_MASS_RATIO * light:
-            most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
-            raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
 
     @classmethod
     def homogeneous(

@@ -21,6 +21,7 @@ import pymunk
 from pymunk import batch
 
 from robocov.arrays import Array
+from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.world.moving_bodies import MovingBodies
 
@@ -32,6 +33,9 @@ LONGEST_SUBSTEP = 0.02
 
 MAX_PENETRATION = 1e-3
 """Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
+
+MAX_MASS_RATIO = 1000.0
+"""Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
 
 _MOST_SUBSTEPS = 64
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
@@ -51,6 +55,11 @@ class World:
         Obstacles that move, as kinematic bodies; see `robocov.world.moving_bodies`.
     wrecks : (w, 3) m or None
         x, y and radius of robots that have failed, and stand in the way.
+
+    Raises
+    ------
+    ParameterError
+        When a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
     """
 
     def __init__(
@@ -66,8 +75,12 @@ class World:
         self.team = team
         self._pieces, self._wrecks = pieces, wrecks
         self._space = pymunk.Space()
+        light, heavy = float(team.mass.min()), float(team.mass.max())
+        if heavy > MAX_MASS_RATIO * light:
+            most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
+            raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
         # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
-        self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
+        self._space.iterations = 20 + math.ceil(2.0 * heavy / light)
         self._space.collision_slop = 1e-4
         # the part of an overlap that is left after a second: none after a substep; only what a moving
         # obstacle has run over is deep, and comes out of it gradually

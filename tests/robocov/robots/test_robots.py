@@ -64,12 +64,6 @@ def test_teams_have_robots_and_one_value_for_each() -> None:
         Team.from_dict({"robots": 2})
 
 
-def test_masses_whose_contacts_cannot_be_resolved_are_refused() -> None:
-    light, heavy = Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)
-    with pytest.raises(ParameterError, match=r"team.mass: 0.5 to 501 kg, but .* 1000 times as heavy"):
-        Team.joined([light, heavy])
-
-
 def test_it_is_short_in_words() -> None:
     team = Team.homogeneous(3, max_speed=0.5)
     assert repr(team) == (

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment
+from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.world import MAX_PENETRATION, World
 from robocov.world.solid import solid_pieces
@@ -113,6 +114,13 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
             assert shapely.contains_xy(empty.free, crowd.positions).all()
             assert (radius - room).max() <= MAX_PENETRATION
     assert overlap.max() > 0.0
+
+
+def test_masses_whose_contacts_cannot_be_resolved_are_refused(empty: Environment) -> None:
+    """The team itself is read all the same, as that of a record is."""
+    team = Team.joined([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
+    with pytest.raises(ParameterError, match=r"team.mass: 0.5 to 501 kg, but .* 1000 times as heavy"):
+        World(solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
 
 
 def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
