@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -34,6 +35,9 @@ class Arguments:
     """What stands above; by default what was run."""
     theme: Literal["auto", "light", "dark"] = "auto"
     """Colours; auto follows the reader's preference."""
+    optimum: bool = False
+    """Search for the centralised reference of each map and team, some seconds each, and tell how far every
+    run stays above it; those that were found before are in the page anyway."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -42,7 +46,6 @@ def command(options: Arguments) -> None:
     """Read, draw and write."""
     if not options.folders:
         raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
-    from robocov_app.progress import progress
     from robocov_app.report.document import report
     from robocov_app.report.gathering import gathered
 
@@ -51,9 +54,15 @@ def command(options: Arguments) -> None:
         check_target(target, overwrite=options.overwrite)
     results = [gathered(folder) for folder in options.folders]
     check_target(target, overwrite=options.overwrite)
-    total = sum(len(result.fine) for result in results)
-    with progress("runs read", total, quiet=options.json) as tell:
-        page = report(results, title=options.title, theme=options.theme, tell=tell)
+    results = [_readable(result, quiet=options.json) for result in results]
+    damaged = [(result.folder, each) for result in results for each in result.damaged]
+    if not any(result.entries for result in results):
+        folder, each = damaged[0]
+        raise InputError(f"{folder}: {each.folder}: {each.reason}; no run is left to report")
+    for folder, each in () if options.json else damaged:
+        print(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", file=sys.stderr)
+    results = [_with_references(result, options) for result in results]
+    page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
     if options.out is None and results[0].kind != "sweep":
         with extended(options.folders[0]) as result, written(result.new / REPORT) as part:
@@ -72,6 +81,24 @@ def command(options: Arguments) -> None:
     for each in results:
         print(_told(each))
     print(f"written to {target} ({len(data) / 1e6:.2f} MB)")
+
+
+def _readable(result: Result, *, quiet: bool) -> Result:
+    """Return the result with its damaged runs apart; reading all takes 10 ms a run."""
+    from robocov_app.progress import progress
+
+    with progress("runs read", len(result.fine), quiet=quiet or result.kind != "sweep") as tell:
+        return result.readable(tell)
+
+
+def _with_references(result: Result, options: Arguments) -> Result:
+    """Return the result with the references that are known, or searched for."""
+    from robocov_app.progress import progress
+    from robocov_app.report.references import with_references
+
+    quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
+    with progress("searching", total, quiet=quiet) as tell:
+        return with_references(result, search=options.optimum, tell=tell)
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
@@ -99,6 +126,7 @@ def _counts(folder: Path, result: Result, shown: int) -> dict[str, object]:
         "kind": result.kind,
         "runs": len(result.fine),
         "failed": len(result.failed),
+        "damaged": [each._asdict() for each in result.damaged],
         "missing": result.missing,
         "shown": shown,
     }
@@ -108,6 +136,8 @@ def _told(result: Result) -> str:
     words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
     if result.failed:
         words.append(f"{len(result.failed)} failed")
+    if result.damaged:
+        words.append(f"{len(result.damaged)} cannot be read")
     if result.missing:
         words.append(f"{result.missing} of {result.wanted} missing")
     return ", ".join(words)

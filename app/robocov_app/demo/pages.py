@@ -97,7 +97,7 @@ def _slider(widgets: Widgets, desk: Desk, each: Parameter, y: float, wide: float
     )
     widgets.entry(each.name, each.words(), rect(right - 114, y, 50, 24), read)
     widgets.label(each.unit, rect(right - 59, y, 37, 24), style="#unit")
-    usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}"
+    usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}".rstrip()
     widgets.button(
         "↺",
         rect(right - 22, y + 1, 22, 22),

@@ -116,7 +116,9 @@ def pair_row(outcomes: Outcomes, first: str, second: str, words: str, controller
     if found is None:
         return None
     paired, fine = found
-    return Pairs(words, controller, np.asarray(fine.of(first, "final") / fine.of(second, "final")), paired)
+    return Pairs(
+        words, controller, np.asarray(fine.of(first, "final") / fine.of(second, "final")), paired.ratio
+    )
 
 
 def gaps_figure(samples: Sequence[Sample], theme: Theme) -> Figure:

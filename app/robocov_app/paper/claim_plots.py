@@ -141,7 +141,7 @@ def _pairs(outcomes: Outcomes, first: str, second: str, measure: str, words: str
         return None
     paired, fine = found
     ratios = fine.of(first, measure) / fine.of(second, measure)
-    return Pairs(words, "rapf", np.asarray(ratios), paired)
+    return Pairs(words, "rapf", np.asarray(ratios), paired.ratio)
 
 
 def _sample(outcomes: Outcomes, law: str, words: str) -> Sample | None:

@@ -135,7 +135,6 @@ def page(
     """
     from markupsafe import Markup
 
-    from robocov_app.plots.curves import curve_styles
     from robocov_app.report.replay import ReplayRun, replay_css, replay_js, replay_part, script
 
     replays = [
@@ -144,7 +143,6 @@ def page(
     ]
     order = list(runs)
     panes = [order.index("b/rapf"), order.index("b/rpf")]
-    styles = curve_styles(run.record.controller for run in replays)
     context: dict[str, Any] = {
         "version": __version__,
         "style": style_sheet(replay_css()),
@@ -169,7 +167,7 @@ def page(
             }
             for text in TEXTS
         ],
-        "replay": Markup(replay_part(replays, styles, panes, _REPLAY_BUDGET)),
+        "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
         "replay_script": Markup(script(replay_js() + "startReplays();")),
         "questions": _questions(claims, images),
         "laws": [],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -28,8 +29,24 @@ VARIANTS: tuple[tuple[Any, str], ...] = (
     ((0, (6, 1.6, 1.6, 1.6)), "D"),
     ((0, (9, 2.5)), "v"),
     ((0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), "P"),
+    ((0, (2.5, 2.5)), "*"),
+    ((0, (9, 1.4, 3, 1.4)), "X"),
 )
 """Those of controllers that have none of their own, and of one controller's second, third, ... gains."""
+
+_LOOKS = (*_KNOWN.values(), *VARIANTS)
+
+MARKS = {
+    "o": "M0-5a5 5 0 1 0 .01 0z",
+    "s": "M-4.6-4.6h9.2v9.2h-9.2z",
+    "^": "M0-5.6 5.6 4.4H-5.6z",
+    "v": "M0 5.6 5.6-4.4H-5.6z",
+    "D": "M0-6 6 0 0 6-6 0z",
+    "P": "M-2-6h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
+    "*": "M0-6.6 1.8-2.1 6.6-1.8 2.9 1.3 4.1 6 0 3.4-4.1 6-2.9 1.3-6.6-1.8-1.8-2.1z",
+    "X": "M-5.6-3-3-5.6 0-2.6 3-5.6 5.6-3 2.6 0 5.6 3 3 5.6 0 2.6-3 5.6-5.6 3-2.6 0z",
+}
+"""The marks as SVG paths round the origin, 10 to 13 across."""
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
@@ -62,17 +79,31 @@ class CurveStyle(NamedTuple):
 
 def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
     """Return a style for each controller; those that have none of their own get the others' in turn."""
-    styles: dict[str, CurveStyle] = {}
-    own = 0
-    for controller in controllers:
-        if controller in styles:
-            continue
-        if controller in _KNOWN:
-            styles[controller] = CurveStyle(controller, *_KNOWN[controller])
-        else:
-            place = own % len(VARIANTS)
-            styles[controller] = CurveStyle(f"other-{place}", *VARIANTS[place])
-            own += 1
+    names = list(dict.fromkeys(controllers))
+    return dict(zip(names, styles_of(names), strict=True))
+
+
+def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
+    """Return a style for each of several curves: another colour, dashes and mark for a controller's variants.
+
+    >>> [(style.name, style.mark) for style in styles_of(["rapf", "rapf", "mine"])]
+    [('rapf', 'o'), ('other-1', 'v'), ('other-0', 'D')]
+    """
+    spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
+    free = itertools.cycle(spare)
+    first = {
+        name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free)
+        for name in dict.fromkeys(controllers)
+    }
+    left, used = dict(first), set(first.values())
+    styles = []
+    for name in controllers:
+        style = left.pop(name, None)
+        if style is None:
+            own = [first[name]._replace(dashes=dashes, mark=mark) for dashes, mark in _LOOKS]
+            style = next((each for each in (*spare, *own) if each not in used), first[name])
+            used.add(style)
+        styles.append(style)
     return styles
 
 
@@ -84,7 +115,9 @@ def end_label(curve: Curve, unit: str = "m") -> str:
     label, _, _, values = curve
     last = float(values[np.isfinite(values)][-1])
     number = f"{last:.3f}"
-    if unit != "m" and abs(last) >= 10.0:
+    if abs(last) >= 1e7:
+        number = f"{last:.4g}"
+    elif unit != "m" and abs(last) >= 10.0:
         number = f"{last:.4g}" if abs(last) < 1e4 else f"{last:,.0f}"
     return f"{label}  {number} {unit}".rstrip()
 
@@ -118,9 +151,8 @@ def draw_curves(
     weight : float
         Of lines and marks: below 1 for a small picture.
     """
-    looks = _styles(curves, theme)
-    if styles is not None:
-        looks = [(style.colour(theme), style.dashes, style.mark) for style in styles]
+    chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
+    looks = [(style.colour(theme), style.dashes, style.mark) for style in chosen]
     around = [band for band in bands or () if band is not None]
     _frame(axes, curves, theme, around, label)
     for (_, _, time, _), (shade, _, _), band in zip(
@@ -170,19 +202,6 @@ def draw_curves(
                 linewidth=0.8,
                 clip_on=False,
             )
-
-
-def _styles(curves: Sequence[Curve], theme: Theme) -> list[tuple[Colour, Any, str]]:
-    """Return each curve's colour, dashes and mark: never a colour alone tells two apart."""
-    styles: list[tuple[Colour, Any, str]] = []
-    own = 0
-    for _, controller, _, _ in curves:
-        if controller in _KNOWN:
-            styles.append((theme.controller(controller), *_KNOWN[controller]))
-        else:
-            styles.append((theme.others[own % len(theme.others)], *VARIANTS[own % len(VARIANTS)]))
-            own += 1
-    return styles
 
 
 def _frame(

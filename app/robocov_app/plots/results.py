@@ -15,12 +15,12 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
 from robocov_app.plots.curves import (
     DISTANCE,
-    VARIANTS,
     Curve,
     CurveStyle,
     curve_styles,
     draw_curves,
     end_label,
+    styles_of,
 )
 from robocov_app.plots.page import TITLE, Page, plain_style, tone
 from robocov_app.plots.rows import (
@@ -41,8 +41,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from robocov_app.statistics import Paired
+    from robocov_app.statistics import Interval
 
+
+_REACH = 1.5
+"""So much farther than its pairs an axis of ratios goes for their intervals."""
 
 _USUAL = 700.0
 """Width of a page in pixels from which on lines have their full width."""
@@ -87,14 +90,14 @@ class Pairs(NamedTuple):
         The first one's name, for the colour.
     ratios : (m,)
         First by second, one for each pair.
-    paired : Paired
-        What `robocov_app.statistics.paired` says of them.
+    interval : Interval
+        The typical ratio.
     """
 
     label: str
     controller: str
     ratios: Array
-    paired: Paired
+    interval: Interval
 
 
 def plot_cost_bands(
@@ -242,7 +245,7 @@ def plot_final_costs(
         for sample, place, look in zip(samples, places, looks, strict=True):
             draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
         values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
-        row_frame(axes, places, names, total, theme, label)
+        row_frame(axes, places, names, total, theme, label, looks)
         value_limits(axes, values, origin)
         for (name, _), head in zip(rows, heads, strict=True):
             if name:
@@ -298,7 +301,7 @@ def plot_paired(
         for each, look, place in zip(pairs, looks, places, strict=True):
             colour = tone(look.colour(theme))
             draw_points(axes, np.sort(each.ratios), place, colour, theme)
-            ratio = each.paired.ratio
+            ratio = each.interval
             if np.isfinite(ratio.low):
                 ends = [ratio.low, ratio.high]
                 axes.plot(
@@ -311,28 +314,12 @@ def plot_paired(
                 )
             draw_median(axes, ratio.estimate, place, theme)
         row_frame(axes, places, names, total, theme, label)
-        ratio_limits(axes, np.concatenate([each.ratios for each in pairs]), theme)
+        ratios = np.concatenate([each.ratios for each in pairs])
+        ends = [end for each in pairs for end in (each.interval.low, each.interval.high) if np.isfinite(end)]
+        # an interval of two or three values may be endless: it leaves the axis then
+        ends = np.clip(ends, ratios.min() / _REACH, ratios.max() * _REACH).tolist()
+        ratio_limits(axes, np.concatenate([ratios, ends]), theme)
         return cast("Figure", axes.get_figure(root=True))
-
-
-def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
-    """Return a style for each of several curves or boxes: one colour a controller, and dashes of its own.
-
-    >>> [style.name for style in styles_of(["rapf", "rapf", "mine"])]
-    ['rapf', 'rapf', 'other-0']
-    """
-    known = curve_styles(controllers)
-    seen: dict[str, int] = {}
-    styles = []
-    for controller in controllers:
-        number = seen.get(controller, 0)
-        seen[controller] = number + 1
-        style = known[controller]
-        if number:
-            dashes, mark = VARIANTS[(number - 1) % len(VARIANTS)]
-            style = style._replace(dashes=dashes, mark=mark)
-        styles.append(style)
-    return styles
 
 
 def quartiles(values: Array) -> tuple[Array, Array, Array]:

@@ -28,6 +28,9 @@ FEW = 5
 _ROW, _HEADING = 30.0, 26.0
 """Heights of a row and of a group's name above several, in pixels at scale 1."""
 
+_BESIDE = 13.0
+"""Points between a row's name and the axis, where its mark stands."""
+
 _HALF = 0.27
 """Half of the height of a box, in rows."""
 
@@ -70,7 +73,7 @@ def rows_page(
     page = Page((width, 200), theme, scale or min(max(width / 640, 0.8), 6.0))
     s = page.scale
     short = [cut_to(name, page.text_width, 0.42 * width) for name in names]
-    left = max(page.text_width(name) for name in short) + 22 * s
+    left = max(page.text_width(name) for name in short) + 32 * s
     above, below = (36 if title else 8) * s, 46 * s
     if height is None:
         height = round(above + _ROW * s * total + below)
@@ -81,9 +84,15 @@ def rows_page(
 
 
 def row_frame(
-    axes: Axes, places: Sequence[float], names: Sequence[str], total: float, theme: Theme, label: str
+    axes: Axes,
+    places: Sequence[float],
+    names: Sequence[str],
+    total: float,
+    theme: Theme,
+    label: str,
+    looks: Sequence[CurveStyle] = (),
 ) -> None:
-    """Write the names beside the rows, and what the values are."""
+    """Write the names beside the rows, with the marks of their styles, and what the values are."""
     ink = tone(theme.ink)
     axes.set_facecolor(tone(theme.background))
     axes.set_ylim(total, 0.0)
@@ -95,7 +104,20 @@ def row_frame(
         axes.spines[side].set_visible(False)
     axes.spines["bottom"].set_color(tone(theme.faint))
     axes.tick_params(colors=tone(theme.faint), labelcolor=ink, labelsize=SMALL)
-    axes.tick_params(axis="y", length=0.0, labelsize=TEXT)
+    axes.tick_params(axis="y", length=0.0, labelsize=TEXT, pad=_BESIDE)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    aside = -0.5 * (_BESIDE + 3.0) * figure.dpi / 72 / axes.get_window_extent().width
+    for place, look in zip(places, looks, strict=False):
+        axes.plot(
+            aside,
+            place,
+            look.mark,
+            color=tone(look.colour(theme)),
+            markersize=5.5,
+            transform=axes.get_yaxis_transform(),
+            clip_on=False,
+        )
 
 
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:

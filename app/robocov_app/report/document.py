@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
 from robocov.errors import ParameterError, counted
+from robocov_app.plots.curves import MARKS
 from robocov_app.report.choosing import MOST_RUNS, chosen
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
@@ -18,22 +20,24 @@ from robocov_app.report.facts import (
     facts,
     gaps,
     lede,
-    pairs_words,
+    meanings,
     run_facts,
     run_title,
     title_of,
     troubles,
     weighed_text,
 )
-from robocov_app.report.groups import comparisons, setting_label, settings, variants
+from robocov_app.report.groups import setting_label, settings, styles, variants
 from robocov_app.report.measure_plots import measure_plots
+from robocov_app.report.pairs import comparisons, contenders, pairs_words
 from robocov_app.report.pictures import map_picture, run_picture
 from robocov_app.report.replay import MOST_PANES, asset, replay_css, replay_js, replay_part, script
-from robocov_app.report.result_plots import MOST_PANELS, Curves, cost_plots, final_plots, paired_plot, styles
+from robocov_app.report.result_plots import MOST_PANELS, Curves, cost_plots, final_plots, paired_plots
 from robocov_app.report.tables import (
     controllers_table,
     failures_table,
     gains_table,
+    map_pairs_tables,
     pairs_table,
     runs_table,
     summary_tables,
@@ -43,12 +47,22 @@ from robocov_app.view.theme import theme_named
 
 if TYPE_CHECKING:
     from jinja2 import Template
+    from markupsafe import Markup
 
     from robocov_app.report.choosing import Choice
     from robocov_app.report.gathering import Result
+    from robocov_app.report.result_plots import Looks
 
 MOST_MAPS = 12
 """Maps that are drawn."""
+
+LEDE_NOTE = (
+    "By the mean distance to the nearest robot at the end, in pairs of runs from the same starts; "
+    "ratios below 1 are in favour of the first, with 95 % intervals."
+)
+
+MOST_LETTERS = 40
+"""A longer word is cut, and stands whole in a tooltip."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +85,6 @@ def report(
     *,
     title: str | None = None,
     theme: str = "auto",
-    tell: Callable[[int], None] = lambda done: None,
 ) -> Report:
     """Return results as a page; the same results give the same page.
 
@@ -83,8 +96,6 @@ def report(
         By default, what the result is called.
     theme : {"auto", "light", "dark"}
         "auto" follows the reader.
-    tell : callable
-        Called with the number of runs whose curves are read.
 
     Raises
     ------
@@ -97,11 +108,8 @@ def report(
         raise ParameterError("report: no results were given, but at least one was wanted")
     if theme != "auto":
         theme_named(theme)
-    sections = []
-    read = 0
-    for number, result in enumerate(results, start=1):
-        sections.append(_section(result, f"r{number}", BUDGET // len(results), partial(_told, tell, read)))
-        read += len(result.fine)
+    budget = BUDGET // len(results)
+    sections = [_section(result, f"r{number}", budget) for number, result in enumerate(results, start=1)]
     default = sections[0]["title"] if len(results) == 1 else f"{len(results)} results"
     code = script(replay_js() + asset("report.js") + "startReport(startReplays());")
     html = _template().render(
@@ -117,35 +125,21 @@ def report(
     return Report(html, tuple(section["shown"] for section in sections))
 
 
-MARKS = {
-    "o": "M0-5a5 5 0 1 0 .01 0z",
-    "s": "M-4.6-4.6h9.2v9.2h-9.2z",
-    "^": "M0-5.6 5.6 4.4H-5.6z",
-    "v": "M0 5.6 5.6-4.4H-5.6z",
-    "D": "M0-6 6 0 0 6-6 0z",
-    "P": "M-2-6h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
-}
-"""The marks of curves as SVG paths."""
-
-
-def _told(tell: Callable[[int], None], before: int, done: int) -> None:
-    tell(before + done)
-
-
-def _section(result: Result, key: str, budget: int, tell: Callable[[int], None]) -> dict[str, Any]:
+def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     """Return all that the page says of a result."""
     looks = styles(result)
     choice = chosen(result, MOST_RUNS, MOST_PANES)
-    pairs = comparisons(result)
-    curves = Curves(result, tell)
-    costs = list(cost_plots(result, curves, f"{key}c"))
+    compared = contenders(result)
+    pairs = comparisons(compared.groups)
+    costs = list(cost_plots(result, Curves(result), looks, f"{key}c"))
     maps = list(result.maps.values())
     several = len(settings(result)) > 1
-    replayed = _replayed(result, choice)
+    replayed = _replayed(result, choice, looks)
     return {
         "key": key,
         "title": title_of(result),
         "lede": lede(result, pairs),
+        "lede_note": LEDE_NOTE if result.kind == "sweep" and any(each.pairs > 1 for each in pairs) else "",
         "gaps": gaps(result),
         "troubles": troubles(result),
         "facts": facts(result),
@@ -153,16 +147,18 @@ def _section(result: Result, key: str, budget: int, tell: Callable[[int], None])
         "map_names": list(result.maps)[:MOST_MAPS],
         "more_maps": len(maps) - MOST_MAPS,
         "controllers": controllers_table(result, looks),
+        "meanings": meanings(result),
         "gains": gains_table(result, looks),
         "summaries": summary_tables(result, looks),
         "runs": runs_table(result, looks),
         "costs": costs,
         "costs_words": _costs_words(result, costs),
-        "measures": measure_plots(result, replayed, choice.entries, f"{key}m"),
-        "finals": list(final_plots(result, f"{key}f")),
+        "measures": measure_plots(result, replayed, choice.entries, looks, f"{key}m"),
+        "finals": list(final_plots(result, looks, f"{key}f")),
         "pairs": pairs_table(pairs, looks) if pairs else None,
-        "pairs_plot": paired_plot(pairs, f"{key}p"),
-        "pairs_words": pairs_words(result, pairs),
+        "pairs_plots": list(paired_plots(pairs, looks, f"{key}p")),
+        "map_pairs": map_pairs_tables(pairs),
+        "pairs_words": pairs_words(pairs, compared.words),
         "dependences": list(dependence_plots(result, f"{key}d")),
         "failures": failures_table(result, looks),
         "several": several,
@@ -177,22 +173,22 @@ def _section(result: Result, key: str, budget: int, tell: Callable[[int], None])
         "thumbnails": [
             {
                 "title": run.title,
-                "label": run.title.partition(" · ")[0],
-                "rest": run.title.partition(" · ")[2],
+                "label": run.label,
+                "rest": run.title.removeprefix(run.label).removeprefix(" · "),
                 "picture": run_picture(run.record, run.history, hidden=True),
                 "facts": run.facts,
                 "final": f"{entry.final:.3f} m" if entry.final == entry.final else "",
                 "where": setting_label(result, entry.setting),
-                "style": looks[entry.controller],
+                "style": run.style,
             }
             for run, entry in zip(replayed, choice.entries, strict=True)
         ],
-        "replay": replay_part(replayed, looks, choice.panes, budget) if replayed else "",
+        "replay": replay_part(replayed, choice.panes, budget) if replayed else "",
         "shown": len(replayed),
     }
 
 
-def _replayed(result: Result, choice: Choice) -> list[ReplayRun]:
+def _replayed(result: Result, choice: Choice, looks: Looks) -> list[ReplayRun]:
     """Return the chosen runs with their records."""
     labels = {entry: group.label for group in variants(result) for entry in group.entries}
     return [
@@ -201,6 +197,8 @@ def _replayed(result: Result, choice: Choice) -> list[ReplayRun]:
             result.history(entry),
             run_title(result, entry, labels[entry]),
             run_facts(result, entry),
+            label=labels[entry],
+            style=looks[labels[entry]],
         )
         for entry in choice.entries
     ]
@@ -234,4 +232,17 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["short"] = _shortened
     return environment.get_template("report.html")
+
+
+def _shortened(text: str) -> Markup:
+    """Return a text as HTML whose overlong words are cut: no name makes a page wider than a telephone."""
+    from markupsafe import Markup, escape
+
+    def cut(word: str) -> Markup:
+        short = f"{word[: MOST_LETTERS - 13]}…{word[-12:]}"
+        return Markup('<span class="cut" title="{}">{}</span>').format(word, short)
+
+    parts = re.split(rf"(\S{{{MOST_LETTERS + 1},}})", text)
+    return Markup("").join(cut(part) if k % 2 else escape(part) for k, part in enumerate(parts))

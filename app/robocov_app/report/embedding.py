@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from robocov_app.plots.curves import MARKS
 from robocov_app.report.density_picture import density_picture
 from robocov_app.saved import roster_of
 
@@ -56,12 +57,18 @@ class ReplayRun:
         What the run is called.
     facts : str
         What else is to be said of it, in one sentence.
+    label : str
+        Its controller, with its variant, at its curve; by default the record's.
+    style : CurveStyle or None
+        By default one of its own in its replay.
     """
 
     record: Record
     history: CostHistory | None
     title: str
     facts: str = ""
+    label: str = ""
+    style: CurveStyle | None = None
 
 
 def even_times(end: float, rate: float) -> Array:
@@ -178,10 +185,10 @@ def embedded_run(
     return {
         "title": run.title,
         "facts": run.facts,
-        "label": record.label,
+        "label": run.label or record.label,
         "style": style.name,
         "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
-        "mark": style.mark,
+        "mark": MARKS[style.mark],
         "map": place,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),

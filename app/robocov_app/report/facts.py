@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robocov.errors import counted
-from robocov_app.report.groups import compared_groups, gain_text, setting_label, variants
+from robocov_app.report.groups import gain_text, setting_label, variants
+from robocov_app.report.pairs import MOST_SAID
 from robocov_app.sweep.circumstances import UNITS, circumstance_text
 from robocov_app.view.phi import density_words
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Entry, Result
-    from robocov_app.report.groups import Comparison
+    from robocov_app.report.pairs import Comparison
 
 
 def title_of(result: Result) -> str:
@@ -28,26 +30,23 @@ def title_of(result: Result) -> str:
     return f"{_listed(labels)} on {_listed(maps)}"
 
 
-def lede(result: Result, comparisons: Sequence[Comparison]) -> str:
-    """Return what came of it, in one or two sentences."""
+def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
+    """Return what came of it, in a few sentences."""
     fine = [entry for entry in result.fine if np.isfinite(entry.final)]
     if not fine:
-        return "No run has a result."
+        return ["No run has a result."]
     if result.kind == "sweep":
-        pairs = [each for each in comparisons if len(each.a) > 1]
-        best = " (each with its best gains)" if len(compared_groups(result)) < len(variants(result)) else ""
-        words = [
-            f"{each.first.label} against {each.second.label}{best}: lower in "
-            f"{100 * each.paired.wins.estimate:.0f} % of {each.paired.pairs} pairs, "
-            f"median ratio {_interval(each)}."
-            for each in pairs[:3]
-        ]
-        return " ".join(words) or f"{counted(len(fine), 'run')}, median final distance {_median(fine):.3f} m."
+        pairs = [each for each in comparisons if each.pairs > 1]
+        words = [each.headline() for each in pairs[:MOST_SAID]]
+        if len(pairs) > MOST_SAID:
+            words.append(f"{counted(len(pairs) - MOST_SAID, 'more comparison')} below.")
+        return words or [f"{counted(len(fine), 'run')}, median final distance {_median(fine):.3f} m."]
     if len(fine) == 1:
         entry = fine[0]
         at = entry.figures.get("settled_at_s")
         rest = "not settled by the end" if at is None else f"settled after {at:.1f} s"
-        return f"At the end the nearest robot is {entry.final:.3f} m away on average; {rest}."
+        above = _above(result, entry)
+        return [f"At the end the nearest robot is {entry.final:.3f} m away on average{above}; {rest}."]
     lowest = min(entry.final for entry in fine)
     labels = {entry: group.label for group in variants(result) for entry in group.entries}
     parts = []
@@ -55,7 +54,7 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> str:
         above = f" (+{100 * (entry.final / lowest - 1):.0f} %)" if entry.final > lowest > 0 else ""
         parts.append(f"{labels[entry]} {entry.final:.3f} m{above}")
     weighed = ", weighed by φ" if weighed_text(result) else ""
-    return f"Final mean distance to the nearest robot{weighed}: {', '.join(parts)}."
+    return [f"Final mean distance to the nearest robot{weighed}: {', '.join(parts)}."]
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
@@ -81,6 +80,12 @@ def facts(result: Result) -> list[tuple[str, str]]:
     return [(term, text) for term, text in rows if text]
 
 
+def meanings(result: Result) -> list[tuple[str, str]]:
+    """Return the gains of the controllers that were run, and what they are."""
+    used = {name for entry in result.entries for name, _ in entry.gains}
+    return [(name, text) for name, text in result.meanings.items() if name in used and text]
+
+
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
     words = {name: density_words(environment) for name, environment in result.maps.items()}
@@ -91,14 +96,31 @@ def weighed_text(result: Result) -> str:
 
 
 def gaps(result: Result) -> list[str]:
-    """Return sentences on runs that are missing or failed."""
+    """Return sentences on runs that failed, cannot be read, or are missing: the first that is told."""
     words = []
+    if result.failed:
+        total = Counter(entry.label for entry in result.entries)
+        failed = Counter(entry.label for entry in result.failed)
+        whose = ", ".join(f"{label} {count} of {total[label]}" for label, count in failed.most_common())
+        words.append(
+            f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): "
+            f"{_firsts([entry.error or '' for entry in result.failed])}"
+        )
+    if result.damaged:
+        reasons = [f"{each.folder} ({each.reason})" for each in result.damaged]
+        be = "is" if len(reasons) == 1 else "are"
+        words.append(f"{counted(len(reasons), 'run')} cannot be read and {be} left out: {_firsts(reasons)}")
     if result.missing:
         verb = "is" if result.missing == 1 else "are"
         words.append(f"Not finished: {result.missing} of {counted(result.wanted, 'run')} {verb} missing.")
-    if result.failed:
-        words.append(f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed.")
     return words
+
+
+def _firsts(texts: Sequence[str], most: int = 3) -> str:
+    """Return the first different texts as a sentence, and how many more there are."""
+    different = list(dict.fromkeys(texts))
+    more = f"; and {len(different) - most} more" if len(different) > most else ""
+    return f"{'; '.join(different[:most])}{more}."
 
 
 def troubles(result: Result) -> list[str]:
@@ -119,22 +141,6 @@ def troubles(result: Result) -> list[str]:
         elif count:
             words.append(f"In {count} of {fine} runs {what}.")
     return words
-
-
-def pairs_words(result: Result, comparisons: Sequence[Comparison]) -> str:
-    """Return how the pairs were made and what the intervals mean."""
-    words = "A pair is two runs on the same map, with the same team, start and seed."
-    apart = variants(result)
-    if len(compared_groups(result)) < len(apart):
-        words += " Of each controller the gains with the lowest median take part, chosen on these same runs."
-    if not comparisons or max(len(each.a) for each in comparisons) < 2:
-        return words + " There is one pair only: nothing can be said of others."
-    by_map = any(each.by_map for each in comparisons)
-    what = "maps, and hold for maps like these" if by_map else "pairs, and hold for these maps only"
-    return (
-        f"{words} Median ratio and difference with 95 % bootstrap intervals, which draw whole {what}. "
-        f"Ties count half."
-    )
 
 
 def run_title(result: Result, entry: Entry, label: str) -> str:
@@ -176,10 +182,9 @@ def _median(entries: Sequence[Entry]) -> float:
     return float(np.median([entry.final for entry in entries]))
 
 
-def _interval(each: Comparison) -> str:
-    ratio = each.paired.ratio
-    known = f" ({ratio.low:.3f} to {ratio.high:.3f})" if np.isfinite(ratio.low) else ""
-    return f"{ratio.estimate:.3f}{known}"
+def _above(result: Result, entry: Entry) -> str:
+    gap = result.gap(entry)
+    return f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
 
 
 def _known(entry: Entry, name: str) -> bool:
@@ -204,6 +209,8 @@ def _runs_text(result: Result) -> str:
     words = [str(done) if done == result.wanted else f"{done} done"]
     if result.failed:
         words.append(f"{len(result.failed)} failed")
+    if result.damaged:
+        words.append(f"{len(result.damaged)} unreadable")
     if result.missing:
         words.append(f"{result.missing} of {result.wanted} missing")
     return ", ".join(words)
@@ -228,7 +235,7 @@ def _team_text(result: Result) -> str:
     parts = []
     if isinstance(team, dict):
         parts = [_parameter(str(key), value) for key, value in team.items()]
-    for name, _ in result.entries[0].team:
+    for name, _ in result.entries[0].team if result.entries else ():
         values = list(dict.fromkeys(dict(entry.team)[name] for entry in result.entries))
         several = ", ".join(circumstance_text(name, value) for value in values)
         parts.append(f"{name.replace('_', ' ')} {several}")

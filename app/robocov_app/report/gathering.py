@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from robocov.controllers.gains import Value
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
+    from robocov_app.report.references import Reference
     from robocov_app.saved import Saved
 
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
@@ -87,6 +88,13 @@ class Entry:
         return *self.setting, self.start, self.seed
 
 
+class Damaged(NamedTuple):
+    """A run that cannot be read: its folder's name, and why."""
+
+    folder: str
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """What one folder holds.
@@ -106,6 +114,10 @@ class Result:
         ``versions``.
     loaded : dict of folder to Saved
         Runs that were read already.
+    damaged : tuple of Damaged
+        Runs that cannot be read; they are not among the entries.
+    references : dict of setting to Reference
+        The centralised references that are known (`robocov_app.report.references`).
     """
 
     kind: Kind
@@ -117,6 +129,8 @@ class Result:
     meanings: Mapping[str, str]
     facts: Mapping[str, Any]
     loaded: Mapping[Path, Saved]
+    damaged: tuple[Damaged, ...] = ()
+    references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)
 
     @cached_property
     def fine(self) -> tuple[Entry, ...]:
@@ -131,7 +145,38 @@ class Result:
     @property
     def missing(self) -> int:
         """How many runs are not done."""
-        return max(self.wanted - len(self.entries), 0)
+        return max(self.wanted - len(self.entries) - len(self.damaged), 0)
+
+    def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:
+        """Return the result with every run that cannot be read among the damaged ones.
+
+        Parameters
+        ----------
+        tell : callable
+            Called with the number of runs that are read.
+        """
+        kept, damaged, done = [], list(self.damaged), 0
+        for entry in self.entries:
+            if entry.error is None:
+                done += 1
+                try:
+                    self.record(entry)
+                    self.history(entry)
+                except InputError as error:
+                    damaged.append(_damaged(entry.folder, error))
+                    continue
+                finally:
+                    tell(done)
+            kept.append(entry)
+        return replace(self, entries=tuple(kept), damaged=tuple(damaged))
+
+    def gap(self, entry: Entry) -> float:
+        """Return J / J_ref - 1 of a run at its end, nan where there is no reference that covers as much."""
+        reference = self.references.get(entry.setting)
+        uncovered = entry.figures.get("uncovered_area_m2") or 0.0
+        if reference is None or abs(uncovered - reference.uncovered_area) > 1e-6:
+            return float("nan")
+        return entry.final / reference.mean_distance - 1.0
 
     def record(self, entry: Entry) -> Record:
         """Return the record of a run.
@@ -192,9 +237,37 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == " " else "\ufffd" for c in text)
 
 
+def _damaged(folder: Path, error: InputError) -> Damaged:
+    """Return what is said of a damaged run, without the way to its folder."""
+    reason = str(error).removeprefix(f"{folder}: ").replace(f"{folder}/", "")
+    return Damaged(printable(folder.name), printable(reason))
+
+
 def _of_runs(folder: Path) -> Result:
     """Read a run or a comparison."""
-    saved = load_saved(folder)
+    kind: Kind = "comparison" if (folder / "comparison.json").is_file() else "run"
+    parts, unfinished = [folder], False
+    if kind == "comparison":
+        content = _json(folder / "comparison.json")
+        names = content.get("folders")
+        if not isinstance(names, list) or not all(isinstance(n, str) and Path(n).name == n for n in names):
+            raise InputError(f"{folder / 'comparison.json'}: folders: names of folders were wanted")
+        parts, unfinished = [folder / name for name in names], not content.get("runs")
+    saved: list[Saved] = []
+    damaged: list[Damaged] = []
+    for part in parts:
+        if unfinished and not (part / "run.json").is_file():
+            continue
+        try:
+            each = load_saved(part)[0]
+            same = [roster_of(run.record).environment for run in (*saved[:1], each)]
+            if (same[0].boundary, same[0].obstacles) != (same[-1].boundary, same[-1].obstacles):
+                raise InputError(f"{part / 'run.json'}: another map than in {saved[0].folder.name}")
+            saved.append(each)
+        except InputError as error:
+            damaged.append(_damaged(part, error))
+    if not saved and not damaged:
+        raise InputError(f"{folder / 'comparison.json'}: there is no run in it")
     entries: list[Entry] = []
     maps: dict[str, Environment] = {}
     facts: dict[str, Any] = {}
@@ -225,17 +298,18 @@ def _of_runs(folder: Path) -> Result:
             "team": content.get("team"),
             "versions": content.get("versions"),
         }
-    kind: Kind = "comparison" if (folder / "comparison.json").is_file() else "run"
-    wanted = len(_json(folder / "comparison.json").get("folders", ())) if kind == "comparison" else 1
+    units, meanings = _known_gains(entries, {})
     return Result(
         kind=kind,
         folder=folder,
         entries=_labelled(entries),
         maps=maps,
-        wanted=max(wanted, len(entries)),
+        wanted=len(parts),
         facts=facts,
         loaded={each.folder: each for each in saved},
-        **_known_gains(entries, {}),
+        damaged=tuple(damaged),
+        units=units,
+        meanings=meanings,
     )
 
 
@@ -288,6 +362,7 @@ def _of_sweep(folder: Path) -> Result:
         for name in names
         if gain_column(name) in told
     }
+    units, meanings = _known_gains(entries, known)
     return Result(
         kind="sweep",
         folder=folder,
@@ -296,7 +371,8 @@ def _of_sweep(folder: Path) -> Result:
         wanted=wanted,
         facts=facts,
         loaded={},
-        **_known_gains(entries, known),
+        units=units,
+        meanings=meanings,
     )
 
 
@@ -326,18 +402,21 @@ def _printable(value: Value) -> Value:
     return printable(value) if isinstance(value, str) else value
 
 
-def _known_gains(entries: list[Entry], told: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, str]]:
+def _known_gains(
+    entries: list[Entry], told: Mapping[str, tuple[str, str]]
+) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
-    units, meanings = {}, {}
+    units: dict[str, str] = {}
+    meanings: dict[str, str] = {}
     for controller in dict.fromkeys(entry.controller for entry in entries):
         if controller in CONTROLLERS:
             for name, gain in gains_of(CONTROLLERS[controller]).items():
                 units[name], meanings[name] = gain.unit, gain.meaning
     for name, (unit, meaning) in told.items():
         if unit or meaning:
-            units.setdefault(name, printable(unit))
+            units.setdefault(name, "" if unit == "1" else printable(unit))
             meanings.setdefault(name, printable(meaning))
-    return {"units": units, "meanings": meanings}
+    return units, meanings
 
 
 def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
@@ -361,8 +440,11 @@ def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | Non
 def _versions(entries: list[Entry]) -> Any:
     """Return the versions that the first run was made with."""
     for entry in entries:
-        if entry.error is None and (entry.folder / "run.json").is_file():
-            return _json(entry.folder / "run.json").get("versions")
+        if entry.error is None:
+            try:
+                return _json(entry.folder / "run.json").get("versions")
+            except InputError:
+                continue
     return None
 
 

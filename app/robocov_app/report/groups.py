@@ -1,4 +1,4 @@
-"""What is compared with what: the runs of a result by controller and gains, by setting, and in pairs."""
+"""The runs of a result by controller and gains, and by map and team, with their labels and styles."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import value_text
-from robocov_app.statistics import Paired, paired
+from robocov_app.plots.curves import curve_styles, styles_of
 from robocov_app.sweep.circumstances import circumstance_text
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
+    from robocov_app.plots.curves import CurveStyle
     from robocov_app.report.gathering import Entry, Result
 
 MOST_GROUPS = 8
 """Controllers with their gains up to which each is shown apart; of more, each controller as a whole."""
 
-MOST_COMPARED = 4
-"""Groups up to which each is compared with each; of more, each with the first."""
-
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
-CLUSTERS = 5
-"""Maps from which on intervals speak of maps in general: whole maps are drawn then."""
+TUNED = " (tuned)"
+"""Stands behind a controller's label where its gains were chosen on other runs than these."""
+
+_DIRECT = 12
+"""Letters that a gain and its value may take in a label."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,48 +65,47 @@ class Group:
         )
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Two groups, case by case.
-
-    Attributes
-    ----------
-    first, second : Group
-    cases : tuple
-        What the pairs share, in the result's order.
-    a, b : (m,) m
-        Mean distances at the end.
-    paired : Paired
-    by_map : bool
-        Whether intervals draw whole maps.
-    """
-
-    first: Group
-    second: Group
-    cases: tuple[tuple[object, ...], ...]
-    a: Array
-    b: Array
-    paired: Paired
-    by_map: bool
-
-
 def variants(result: Result) -> list[Group]:
-    """Return the runs that did not fail by controller and gains, lettered where a controller has several."""
-    found: dict[tuple[object, ...], list[Entry]] = {}
+    """Return the runs that did not fail by controller and gains.
+
+    Of a controller with several sets of gains, each is called by the one gain that differs, else by a letter.
+    """
+    found: dict[str, dict[tuple[tuple[str, Value], ...], list[Entry]]] = {}
     for entry in result.fine:
-        found.setdefault((entry.controller, entry.gains), []).append(entry)
-    sizes: dict[str, int] = {}
-    for entries in found.values():
-        sizes[entries[0].controller] = sizes.get(entries[0].controller, 0) + 1
-    numbers: dict[str, int] = {}
-    groups = []
-    for entries in found.values():
-        head = entries[0]
-        number = numbers.get(head.controller, 0)
-        numbers[head.controller] = number + 1
-        label = head.label if sizes[head.controller] == 1 else f"{head.label} {_letters(number)}"
-        groups.append(Group(label, head.controller, head.gains, tuple(entries)))
-    return groups
+        found.setdefault(entry.controller, {}).setdefault(entry.gains, []).append(entry)
+    groups = {
+        (controller, gains): Group(f"{entries[0].label}{suffix}", controller, gains, tuple(entries))
+        for controller, sets in found.items()
+        for (gains, entries), suffix in zip(sets.items(), _suffixes(list(sets)), strict=True)
+    }
+    return [groups[key] for key in dict.fromkeys((entry.controller, entry.gains) for entry in result.fine)]
+
+
+def _suffixes(sets: Sequence[tuple[tuple[str, Value], ...]]) -> list[str]:
+    """Return what tells sets of gains of one controller apart."""
+    if len(sets) == 1:
+        return [""]
+    differing = [own for own in zip(*sets, strict=False) if len(set(own)) > 1]
+    if len(differing) == 1 and len({name for name, _ in differing[0]}) == 1:
+        named = [f" {name} {value_text(value, digits=4)}" for name, value in differing[0]]
+        if len(set(named)) == len(sets) and max(map(len, named)) <= _DIRECT:
+            return named
+    return [f" {_letters(number)}" for number in range(len(sets))]
+
+
+def styles(result: Result) -> dict[str, CurveStyle]:
+    """Return the style of each label: the same for a group in everything that is drawn of a result.
+
+    Groups that are shown apart have a style each; what else there is of a controller has the controller's.
+    """
+    shown = shown_groups(result)
+    there = {group.controller for group in shown}
+    lost = dict.fromkeys(each.controller for each in result.entries if each.controller not in there)
+    names = [*(group.controller for group in shown), *lost]
+    own, apart = curve_styles(names), styles_of(names)
+    found = {entry.label + more: own[entry.controller] for entry in result.entries for more in ("", TUNED)}
+    found |= {group.label: own[group.controller] for group in variants(result)}
+    return found | {group.label: style for group, style in zip(shown, apart, strict=False)}
 
 
 def by_controller(result: Result) -> list[Group]:
@@ -126,20 +126,6 @@ def shown_groups(result: Result) -> list[Group]:
     """Return the groups that plots show: `variants`, or `by_controller` where these are too many."""
     apart = variants(result)
     return apart if len(apart) <= MOST_GROUPS else by_controller(result)
-
-
-def compared_groups(result: Result) -> list[Group]:
-    """Return the groups that are compared in pairs: `variants`, or of each controller the best of them."""
-    apart = variants(result)
-    if len(apart) <= MOST_COMPARED:
-        return apart
-    best: dict[str, Group] = {}
-    scales = medians(result)
-    for group in apart:
-        kept = best.get(group.controller)
-        if kept is None or _standing(group, scales) < _standing(kept, scales):
-            best[group.controller] = group
-    return list(best.values())
 
 
 def settings(result: Result) -> list[tuple[object, ...]]:
@@ -179,33 +165,6 @@ def relative(group: Group, scales: Mapping[tuple[object, ...], float]) -> Array:
     return np.array(values)
 
 
-def comparisons(result: Result) -> list[Comparison]:
-    """Return how groups compare on the same cases: each with each, or many with the first."""
-    groups = compared_groups(result)
-    firsts = groups if len(groups) <= MOST_COMPARED else groups[:1]
-    found = []
-    for k, first in enumerate(firsts):
-        for second in groups[k + 1 :]:
-            comparison = compared(first, second)
-            if comparison is not None:
-                found.append(comparison)
-    return found
-
-
-def compared(first: Group, second: Group) -> Comparison | None:
-    """Return how two groups compare on the cases that both have, None where they have none."""
-    a, b = _by_case(first), _by_case(second)
-    cases = tuple(case for case in a if case in b)
-    if not cases:
-        return None
-    left, right = np.array([a[case] for case in cases]), np.array([b[case] for case in cases])
-    maps = [case[0] for case in cases]
-    by_map = len(set(maps)) >= CLUSTERS
-    return Comparison(
-        first, second, cases, left, right, paired(left, right, maps if by_map else None), by_map
-    )
-
-
 def dependences(result: Result) -> dict[str, list[str]]:
     """Return the gains that take several values, by name, with the controllers that they vary in."""
     levels: dict[tuple[str, str], set[Value]] = {}
@@ -230,17 +189,6 @@ def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> s
         unit = "" if value is None else units.get(name, "")
         parts.append(f"{name} {value_text(value)} {unit}".rstrip())
     return ", ".join(parts)
-
-
-def _by_case(group: Group) -> dict[tuple[object, ...], float]:
-    return {
-        entry.case: entry.final for entry in group.entries if np.isfinite(entry.final) and entry.final > 0
-    }
-
-
-def _standing(group: Group, scales: Mapping[tuple[object, ...], float]) -> float:
-    values = relative(group, scales)
-    return float(np.median(values)) if len(values) else float("inf")
 
 
 def _letters(number: int) -> str:

@@ -10,7 +10,7 @@ from robocov.metrics.run_metrics import run_metrics
 from robocov_app.plots.results import Band, plot_cost_bands
 from robocov_app.report.embedding import has_path
 from robocov_app.report.groups import shown_groups
-from robocov_app.report.result_plots import PANEL, SCALE, Plot, looks_of
+from robocov_app.report.result_plots import PANEL, SCALE, Looks, Plot
 from robocov_app.report.svg import inline_svg
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ _PANELS = (
 
 
 def measure_plots(
-    result: Result, runs: Sequence[ReplayRun], entries: Sequence[Entry], key: str
+    result: Result, runs: Sequence[ReplayRun], entries: Sequence[Entry], looks: Looks, key: str
 ) -> list[Plot]:
     """Return a plot for each metric of a run, or of the runs of a comparison; none of a sweep.
 
@@ -73,6 +73,7 @@ def measure_plots(
     result : Result
     runs, entries : sequences
         The runs with their records.
+    looks : dict of label to CurveStyle
     key : str
         For the ids of the plots.
     """
@@ -103,9 +104,9 @@ def measure_plots(
             if entry in group_of and (known := np.isfinite(values)).any()
         ]
         if bands:
-            looks = looks_of(bands, groups)
+            own = [looks[band.label] for band in bands]
             figure = plot_cost_bands(
-                bands, size=PANEL, scale=SCALE, title="", styles=looks, label=panel.label, unit=panel.unit
+                bands, size=PANEL, scale=SCALE, title="", styles=own, label=panel.label, unit=panel.unit
             )
             name = f"{key}-{panel.title.lower().replace(' ', '-')}"
             plots.append(Plot(panel.title, inline_svg(figure, name, _sentence(panel, bands))))

@@ -8,15 +8,13 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
-from robocov_app.plots.curves import curve_styles
+from robocov_app.plots.curves import styles_of
 from robocov_app.report.embedding import BUDGET, ReplayRun, embedded, script_json
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.theme_css import theme_rules
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from robocov_app.plots.curves import CurveStyle
+    from collections.abc import Sequence
 
 __all__ = [
     "MOST_PANES",
@@ -60,8 +58,7 @@ def replay_html(
     ParameterError
         When there are no runs.
     """
-    styles = curve_styles(run.record.controller for run in runs)
-    content = replay_part(runs, styles, panes, budget)
+    content = replay_part(runs, panes, budget)
     style = theme_rules(".robocov-replay") + replay_css()
     fragment = f"<style>{style}</style>{content}<script>{script(replay_js() + 'startReplays();')}</script>"
     if not standalone:
@@ -77,7 +74,6 @@ def replay_html(
 
 def replay_part(
     runs: Sequence[ReplayRun],
-    styles: Mapping[str, CurveStyle],
     panes: Sequence[int] | None = None,
     budget: int = BUDGET,
 ) -> str:
@@ -87,8 +83,6 @@ def replay_part(
     ----------
     runs, panes, budget
         As for `replay_html`.
-    styles : dict of controller to CurveStyle
-        As elsewhere on the page.
 
     Raises
     ------
@@ -98,7 +92,12 @@ def replay_part(
     if not runs:
         raise ParameterError("replay: no runs were given, but at least one was wanted")
     shown = list(range(len(runs)))[:MOST_PANES] if panes is None else list(panes)
-    data = embedded(runs, [styles[run.record.controller] for run in runs], shown, budget)
+    # runs of one controller with the same gains look the same
+    keys = [(run.record.controller, tuple(run.record.gains.items())) for run in runs]
+    order = list(dict.fromkeys(keys))
+    own = dict(zip(order, styles_of([controller for controller, _ in order]), strict=True))
+    styles = [run.style or own[key] for run, key in zip(runs, keys, strict=True)]
+    data = embedded(runs, styles, shown, budget)
     stills = "".join(
         f"<figure><figcaption><strong>{escape(runs[k].title)}</strong></figcaption>"
         f"{run_picture(runs[k].record, runs[k].history, 560, 460, numbers=True)}</figure>"

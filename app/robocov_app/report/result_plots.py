@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import counted
-from robocov_app.plots.curves import CurveStyle, curve_styles
+from robocov_app.plots.curves import CurveStyle
 from robocov_app.plots.results import (
     Band,
     Pairs,
@@ -18,10 +18,8 @@ from robocov_app.plots.results import (
     plot_final_costs,
     plot_paired,
     quartiles,
-    styles_of,
 )
 from robocov_app.report.groups import (
-    Comparison,
     Group,
     medians,
     relative,
@@ -29,12 +27,16 @@ from robocov_app.report.groups import (
     settings,
     shown_groups,
 )
+from robocov_app.report.pairs import Comparison, ratio_text
 from robocov_app.report.svg import inline_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from robocov_app.report.gathering import Entry, Result
+
+Looks: TypeAlias = Mapping[str, CurveStyle]
+"""The styles of a result's groups by label (`robocov_app.report.groups.styles`)."""
 
 MOST_PANELS = 24
 """Settings up to which each has panels of its own."""
@@ -71,21 +73,13 @@ class Plot(NamedTuple):
 
 
 class Curves:
-    """Mean distances over time of all runs of a result, at common moments.
+    """Mean distances over time of all runs of a result, at common moments."""
 
-    Parameters
-    ----------
-    result : Result
-    tell : callable
-        Called with the number of runs that are read.
-    """
-
-    def __init__(self, result: Result, tell: Callable[[int], None]) -> None:
+    def __init__(self, result: Result) -> None:
         longest = 0.0
         histories = {}
-        for done, entry in enumerate(result.fine, start=1):
+        for entry in result.fine:
             history = result.history(entry)
-            tell(done)
             if history is None or not np.isfinite(history.mean_distance).any():
                 continue
             time = history.time - history.time[0]
@@ -107,12 +101,7 @@ class Curves:
         return Band(group.label, group.controller, self.time, np.array(rows))
 
 
-def styles(result: Result) -> dict[str, CurveStyle]:
-    """Return the style of each controller: the same in all plots of a result."""
-    return curve_styles(entry.controller for entry in result.entries)
-
-
-def cost_plots(result: Result, curves: Curves, key: str) -> Iterator[Plot]:
+def cost_plots(result: Result, curves: Curves, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the cost curves: over all settings, as parts of the first value, then of each setting."""
     groups = shown_groups(result)
     every = settings(result)
@@ -120,59 +109,61 @@ def cost_plots(result: Result, curves: Curves, key: str) -> Iterator[Plot]:
         bands = [band for group in groups if (band := curves.band(group, parts=True)) is not None]
         if bands:
             what = "mean distance / that of the start"
-            yield _band_plot("All maps and teams together", bands, groups, f"{key}-all", what, "")
+            yield _band_plot("All maps and teams together", bands, looks, f"{key}-all", what, "")
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
         bands = [band for group in groups if (band := curves.band(group.at(setting))) is not None]
         if bands:
             what = "mean distance to the nearest robot (m)"
             title = setting_label(result, setting) if len(every) > 1 else ""
-            yield _band_plot(title, bands, groups, f"{key}-{k}", what, "m")
+            yield _band_plot(title, bands, looks, f"{key}-{k}", what, "m")
 
 
-def final_plots(result: Result, key: str) -> Iterator[Plot]:
+def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
     groups = shown_groups(result)
     every = settings(result)
     if len(every) > 1:
         scales = medians(result)
         samples = [_sample(group, relative(group, scales)) for group in groups]
-        yield from _sample_plot("All maps and teams together", samples, groups, f"{key}-all", RELATIVE, "")
+        yield from _sample_plot("All maps and teams together", samples, looks, f"{key}-all", RELATIVE, "")
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
         samples = [_sample(group, group.at(setting).finals) for group in groups]
         title = setting_label(result, setting) if len(every) > 1 else ""
-        yield from _sample_plot(title, samples, groups, f"{key}-{k}", "final mean distance (m)", " m")
+        yield from _sample_plot(title, samples, looks, f"{key}-{k}", "final mean distance (m)", " m")
 
 
-def paired_plot(comparisons: Sequence[Comparison], key: str) -> Plot | None:
-    """Return the ratios of pairs, None where no comparison has several."""
-    rows = [
-        Pairs(
-            f"{each.first.label} / {each.second.label}", each.first.controller, each.a / each.b, each.paired
+def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> Iterator[Plot]:
+    """Yield the ratios of each comparison, a row for each map and one over all of them."""
+    for k, each in enumerate(comparisons):
+        if each.pairs < 2:
+            continue
+        name, rows = each.first.controller, []
+        if 1 < len(each.maps) <= MOST_PANELS:
+            rows = [Pairs(own.name, name, own.a / own.b, own.ratio) for own in each.maps]
+        several = len(each.maps) > 1
+        label = f"all {len(each.maps)} maps" if several else f"{each.pairs} pairs"
+        ratios = (
+            np.array([own.ratio.estimate for own in each.maps])
+            if several
+            else each.maps[0].a / each.maps[0].b
         )
-        for each in comparisons
-        if len(each.a) > 1
-    ]
-    if not rows:
-        return None
-    words = []
-    for row in rows:
-        ratio = row.paired.ratio
-        known = f", 95 % interval {ratio.low:.3f} to {ratio.high:.3f}" if np.isfinite(ratio.low) else ""
-        words.append(f"{row.label}: median ratio {ratio.estimate:.3f}{known}")
-    sentence = f"Ratios pair by pair. {'; '.join(words)}."
-    label = "ratio of final mean distances (log)"
-    figures = [
-        plot_paired(rows, size=(width, None), scale=SCALE, label=label) for width in (WIDE[0], PANEL[0])
-    ]
-    return _alone("", figures, key, sentence)
+        rows.append(Pairs(label, name, ratios, each.ratio))
+        words = "; ".join(f"{row.label}: ratio {ratio_text(row.interval)}" for row in rows)
+        figure = plot_paired(
+            rows,
+            size=(PANEL[0], None),
+            scale=SCALE,
+            label="ratio of final mean distances (log)",
+            styles=[looks[each.first.label]] * len(rows),
+        )
+        yield Plot(each.label, inline_svg(figure, f"{key}-{k}", f"{each.label}, pair by pair. {words}."))
 
 
-def _band_plot(
-    title: str, bands: list[Band], groups: Sequence[Group], key: str, what: str, unit: str
-) -> Plot:
-    looks = looks_of(bands, groups)
+def _band_plot(title: str, bands: list[Band], looks: Looks, key: str, what: str, unit: str) -> Plot:
+    own = [looks[band.label] for band in bands]
     figures = [
-        plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=looks, label=what, unit=unit)
+        # the axis tells the unit: names have little room
+        plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=own, label=what, unit="")
         for size in ((PANEL,) if title else (WIDE, PANEL))
     ]
     words = []
@@ -197,14 +188,14 @@ def _sample(group: Group, values: Array) -> Sample:
 
 
 def _sample_plot(
-    title: str, samples: list[Sample], groups: Sequence[Group], key: str, what: str, unit: str
+    title: str, samples: list[Sample], looks: Looks, key: str, what: str, unit: str
 ) -> Iterator[Plot]:
     samples = [sample for sample in samples if len(sample.values)]
     if not samples or max(len(sample.values) for sample in samples) < 2:
         return
-    looks = looks_of(samples, groups)
+    own = [looks[sample.label] for sample in samples]
     figures = [
-        plot_final_costs([("", samples)], size=(width, None), scale=SCALE, styles=looks, label=what)
+        plot_final_costs([("", samples)], size=(width, None), scale=SCALE, styles=own, label=what)
         for width in ((PANEL[0],) if title else (WIDE[0], PANEL[0]))
     ]
     words = []
@@ -216,11 +207,3 @@ def _sample_plot(
         )
     sentence = f"{f'{title}: {what}' if title else what}. {'; '.join(words)}."
     yield _alone(title, figures, key, sentence)
-
-
-def looks_of(shown: Sequence[Band | Sample], groups: Sequence[Group]) -> list[CurveStyle]:
-    """Return the styles that these have among all groups, so that they are the same in all plots."""
-    every = dict(
-        zip([group.label for group in groups], styles_of([group.controller for group in groups]), strict=True)
-    )
-    return [every[each.label] for each in shown]

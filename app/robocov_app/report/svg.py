@@ -30,7 +30,10 @@ _MANY = 8
 
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
 
-_PLOTTED = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd", "other-0", "other-1", "other-2")
+_PLOTTED = (
+    *("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd"),
+    *(f"other-{k}" for k in range(len(LIGHT.others))),
+)
 
 
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 from robocov.controllers.gains import value_text
 from robocov.errors import counted
 from robocov_app.report.groups import (
-    Comparison,
     Group,
     gain_text,
     medians,
@@ -21,7 +20,8 @@ from robocov_app.report.groups import (
     shown_groups,
     variants,
 )
-from robocov_app.statistics import Interval
+from robocov_app.report.pairs import Comparison, ratio_text
+from robocov_app.report.references import RESTARTS
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
@@ -73,17 +73,13 @@ class Table:
 
 def controllers_table(result: Result, styles: dict[str, CurveStyle]) -> Table:
     """Return the controllers with their gains, or between which values these are."""
-    apart = variants(result)
-    used = {name for group in apart for name, _ in group.gains or ()}
-    meanings = [f"{name}: {result.meanings[name]}" for name in result.meanings if name in used]
-    notes = ("; ".join(meanings) + ".",) if meanings else ()
     groups = shown_groups(result)
     known = {group.controller for group in groups}
     lost: dict[str, Group] = {}
     for entry in result.failed:
         if entry.controller not in known:
             lost.setdefault(entry.controller, Group(entry.label, entry.controller, None, (entry,)))
-    return _gains_table("Controllers and their gains", [*groups, *lost.values()], result, styles, notes)
+    return _gains_table("Controllers and their gains", [*groups, *lost.values()], result, styles)
 
 
 def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
@@ -91,7 +87,7 @@ def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
     apart = variants(result)
     if len(apart) == len(shown_groups(result)) or len(apart) > MOST_SETS:
         return None
-    return _gains_table("Sets of gains", apart, result, styles, ())
+    return _gains_table("Sets of gains", apart, result, styles)
 
 
 def _gains_table(
@@ -99,14 +95,13 @@ def _gains_table(
     groups: Sequence[Group],
     result: Result,
     styles: dict[str, CurveStyle],
-    notes: tuple[str, ...],
 ) -> Table:
     rows = []
     for group in groups:
         gains = _ranges_text(group, result) if group.gains is None else gain_text(group.gains, result.units)
-        cells = Cell(group.label, styles[group.controller]), Cell(group.controller), Cell(gains or NOTHING)
+        cells = Cell(group.label, styles[group.label]), Cell(group.controller), Cell(gains or NOTHING)
         rows.append(cells)
-    return Table(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}), notes)
+    return Table(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}))
 
 
 def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]:
@@ -115,12 +110,15 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
     every = settings(result)
     tables = []
     timed = any(_known(entry, TIME) for entry in result.fine)
-    whole = (*_HEAD, *(("Mean time, s",) if timed else ()))
+    whole = (
+        *(*_HEAD, *(("Mean time, s",) if timed else ())),
+        *(("Above the reference, %",) if result.references else ()),
+    )
     if len(every) > 1:
         scales = medians(result)
         rows = []
         for group in groups:
-            row = _summary_row(group, styles, timed)
+            row = _summary_row(result, group, styles, timed)
             # metres of different maps have no common median
             rows.append((*row[:2], Cell(_quartiles(relative(group, scales).tolist(), 3)), *row[4:]))
         head = (*whole[:2], "Mean distance / median", *whole[4:])
@@ -130,7 +128,7 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
         tables.append(Table("All maps and teams together", head, rows, notes=(note,)))
     for setting in every if len(every) <= MOST_SETTINGS else ():
         parts = [group.at(setting) for group in groups]
-        rows = [_summary_row(part, styles, timed) for part in parts if part.entries]
+        rows = [_summary_row(result, part, styles, timed) for part in parts if part.entries]
         caption = setting_label(result, setting) if len(every) > 1 else "Final figures"
         tables.append(Table(caption, whole, rows))
     if tables and any(len(group.entries) > 1 for group in groups):
@@ -139,6 +137,12 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
             "a wall or another robot; clearance: the smallest gap to a wall in any of them."
         )
         tables[-1] = replace(tables[-1], notes=(note,))
+    if tables and result.references:
+        note = (
+            f"Above the reference: J/J_ref − 1 of the final mean distance; J_ref is the lowest of {RESTARTS} "
+            f"searches for the best placement of the team with the whole map known, on the same lattice."
+        )
+        tables[0] = replace(tables[0], notes=(*tables[0].notes, note))
     return tables
 
 
@@ -152,32 +156,46 @@ _HEAD = (
 
 
 def pairs_table(comparisons: Sequence[Comparison], styles: dict[str, CurveStyle]) -> Table:
-    """Return how the groups compare, pair by pair."""
-    several = max(len(each.a) for each in comparisons) > 1
+    """Return how the groups compare over maps, one row a comparison."""
     rows = []
     for each in comparisons:
-        said = each.paired
-        names = Cell(each.first.label, styles[each.first.controller]), Cell(each.second.label)
-        how = Cell(_interval(said.ratio)), Cell(_interval(said.difference))
-        more = (Cell(str(said.pairs)), *how, Cell(_percent(said.wins)))
-        rows.append((*names, *(more if several else how)))
-    figures = ("Pairs", "Median ratio", "Median difference, m", "First is lower, %")
-    head = ("First", "Second", *(figures if several else ("Ratio", "Difference, m")))
-    return Table("Final mean distance of the first by that of the second", head, rows, frozenset({1}))
+        lower = sum(int((own.a < own.b).sum()) for own in each.maps)
+        names = Cell(each.first.label, styles[each.first.label]), Cell(each.second.label)
+        words = each.tally() if each.pairs > 1 else "one pair only"
+        rows.append((*names, Cell(ratio_text(each.ratio)), Cell(words), Cell(f"{lower} of {each.pairs}")))
+    head = ("First", "Second", "Ratio", "First is", "First is lower in")
+    return Table("Final mean distance of the first by that of the second", head, rows, frozenset({1, 3}))
+
+
+def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
+    """Return a table for each comparison on several maps, one row a map."""
+    head = ("Map", "Pairs", "First, m", "Second, m", "Ratio", "First is", "First is lower in")
+    tables = []
+    for each in comparisons:
+        if len(each.maps) < 2:
+            continue
+        rows = []
+        for own in each.maps:
+            means = [Cell(f"{np.mean(values):.3f}") for values in (own.a, own.b)]
+            lower = f"{int((own.a < own.b).sum())} of {len(own.a)}"
+            how = Cell(ratio_text(own.ratio)), Cell(own.verdict), Cell(lower)
+            rows.append((Cell(own.name), Cell(str(len(own.a))), *means, *how))
+        tables.append(Table(each.label, head, rows, frozenset({5})))
+    return tables
 
 
 def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
     """Return every run in a row of its own, None where they are too many."""
     if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
         return None  # too many, or the summary tells all of them
-    labels = {entry: group for group in variants(result) for entry in group.entries}
+    labels = {entry: group.label for group in variants(result) for entry in group.entries}
     timed = any(_known(entry, TIME) for entry in result.fine)
     rows = []
     for entry in result.fine:
         figures = entry.figures
         rows.append(
             (
-                Cell(labels[entry].label, styles[entry.controller]),
+                Cell(labels[entry], styles[labels[entry]]),
                 Cell(setting_label(result, entry.setting)),
                 Cell(entry.start or NOTHING),
                 Cell(NOTHING if entry.seed is None else str(entry.seed)),
@@ -197,30 +215,35 @@ def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
 
 
 def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
-    """Return the runs that failed, each with its error; None where none did."""
-    rows = [
+    """Return the runs that failed, each with its error, and those that cannot be read; None without any."""
+    rows: list[tuple[Cell, ...]] = [
         (
-            Cell(entry.label, styles[entry.controller]),
+            Cell(entry.label, styles[entry.label]),
             Cell(setting_label(result, entry.setting)),
             Cell(f"{entry.start}, {entry.seed}"),
             Cell(gain_text(entry.gains, result.units)),
             Cell(entry.error or ""),
         )
-        for entry in result.failed[:MOST_ROWS]
+        for entry in result.failed
     ]
+    # what cannot be read is known by its folder alone
+    nothing = [Cell(NOTHING)] * 3
+    rows += [(Cell(each.folder), *nothing, Cell(each.reason)) for each in result.damaged]
     if not rows:
         return None
-    left = len(result.failed) - len(rows)
-    notes = (f"{counted(left, 'more failed run')} in results.csv.",) if left else ()
-    head = ("Controller", "Map", "Start, seed", "Gains", "Error")
-    return Table("Runs that failed", head, rows, frozenset({1, 2, 3, 4}), notes)
+    left = len(rows) - MOST_ROWS
+    notes = (f"{counted(left, 'more run')}.",) if left > 0 else ()
+    head = ("Controller or folder", "Map", "Start, seed", "Gains", "Error")
+    return Table("Runs that failed or cannot be read", head, rows[:MOST_ROWS], frozenset({1, 2, 3, 4}), notes)
 
 
-def _summary_row(group: Group, styles: dict[str, CurveStyle], timed: bool) -> tuple[Cell, ...]:
+def _summary_row(
+    result: Result, group: Group, styles: dict[str, CurveStyle], timed: bool
+) -> tuple[Cell, ...]:
     entries = group.entries
     settled = [e for e in entries if _known(e, "settled_at_s")]
     return (
-        Cell(group.label, styles[group.controller]),
+        Cell(group.label, styles[group.label]),
         Cell(str(len(entries))),
         Cell(_spread(entries, "mean_distance_m", 3)),
         Cell(_spread(entries, "mean_distance_over_run_m", 3)),
@@ -231,7 +254,13 @@ def _summary_row(group: Group, styles: dict[str, CurveStyle], timed: bool) -> tu
         Cell(_spread(entries, "path_length_m", 2)),
         Cell(_stuck(entries)),
         *([Cell(_spread(entries, TIME, 3))] if timed else []),
+        *([Cell(_quartiles(_gaps(result, entries), 1))] if result.references else []),
     )
+
+
+def _gaps(result: Result, entries: Sequence[Entry]) -> list[float]:
+    """Return J / J_ref - 1 of the runs that have it, %."""
+    return [100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))]
 
 
 def _known(entry: Entry, name: str) -> bool:
@@ -281,23 +310,9 @@ def _stuck(entries: Sequence[Entry]) -> str:
     return f"{values[0]:.0f}" if len(entries) == 1 else f"{np.mean(values):.2g} per run"
 
 
-def _interval(interval: Interval) -> str:
-    text = _signed(f"{interval.estimate:.3f}")
-    if np.isnan(interval.low):
-        return text
-    return f"{text} ({_signed(f'{interval.low:.3f}')} to {_signed(f'{interval.high:.3f}')})"
-
-
 def _signed(number: str) -> str:
     """Return a number with a minus that is as wide as a digit, and none before nothing but zeros."""
     return number.replace("-", "\u2212" if number.strip("-0.") else "")
-
-
-def _percent(interval: Interval) -> str:
-    text = f"{100 * interval.estimate:.0f}"
-    if np.isnan(interval.low):
-        return text
-    return f"{text} ({100 * interval.low:.0f} to {100 * interval.high:.0f})"
 
 
 def _decimals(value: Any, decimals: int, nothing: str = NOTHING) -> str:

@@ -180,7 +180,7 @@ LIGHT = Theme(
         "rpf": rgb("D62222"),
         "lloyd": rgb("118038"),
     },
-    others=(rgb("8A3FA8"), rgb("7A5C00"), rgb("28303C")),
+    others=tuple(rgb(code) for code in ("8A3FA8", "7A5C00", "28303C", "007A8A", "D4127E")),
     forces={
         "attraction": rgb("0B7A6F"),
         "repulsion_robots": rgb("D9480F"),
@@ -218,7 +218,7 @@ DARK = Theme(
         "rpf": rgb("FF6B63"),
         "lloyd": rgb("46C46A"),
     },
-    others=(rgb("CF8BE8"), rgb("F0A94A"), rgb("E8ECF2")),
+    others=tuple(rgb(code) for code in ("CF8BE8", "F0A94A", "E8ECF2", "2DD4BF", "FF5CA4")),
     forces={
         "attraction": rgb("2DD4BF"),
         "repulsion_robots": rgb("FF9354"),

@@ -60,7 +60,8 @@ class Gain:
         if value is None and self.optional:
             return None
         also = ", or null for no limit," if self.optional else ""
-        wanted = f"but a number from {self.low:g} to {self.high:g} {self.unit}{also} was wanted"
+        unit = f" {self.unit}" if self.unit else ""
+        wanted = f"but a number from {self.low:g} to {self.high:g}{unit}{also} was wanted"
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
         if not self.low <= value <= min(self.high, sys.float_info.max):
@@ -119,7 +120,9 @@ def gain(
     >>> gains_of(Mine)["k"].unit
     'N/m'
     """
-    return field(default=default, metadata={"gain": (unit, low, high, meaning, optional)})
+    # "1" is a unit in formulas, and nothing behind a number
+    shown_unit = "" if unit == "1" else unit
+    return field(default=default, metadata={"gain": (shown_unit, low, high, meaning, optional)})
 
 
 def choice(default: str, words: Sequence[str], meaning: str) -> Any:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from clear_pages import all_clear
+from hypothesis import given
+from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
 from robocov_app.plots.curves import curve_styles
@@ -19,7 +21,7 @@ from robocov_app.plots.results import (
     quartiles,
     styles_of,
 )
-from robocov_app.statistics import paired
+from robocov_app.statistics import bootstrap
 from robocov_app.view.theme import DARK, LIGHT
 
 RNG = np.random.default_rng(3)
@@ -38,7 +40,7 @@ SAMPLES = [
     Sample("A law with a name that is far too long for any plot", "mine", RNG.normal(3.0, 0.6, 3)),
 ]
 PAIRS = [
-    Pairs("RAPF / RPF", "rapf", a / b, paired(a, b)) for a, b in [(SAMPLES[0].values, SAMPLES[1].values)]
+    Pairs("RAPF / RPF", "rapf", a / b, bootstrap(a / b)) for a, b in [(SAMPLES[0].values, SAMPLES[1].values)]
 ]
 
 
@@ -99,17 +101,28 @@ def test_controllers_keep_their_colours_in_all_plots() -> None:
         assert tone(LIGHT.controllers["rpf"]) in {line.get_color() for line in axes.lines}
 
 
-def test_gains_of_one_controller_differ_in_dashes_and_marks() -> None:
-    styles = styles_of(["rapf"] * 4)
-    assert len({style.name for style in styles}) == 1
-    assert len({str(style.dashes) for style in styles}) == len({style.mark for style in styles}) == 4
+@pytest.mark.parametrize("controllers", [["rapf"] * 6, ["mine", "rapf", "mine", "rpf", "rapf", "mine"]])
+def test_gains_of_one_controller_differ_in_colour_dashes_and_mark(controllers) -> None:
+    styles = styles_of(controllers)
+    for part in zip(*styles, strict=True):
+        assert len(set(map(str, part))) == len(controllers)
+    for theme in (LIGHT, DARK):
+        assert len({style.colour(theme) for style in styles}) == len(controllers)
+
+
+@given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
+def test_no_two_of_eight_curves_have_one_style(controllers) -> None:
+    styles = styles_of(controllers)
+    assert len(set(styles)) == len(controllers)
+    for name, style in curve_styles(controllers).items():
+        assert styles[controllers.index(name)] == style
 
 
 @pytest.mark.parametrize("size", [None, (420, None), (860, 300)])
 def test_every_value_of_a_sample_is_a_point(size) -> None:
     figure = plot_final_costs([("Rooms", SAMPLES), ("Museum", SAMPLES[:2])], size=size, title="Final costs")
     axes = figure.axes[0]
-    points = [line for line in axes.lines if line.get_marker() == "o"]
+    points = [line for line in axes.lines if line.get_marker() == "o" and line.get_clip_on()]
     values = [*SAMPLES, *SAMPLES[:2]]
     assert [sorted(line.get_xdata()) for line in points] == [sorted(each.values) for each in values]
     assert {text.get_text() for text in axes.texts} == {"Rooms", "Museum"}
@@ -130,7 +143,7 @@ def test_what_is_not_finite_is_left_out() -> None:
 
 def test_pairs_have_their_interval_and_one_is_marked() -> None:
     axes = plot_paired(PAIRS).axes[0]
-    ratio = PAIRS[0].paired.ratio
+    ratio = PAIRS[0].interval
     spans = [tuple(line.get_xdata()) for line in axes.lines]
     assert (ratio.low, ratio.high) in spans
     assert any(span == (1.0, 1.0) for span in spans)
@@ -141,12 +154,12 @@ def test_pairs_may_have_other_colours() -> None:
     style = curve_styles(["mine"])["mine"]
     own, other = (plot_paired(PAIRS, styles=styles).axes[0] for styles in (None, [style]))
     for axes, colour in ((own, LIGHT.controllers["rapf"]), (other, style.colour(LIGHT))):
-        (points,) = (line for line in axes.lines if line.get_marker() == "o")
+        (points,) = (line for line in axes.lines if line.get_marker() == "o" and line.get_clip_on())
         assert points.get_color() == tone(colour)
 
 
 def test_a_single_pair_has_no_interval() -> None:
-    alone = Pairs("RAPF / RPF", "rapf", np.array([0.5]), paired([1.0], [2.0]))
+    alone = Pairs("RAPF / RPF", "rapf", np.array([0.5]), bootstrap([0.5]))
     axes = plot_paired([alone]).axes[0]
     assert all(np.isfinite(np.asarray(line.get_xdata(), dtype=float)).all() for line in axes.lines)
 

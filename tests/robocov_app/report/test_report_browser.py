@@ -22,6 +22,7 @@ from robocov.voronoi import partition
 from robocov_app.plots.curves import curve_styles
 from robocov_app.report.document import report
 from robocov_app.report.embedding import embedded_map, embedded_run
+from robocov_app.report.gathering import Damaged
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.view.theme import DARK, LIGHT
 
@@ -444,9 +445,69 @@ def test_labels_of_curves_do_not_overlap(browser) -> None:
         order = np.argsort(heights, kind="stable")
         assert (np.diff(np.array(apart)[order]) >= 15 - 1e-9).all()
         assert min(apart) >= 0 and max(apart) <= 150
-    assert browser.js(asset("arena.js") + asset("chart.js") + "return roundTicks(0, 60, 5)") == [
-        0,
-        20,
-        40,
-        60,
+
+
+ULP = float(np.spacing(2.0))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wanted"),
+    [
+        (0.0, 60.0, [0, 20, 40, 60]),
+        (-0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1]),
+        (-3.0, -1.0, [-3, -2.5, -2, -1.5, -1]),
+        *((low, high, []) for low, high in ((2.0, 2.0 + ULP), (2.0, 2.0), (-1e308, 1e308), (3.0, 1.0))),
+        (0.0, 1e300, [k * 2e299 for k in range(6)]),
+    ],
+)
+def test_ticks_are_few_whatever_they_span(browser, low, high, wanted) -> None:
+    script = asset("arena.js") + asset("chart.js") + "return roundTicks(...arguments)"
+    assert browser.js(script, low, high, 5) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("values", [(2.0, 2.0 + ULP), (2.0, 2.0), (-0.0, 0.0), (1e-3, 1e300), (np.nan, 2.0)])
+def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
+    result = watched([entry(), entry("rpf")], seconds=2.0)
+    for folder, saved in result.loaded.items():
+        time = saved.history.time
+        distance = np.where(np.arange(len(time)) % 2, *values)
+        result.loaded[folder] = saved._replace(history=replace(saved.history, mean_distance=distance))
+    path = tmp_path / "page.html"
+    path.write_text(report([result]).html, encoding="utf-8")
+    browser.open(path)
+    browser.until(lambda: browser.all(".pane"))
+    browser.seek(1.0)
+    assert browser.complaints() == [] and len(browser.drawn()) == 3
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
+    name = "W" * 300
+    runs = [
+        replace(
+            entry(own, seed, 2.0, map_name=f"{name}{m}", start=name, gains=((name, 1.0 + seed),)), label=own
+        )
+        for own in (f"{name}1", f"{name}2")
+        for m in range(2)
+        for seed in range(3)
     ]
+    failed = replace(runs[0], error=f"{name} {name}", figures={}, seed=9)
+    result = replace(
+        watched(runs, replace(ROOMS, name=name), seconds=2.0), units={name: name}, meanings={name: name}
+    )
+    result = replace(result, entries=(*result.entries, failed), damaged=(Damaged(name, name),))
+    path = tmp_path / "names.html"
+    path.write_text(report([result], title=name).html, encoding="utf-8")
+    browser.open(path, width, 844)
+    browser.until(lambda: browser.all(".pane"))
+    browser.js("for (const details of document.querySelectorAll('details')) details.open = true")
+    outside = browser.js(
+        "return [...document.body.querySelectorAll('*')].filter((e) => e.checkVisibility()"
+        " && !e.closest('.scroll') && e.getBoundingClientRect().right > innerWidth + 1)"
+        ".map((e) => e.outerHTML.slice(0, 80))"
+    )
+    assert outside == [] and browser.js("return document.documentElement.scrollWidth") <= width
+    assert browser.find("h1 .cut").get_attribute("title") == name
+    assert browser.find("h1").text == f"{name[:27]}…{name[:12]}"
+    browser.js("document.querySelector('.thumbnails button').click()")
+    assert browser.js("return document.querySelector('dialog').scrollWidth") <= width

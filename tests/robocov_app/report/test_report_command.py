@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,50 @@ def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
     said = answer(capsys, "report", str(tmp_path / "both"))
     assert said["results"][0]["missing"] == 1
     assert "Not finished: 1 of 3 runs is missing." in (tmp_path / "both/report.html").read_text()
+
+
+def test_one_damaged_run_is_named_and_the_report_goes_on(run, tmp_path, capsys) -> None:
+    saved_comparison(tmp_path / "both")
+    (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")
+    assert main(["report", str(tmp_path / "both")]) == 0
+    said = capsys.readouterr()
+    assert f"robocov: warning: {tmp_path / 'both'}: rpf is left out: " in said.err
+    page = (tmp_path / "both/report.html").read_text()
+    assert "1 run cannot be read and is left out: rpf (" in page
+    assert "Runs that failed or cannot be read" in page
+    told = answer(capsys, "report", str(tmp_path / "both"))["results"][0]
+    assert (told["runs"], told["damaged"][0]["folder"], told["missing"]) == (1, "rpf", 0)
+    # beside another result that is whole, one that is not is named, too
+    (run / "record.npz").write_bytes(b"PK")
+    assert main(["report", str(tmp_path / "both"), str(run)]) == 0
+    assert "one is left out: " in capsys.readouterr().err
+
+
+def test_where_no_run_is_left_nothing_is_written(run, capsys) -> None:
+    (run / "record.npz").write_bytes(b"PK")
+    said = complaint(capsys, "report", str(run))
+    assert "no run is left to report" in said and not (run / "report.html").exists()
+
+
+def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("robocov_app.report.references.RESTARTS", 2)
+    page = run / "report.html"
+    assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
+    assert main(["report", str(run), "--optimum"]) == 0
+    (above,) = re.findall(r"average, ([\d.]+) % above the best placement known", page.read_text())
+    assert float(above) > 0.0
+    before = page.read_bytes()
+    monkeypatch.setattr("robocov_app.report.references.optimum", None)  # nothing is searched for again
+    assert main(["report", str(run)]) == 0 and page.read_bytes() == before
+    monkeypatch.setenv("ROBOCOV_CACHE", "")
+    assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
+    assert "searching" not in capsys.readouterr().err.replace("searching: 1 of 1", "")
+
+
+def test_a_dimensionless_gain_has_no_unit(run) -> None:
+    saved_run(
+        run / "atlas", replace(walk(SQUARE), controller="atlas", gains={"threshold": 0.01, "stake": 0.004})
+    )
+    assert main(["report", str(run / "atlas")]) == 0
+    assert "threshold 0.01, stake 0.004<" in (run / "atlas/report.html").read_text()

@@ -15,8 +15,9 @@ from reported_results import HOSTILE, Page, entry, result_of, watched
 
 from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
-from robocov_app.report.document import MARKS, report
-from robocov_app.report.replay import asset
+from robocov_app.plots.curves import MARKS
+from robocov_app.report.document import MOST_LETTERS, report
+from robocov_app.report.gathering import Damaged
 from robocov_app.saved import Saved
 
 SWEEP = [
@@ -170,7 +171,7 @@ def test_sections_are_there_where_they_tell_something(html) -> None:
         *("What was run", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
         *("What the result depends on", "Trajectories", "Failures"),
     ]
-    assert "Not finished: 9 of 40 runs are missing." in html and "1 of 31 runs failed." in html
+    assert "Not finished: 9 of 40 runs are missing." in html and "1 of 31 runs failed (mine 1 of 1): " in html
     assert html.count('class="thumbnails"') == 1 and html.count("data-run=") == 30
 
 
@@ -193,10 +194,36 @@ def test_bad_input_is_named(call, message) -> None:
     assert message in str(caught.value)
 
 
-def test_progress_counts_all_runs() -> None:
-    told: list[int] = []
-    report([watched([entry(), entry("rpf")]), watched([entry()])], tell=told.append)
-    assert told == [1, 2, 3]
+def test_failures_are_the_first_that_is_told(html) -> None:
+    words = html.partition("<body>")[2]
+    assert words.index("1 of 31 runs failed (mine 1 of 1): ") < words.index("Not finished: 9 of 40")
+    assert words.index("Not finished") < words.index('class="lede"') < words.index("<table")
+
+
+def test_variants_have_their_own_marks_and_names_in_tables_pictures_and_the_replay(html) -> None:
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+    looks = {(run["label"], run["style"], run["mark"], str(run["dashes"])) for run in data["runs"]}
+    assert len(looks) == 6
+    for part in zip(*looks, strict=True):
+        assert len(set(part)) == 6
+    for label, style, mark, _ in looks:
+        cell = f'<path d="{mark}" style="fill:var(--rc-{style})"/></svg>{label}<'
+        assert html.count(cell) >= 3  # gains, results, trajectories
+
+
+def test_a_long_name_is_cut_and_stands_whole_beside() -> None:
+    name = "<b>" + "ü" * 297
+    whole = name.replace("<", "&lt;").replace(">", "&gt;")
+    html = report([watched([entry(map_name=name)], replace(ROOMS, name=name))], title=name).html
+    page = Page(html)
+    cut = [word for words in page.words for word in words.split() if "…" in word]
+    assert len(cut) >= 3 and max(map(len, cut)) <= MOST_LETTERS and f'title="{whole}"' in html
+
+
+def test_a_result_all_of_whose_runs_are_damaged_is_a_section_that_says_so() -> None:
+    lost = replace(result_of([]), damaged=(Damaged("run", "record.npz: no zip file"),), wanted=1)
+    html = report([watched([entry()]), lost]).html
+    assert "1 run cannot be read and is left out: run (record.npz: no zip file)." in html
 
 
 def test_a_page_knows_its_own(tmp_path) -> None:
@@ -210,7 +237,4 @@ def test_a_page_knows_its_own(tmp_path) -> None:
 def test_marks_are_those_of_the_plots() -> None:
     from robocov_app.plots.curves import curve_styles
 
-    used = {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", "a", "b", "c"]).values()}
-    assert used == MARKS.keys()
-    for mark in used - {"o"}:  # all but the round one are shapes of their own in the replay, too
-        assert f'"{mark}"' in asset("chart.js") or f"{mark}:" in asset("chart.js")
+    assert {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", *"abcde"]).values()} == MARKS.keys()

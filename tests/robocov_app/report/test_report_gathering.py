@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,8 +126,6 @@ def test_an_unfinished_sweep_says_what_is_missing(folder, tmp_path) -> None:
 
 
 def moved(entries, folder):
-    from dataclasses import replace
-
     return [replace(each, folder=folder / "runs" / each.folder.name) for each in entries]
 
 
@@ -160,13 +159,42 @@ def test_what_cannot_be_read_is_named(folder, tmp_path, spoil, message) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_record_that_is_not_there_is_named(folder, tmp_path) -> None:
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (shutil.rmtree, "there is no run.json"),
+        (lambda run: (run / "run.json").unlink(), "there is no run.json"),
+        (lambda run: (run / "run.json").write_text('{"format": "robocov-run", "version": 99}'), ""),
+        (lambda run: (run / "record.npz").write_bytes(b"PK" * 9), ""),
+        (lambda run: (run / "record.npz").unlink(), ""),
+        (lambda run: (run / "cost.csv").write_text("time_s\n"), "cost.csv: line 1: "),
+    ],
+)
+def test_a_damaged_run_of_a_sweep_is_left_out_and_named(folder, tmp_path, spoil, reason) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
-    result = gathered(copy)
-    shutil.rmtree(result.fine[0].folder)
-    with pytest.raises(InputError, match=r"not the folder of a run \(there is no run.json\)"):
-        result.record(result.fine[0])
+    whole = gathered(copy)
+    first = whole.fine[0]
+    spoil(first.folder)
+    told: list[int] = []
+    result = whole.readable(told.append)
+    assert result.entries == tuple(each for each in whole.entries if each is not first)
+    ((name, words),) = result.damaged
+    assert name == first.folder.name and reason in words and str(tmp_path) not in words
+    assert told == list(range(1, len(whole.fine) + 1)) and result.missing == 0
+
+
+def test_damaged_runs_of_a_comparison_are_left_out_and_named(tmp_path) -> None:
+    saved_comparison(tmp_path / "three", ("rapf", "rpf", "lloyd"))
+    (tmp_path / "three/rpf/record.npz").write_bytes(b"")
+    other = replace(SQUARE, boundary=((0, 0), (9, 0), (9, 8), (0, 8)))
+    saved_run(tmp_path / "other", walk(other))
+    shutil.rmtree(tmp_path / "three/lloyd")
+    shutil.copytree(tmp_path / "other", tmp_path / "three/lloyd")
+    result = gathered(tmp_path / "three")
+    assert [each.controller for each in result.entries] == ["rapf"]
+    assert [name for name, _ in result.damaged] == ["rpf", "lloyd"]
+    assert "another map than in rapf" in result.damaged[1].reason and result.missing == 0
 
 
 def test_controllers_of_one_name_are_told_apart(tmp_path) -> None:

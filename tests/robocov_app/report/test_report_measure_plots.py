@@ -11,6 +11,7 @@ from robocov.metrics import CostHistory
 from robocov.metrics.run_metrics import run_metrics
 from robocov.robots import Team
 from robocov_app.report.embedding import ReplayRun
+from robocov_app.report.groups import styles
 from robocov_app.report.measure_plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
 
 ENTRIES = [entry("rapf"), entry("rpf")]
@@ -26,7 +27,7 @@ def run_of(controller: str = "rapf", timed: bool = False, **walking) -> ReplayRu
 
 
 def plots_of(runs: list[ReplayRun], result=RESULT) -> dict[str, str]:
-    plots = measure_plots(result, runs, result.entries[: len(runs)], "m")
+    plots = measure_plots(result, runs, result.entries[: len(runs)], styles(result), "m")
     return {plot.title: plot.svg for plot in plots}
 
 

@@ -11,7 +11,6 @@ from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
 from robocov.errors import ParameterError
-from robocov_app.plots.curves import curve_styles
 from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
 
 
@@ -39,6 +38,15 @@ def test_a_fragment_brings_all_that_it_needs() -> None:
     assert [run["style"] for run in data["runs"]] == ["rapf", "rpf"]
 
 
+def test_runs_of_one_controller_with_other_gains_look_different() -> None:
+    runs = [ReplayRun(walk(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
+    looks = [
+        (run["style"], run["mark"], tuple(run["dashes"]))
+        for run in data_of(replay_html(runs, standalone=True))["runs"]
+    ]
+    assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
+
+
 def test_a_page_is_a_page() -> None:
     html = replay_html(runs_of(), standalone=True)
     page = Page(html)
@@ -48,7 +56,7 @@ def test_a_page_is_a_page() -> None:
 
 
 def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
-    page = Page(replay_part(runs_of(6), curve_styles(["rapf", "rpf", "lloyd"])))
+    page = Page(replay_part(runs_of(6)))
     pictures = page.all("svg")
     assert len(pictures) == MOST_PANES
     assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reported_results import entry, result_of
@@ -11,20 +13,23 @@ from robocov_app.report.facts import (
     facts,
     gaps,
     lede,
-    pairs_words,
+    meanings,
     run_facts,
     run_title,
     title_of,
     troubles,
 )
-from robocov_app.report.groups import CLUSTERS, comparisons
-from robocov_app.report.result_plots import styles
+from robocov_app.report.gathering import Damaged
+from robocov_app.report.groups import styles
+from robocov_app.report.pairs import comparisons, contenders
+from robocov_app.report.references import Reference
 from robocov_app.report.tables import (
     MOST_ROWS,
     NOTHING,
     controllers_table,
     failures_table,
     gains_table,
+    map_pairs_tables,
     pairs_table,
     runs_table,
     summary_tables,
@@ -105,8 +110,14 @@ def test_the_mean_time_is_told_where_it_is_known() -> None:
 
 def test_gains_are_told_by_set_or_between_which_values_they_are() -> None:
     few = result_of([entry(gains=(("k_rep", 0.3),)), entry(gains=(("k_rep", 1.0),))], units={"k_rep": "N m³"})
+    few = replace(few, meanings={"k_rep": "strength", "k_att": "of others"})
     table = controllers_table(few, styles(few))
-    assert texts(table) == [["RAPF A", "rapf", "k_rep 0.3 N m³"], ["RAPF B", "rapf", "k_rep 1 N m³"]]
+    assert texts(table) == [
+        ["RAPF k_rep 0.3", "rapf", "k_rep 0.3 N m³"],
+        ["RAPF k_rep 1", "rapf", "k_rep 1 N m³"],
+    ]
+    marks = [row[0].style.mark for row in table.rows]
+    assert len(set(marks)) == 2 and meanings(few) == [("k_rep", "strength")]
     assert gains_table(few, styles(few)) is None
     many = result_of(
         [
@@ -132,40 +143,48 @@ def test_failures_are_listed_up_to_some() -> None:
     table = failures_table(result, styles(result))
     assert table is not None and len(table.rows) == MOST_ROWS
     assert texts(table)[2] == ["mine", "rooms", "spread, 2", "k 1", "<b>error 2</b>"]
-    assert table.notes == ("3 more failed runs in results.csv.",)
+    assert table.notes == ("3 more runs.",)
     assert failures_table(result_of([entry()]), {}) is None
+    damaged = replace(result_of([entry()]), damaged=(Damaged("rooms-0", "record.npz: no zip file"),))
+    table = failures_table(damaged, styles(damaged))
+    assert table is not None and texts(table) == [["rooms-0", *[NOTHING] * 3, "record.npz: no zip file"]]
 
 
-def test_pairs_have_intervals_where_there_are_several() -> None:
+def test_pairs_are_told_over_maps_and_map_by_map() -> None:
     entries = [
-        entry(name, k, base + 0.1 * k) for k in range(8) for name, base in (("rapf", 1.0), ("rpf", 2.0))
+        entry(name, k, base * (1.0 + 0.01 * k * (name == "rapf")), map_name=f"m{m}")
+        for m in range(2)
+        for k in range(8)
+        for name, base in (("rapf", 1.0 + 2.0 * m), ("rpf", 2.0))
     ]
     result = result_of(entries)
-    found = comparisons(result)
+    found = comparisons(contenders(result).groups)
     table = pairs_table(found, styles(result))
-    assert column(table, "Pairs") == ["8"] and column(table, "First is lower, %") == ["100 (100 to 100)"]
-    ratio = found[0].paired.ratio
-    assert column(table, "Median ratio") == [f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"]
-    assert column(table, "Median difference, m") == ["−1.000 (−1.000 to −1.000)"]
-    assert "draw whole pairs" in pairs_words(result, found)
-    one = result_of(entries[:2])
-    table = pairs_table(comparisons(one), styles(one))
-    assert table.head == ("First", "Second", "Ratio", "Difference, m")
-    assert "one pair only" in pairs_words(one, comparisons(one))
+    assert column(table, "First is") == ["better on 1 of 2 maps, worse on 1"]
+    assert column(table, "First is lower in") == ["8 of 16"]
+    ratio = found[0].ratio
+    assert column(table, "Ratio") == [f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"]
+    (by_map,) = map_pairs_tables(found)
+    assert column(by_map, "Map") == ["m0", "m1"] and column(by_map, "First is") == ["better", "worse"]
+    assert column(by_map, "First, m") == ["1.035", "3.105"] and column(by_map, "Pairs") == ["8", "8"]
+    one = comparisons(contenders(result_of(entries[:2])).groups)
+    assert column(pairs_table(one, styles(result)), "First is") == ["one pair only"]
+    assert map_pairs_tables(one) == []
 
 
-def test_words_on_pairs_say_what_was_drawn_and_chosen() -> None:
-    entries = [
-        entry(name, k, 1.0 + level, map_name=f"m{m}", gains=(("k", level),))
-        for m in range(CLUSTERS)
-        for k in range(2)
-        for level in (0.1, 0.2, 0.3)
-        for name in ("rapf", "rpf")
+def test_how_far_runs_stay_above_the_reference_is_told_where_it_is_known() -> None:
+    entries = [entry("rapf", k, 2.0 + 0.1 * k) for k in range(3)]
+    entries += [entry("rapf", 9, 2.0, uncovered_area_m2=3.0), entry("rapf", final=5.0, map_name="museum")]
+    result = replace(result_of(entries), references={entries[0].setting: Reference(2.0, 0.0)})
+    every, rooms, museum = summary_tables(result, styles(result))
+    name = "Above the reference, %"
+    # another part of the map is covered at seed 9: its cost is none of the same places
+    assert column(rooms, name) == column(every, name) == ["5.0 (2.5–7.5)"] and column(museum, name) == [
+        NOTHING
     ]
-    result = result_of(entries)
-    words = pairs_words(result, comparisons(result))
-    assert "draw whole maps" in words and "lowest median take part" in words
-    assert "each with its best gains" in lede(result, comparisons(result))
+    assert "J/J_ref − 1" in every.notes[-1]
+    alone = replace(result_of(entries[2:3], kind="run"), references=result.references)
+    assert ", 10.0 % above the best placement known" in lede(alone, [])[0]
 
 
 @pytest.mark.parametrize(
@@ -187,15 +206,20 @@ def test_words_on_pairs_say_what_was_drawn_and_chosen() -> None:
 )
 def test_the_first_words(result, title, words) -> None:
     assert title_of(result) == title
-    assert lede(result, comparisons(result)) == words
+    assert lede(result, comparisons(contenders(result).groups)) == [words]
 
 
 def test_what_is_missing_or_failed_is_said_first() -> None:
     assert gaps(result_of(FIVE)) == []
     assert gaps(result_of(FIVE, wanted=6)) == ["Not finished: 1 of 6 runs is missing."]
-    both = result_of([*FIVE, entry("rpf", error="no")], wanted=20)
-    assert gaps(both) == ["Not finished: 14 of 20 runs are missing.", "1 of 6 runs failed."]
-    assert dict(facts(both))["Runs"] == "5 done, 1 failed, 14 of 20 missing"
+    failed = [entry("rpf", seed=k, error=words) for k, words in enumerate(("no", "no", "a", "b", "c"))]
+    both = replace(result_of([*FIVE, *failed], wanted=20), damaged=(Damaged("run-7", "no zip file"),))
+    assert gaps(both) == [
+        "5 of 10 runs failed (RPF 5 of 5): no; a; b; and 1 more.",
+        "1 run cannot be read and is left out: run-7 (no zip file).",
+        "Not finished: 9 of 20 runs are missing.",
+    ]
+    assert dict(facts(both))["Runs"] == "5 done, 5 failed, 1 unreadable, 9 of 20 missing"
 
 
 def test_what_did_not_go_well_is_counted() -> None:

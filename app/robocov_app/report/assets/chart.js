@@ -2,15 +2,16 @@
 
 const SMALL = 11.5;
 
-/** Round numbers within [low, high], about `wanted` of them. */
+/** Round numbers within [low, high], about `wanted` of them; none where there is no room for them. */
 function roundTicks(low, high, wanted) {
   const rough = (high - low) / Math.max(wanted, 1);
-  if (!(rough > 0)) return [low];
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((value) => value >= rough * 0.999);
-  const ticks = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) ticks.push(k * step);
-  return ticks;
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.floor(high / step + 1e-9) - first + 1;
+  // where the steps are below a rounding error, or nothing is finite, they could not be counted
+  if (!Number.isFinite(step) || !(Math.abs(first) < 1e12) || !(count > 0 && count < 1000)) return [];
+  return Array.from({ length: count }, (_, k) => (first + k) * step);
 }
 
 function plain(value) {
@@ -42,7 +43,8 @@ function limitsOf(runs) {
     high = Math.max(high, run.range.high);
   }
   if (!(low <= high)) return { low: 0, high: 1, end };
-  const room = high > low ? 0.08 * (high - low) : 0.1 * Math.max(Math.abs(high), 1e-3);
+  const size = Math.max(Math.abs(low), Math.abs(high), 1e-3);
+  const room = high - low > 1e-9 * size ? 0.08 * (high - low) : 0.1 * size;
   return { low: low < 0.4 * high ? 0 : low - room, high: high + room, end };
 }
 
@@ -169,26 +171,16 @@ function drawCurve(context, run, x, y, look, above) {
   context.setLineDash([]);
 }
 
-/** The mark of a curve: a shape of its own beside the colour of its own. */
+/** The mark of a curve, an SVG path: a shape of its own beside the colour of its own. */
 function drawMark(context, mark, x, y, size, colour, look) {
-  const corners = { s: [45, 4], D: [0, 4], "^": [-90, 3], v: [90, 3] }[mark];
-  context.beginPath();
-  if (mark === "P") {
-    context.rect(x - size, y - size / 2.6, 2 * size, size / 1.3);
-    context.rect(x - size / 2.6, y - size, size / 1.3, 2 * size);
-  } else if (corners) {
-    const [turn, count] = corners;
-    for (let k = 0; k < count; k += 1) {
-      const angle = ((turn + (360 * k) / count) * Math.PI) / 180;
-      context[k ? "lineTo" : "moveTo"](x + 1.3 * size * Math.cos(angle), y + 1.3 * size * Math.sin(angle));
-    }
-    context.closePath();
-  } else {
-    context.arc(x, y, size, 0, 2 * Math.PI);
-  }
+  const path = new Path2D(mark);
+  context.save();
+  context.translate(x, y);
+  context.scale(size / 5, size / 5);
   context.strokeStyle = look.background;
-  context.lineWidth = 2;
-  context.stroke();
+  context.lineWidth = 10 / size;
+  context.stroke(path);
   context.fillStyle = colour;
-  context.fill();
+  context.fill(path);
+  context.restore();
 }
