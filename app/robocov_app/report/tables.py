@@ -110,18 +110,17 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
     every = settings(result)
     tables = []
     timed = any(_known(entry, TIME) for entry in result.fine)
-    whole = (
-        *(*_HEAD, *(("Mean time, s",) if timed else ())),
-        *(("Above the reference, %",) if result.references else ()),
-    )
+    gap = ("Above J_ref, %",) if result.references else ()
+    whole = (*_HEAD[:3], *gap, *_HEAD[3:], *(("Mean time, s",) if timed else ()))
     if len(every) > 1:
         scales = medians(result)
         rows = []
         for group in groups:
             row = _summary_row(result, group, styles, timed)
             # metres of different maps have no common median
-            rows.append((*row[:2], Cell(_quartiles(relative(group, scales).tolist(), 3)), *row[4:]))
-        head = (*whole[:2], "Mean distance / median", *whole[4:])
+            parted = Cell(_quartiles(relative(group, scales).tolist(), 3))
+            rows.append((*row[:2], parted, *row[3 : 3 + len(gap)], *row[4 + len(gap) :]))
+        head = (*whole[:2], "Mean distance / median", *gap, *whole[4 + len(gap) :])
         note = (
             "Mean distance / median: divided by the median over all runs on the same map with the same team."
         )
@@ -139,7 +138,7 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
         tables[-1] = replace(tables[-1], notes=(note,))
     if tables and result.references:
         note = (
-            f"Above the reference: J/J_ref − 1 of the final mean distance; J_ref is the lowest of {RESTARTS} "
+            f"Above J_ref: J/J_ref − 1 of the final mean distance; J_ref is the lowest of {RESTARTS} "
             f"searches for the best placement of the team with the whole map known, on the same lattice."
         )
         tables[0] = replace(tables[0], notes=(*tables[0].notes, note))
@@ -246,6 +245,7 @@ def _summary_row(
         Cell(group.label, styles[group.label]),
         Cell(str(len(entries))),
         Cell(_spread(entries, "mean_distance_m", 3)),
+        *([Cell(_quartiles(_gaps(result, entries), 1))] if result.references else []),
         Cell(_spread(entries, "mean_distance_over_run_m", 3)),
         Cell(_share(len(settled), len(entries))),
         Cell(_spread(settled, "settled_at_s", 1)),
@@ -254,7 +254,6 @@ def _summary_row(
         Cell(_spread(entries, "path_length_m", 2)),
         Cell(_stuck(entries)),
         *([Cell(_spread(entries, TIME, 3))] if timed else []),
-        *([Cell(_quartiles(_gaps(result, entries), 1))] if result.references else []),
     )
 
 

@@ -177,7 +177,7 @@ def test_how_far_runs_stay_above_the_reference_is_told_where_it_is_known() -> No
     entries += [entry("rapf", 9, 2.0, uncovered_area_m2=3.0), entry("rapf", final=5.0, map_name="museum")]
     result = replace(result_of(entries), references={entries[0].setting: Reference(2.0, 0.0)})
     every, rooms, museum = summary_tables(result, styles(result))
-    name = "Above the reference, %"
+    name = "Above J_ref, %"
     # another part of the map is covered at seed 9: its cost is none of the same places
     assert column(rooms, name) == column(every, name) == ["5.0 (2.5–7.5)"] and column(museum, name) == [
         NOTHING
