@@ -21,8 +21,7 @@ from robocov_app.demo.scenario import Law, branch_words, gain_words
 from robocov_app.plots.gains import Dependence, plot_gain_grid, plot_gains
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.gathering import gathered
-from robocov_app.report.groups import dependences, gain_text
-from robocov_app.report.result_plots import styles
+from robocov_app.report.groups import dependences, gain_text, styles
 from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gain_choices import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study

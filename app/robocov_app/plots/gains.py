@@ -13,6 +13,7 @@ from robocov.controllers.gains import value_text
 from robocov.errors import ParameterError, shown
 from robocov_app.plots.curves import DISTANCE, CurveStyle, curve_styles
 from robocov_app.plots.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.plots.rows import cut_to
 from robocov_app.view.theme import LIGHT, Colour, Theme, theme_named
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ HEAT_LEVELS = 12
 
 MOST_LEVELS = 15
 """Different values of a gain up to which medians are drawn; more are a sample of a range."""
+
+MOST_LETTERS = 28
+"""Of a name on an axis or in a legend."""
 
 MOST_POINTS = 600
 """Points that are drawn of a controller; of more, every so many-th."""
@@ -103,11 +107,13 @@ def plot_gains(
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
     kept = []
+    gain = cut_to(gain, len, MOST_LETTERS)
     for each in dependences:
         fine: BoolArray = np.isfinite(each.values)
         if not fine.any():
             raise ParameterError(f"dependence {shown(each.label)}: no finite value, but one was wanted")
-        kept.append(each._replace(gains=each.gains[fine], values=each.values[fine]))
+        short = cut_to(each.label, len, MOST_LETTERS)
+        kept.append(Dependence(short, each.controller, each.gains[fine], each.values[fine]))
     if not kept:
         raise ParameterError("dependences: none were given, but at least one was wanted")
     known = curve_styles(each.controller for each in kept)
@@ -198,8 +204,8 @@ def plot_gain_grid(
         axes.tick_params(length=0.0)
         for side in axes.spines.values():
             side.set_visible(False)
-        axes.set_xlabel(gains[0], fontsize=TEXT, color=tone(theme.ink))
-        axes.set_ylabel(gains[1], fontsize=TEXT, color=tone(theme.ink))
+        axes.set_xlabel(cut_to(gains[0], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
+        axes.set_ylabel(cut_to(gains[1], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
         _level_words(axes)
         return cast("Figure", axes.get_figure(root=True))
 

@@ -188,10 +188,8 @@ def _grid_plot(
 
 
 def _named(name: str, units: Mapping[str, str]) -> str:
-    """Return a gain with its unit, each short enough for an axis."""
     unit = units.get(name, "")
-    name = f"{name[:19]}…" if len(name) > 20 else name
-    return f"{name} ({unit})" if 0 < len(unit) < 10 else name
+    return f"{name} ({unit})" if unit else name
 
 
 def _level_value(level: float, words: tuple[str, ...]) -> Value:
