@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robocov_app.report.groups import medians, variants
+from robocov_app.report.pairs import contenders
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -20,17 +21,7 @@ MOST_RUNS = 50
 
 
 class Choice(NamedTuple):
-    """Runs to be shown.
-
-    Attributes
-    ----------
-    entries : tuple of Entry
-        In the result's order.
-    words : str
-        How they were chosen, for the reader.
-    panes : tuple of int
-        Which of them stand side by side at first.
-    """
+    """Runs to be shown, in the result's order; how they were chosen; which stand side by side at first."""
 
     entries: tuple[Entry, ...]
     words: str
@@ -49,7 +40,7 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
         return Choice(fine, "All runs.", _side_by_side(result, fine, panes))
     what = (
         "the best and the worst run of each controller by its final mean distance, and the case (start and "
-        "seed) that is nearest to the middle for all of them, with the best gains of each"
+        "seed) that is nearest to the middle for all of them, with the gains that each is compared with"
     )
     maps = list(dict.fromkeys(entry.map for entry in fine))
     found: set[Entry] = set()
@@ -85,20 +76,12 @@ def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
 
 
 def _best_variants(result: Result, entries: Iterable[Entry], few: int = 0) -> list[Group]:
-    """Return of each controller the gains with the lowest median on these runs, or all where they are few."""
+    """Return of each controller the runs with the gains it is compared with, or all variants of few."""
     among = set(entries)
-    apart = variants(result)
-    if len(apart) <= few:
-        return [replace(group, entries=tuple(e for e in group.entries if e in among)) for group in apart]
-    best: dict[str, tuple[float, Group]] = {}
-    scales = medians(result)
-    for group in apart:
-        values = [e.final / scales[e.setting] for e in group.entries if e in among and np.isfinite(e.final)]
-        standing = float(np.median(values)) if values else float("inf")
-        if group.controller not in best or standing < best[group.controller][0]:
-            kept = tuple(entry for entry in group.entries if entry in among)
-            best[group.controller] = standing, replace(group, entries=kept)
-    return [group for _, group in best.values()]
+    groups = variants(result)
+    if len(groups) > few:
+        groups = contenders(result).groups
+    return [replace(group, entries=tuple(e for e in group.entries if e in among)) for group in groups]
 
 
 def _middle_case(groups: Sequence[Group], scales: Mapping[tuple[object, ...], float]) -> tuple[Entry, ...]:

@@ -67,14 +67,7 @@ MOST_LETTERS = 40
 
 @dataclass(frozen=True)
 class Report:
-    """A page.
-
-    Attributes
-    ----------
-    html : str
-    shown : tuple of int
-        For each result, how many runs can be watched.
-    """
+    """A page, and for each result how many of its runs can be watched."""
 
     html: str
     shown: tuple[int, ...]
@@ -86,23 +79,14 @@ def report(
     title: str | None = None,
     theme: str = "auto",
 ) -> Report:
-    """Return results as a page; the same results give the same page.
+    """Return results as a page, a section each; the same results give the same page.
 
-    Parameters
-    ----------
-    results : sequence of Result
-        One section each.
-    title : str or None
-        By default, what the result is called.
-    theme : {"auto", "light", "dark"}
-        "auto" follows the reader.
+    The theme is "auto", which follows the reader, "light" or "dark".
 
     Raises
     ------
     ParameterError
         When there are no results, or no such theme.
-    InputError
-        When a run cannot be read.
     """
     if not results:
         raise ParameterError("report: no results were given, but at least one was wanted")

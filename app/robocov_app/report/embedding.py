@@ -46,21 +46,10 @@ _VERTICES = 4000
 
 @dataclass(frozen=True, eq=False)
 class ReplayRun:
-    """A run to be replayed.
+    """A run to be replayed, with what it is called, what else is said of it, and how its curve looks.
 
-    Attributes
-    ----------
-    record : Record
-    history : CostHistory or None
-        Its cost; without, the replay shows no curve of it.
-    title : str
-        What the run is called.
-    facts : str
-        What else is to be said of it, in one sentence.
-    label : str
-        Its controller, with its variant, at its curve; by default the record's.
-    style : CurveStyle or None
-        By default one of its own in its replay.
+    Without a history the replay shows no curve; without a label and a style it has the record's label and a
+    style of its own.
     """
 
     record: Record
@@ -163,19 +152,7 @@ def lives(record: Record) -> list[tuple[float, float | None]]:
 def embedded_run(
     run: ReplayRun, place: int, style: CurveStyle, rate: float, *, goals: bool
 ) -> dict[str, Any]:
-    """Return one run.
-
-    Parameters
-    ----------
-    run : ReplayRun
-    place : int
-        Number of its map.
-    style : CurveStyle
-        Of its curve.
-    rate : float, Hz
-    goals : bool
-        Whether the robots' goals are to be embedded where there are any.
-    """
+    """Return one run: `place` is the number of its map, `rate` in Hz, `goals` whether those come along."""
     record = run.record
     begin, end = float(record.time[0]), float(record.time[-1])
     times = even_times(end - begin, rate) if has_path(record) else np.unique([0.0, end - begin])
@@ -210,16 +187,7 @@ def embedded(
 ) -> dict[str, Any]:
     """Return all that a replay needs, at the highest rate (up to `RATE`) at which it fits `budget` bytes.
 
-    Where even one moment a second is too much, goals are left out.
-
-    Parameters
-    ----------
-    runs : sequence of ReplayRun
-    styles : sequence of CurveStyle
-        One for each run.
-    panes : sequence of int
-        The runs to be shown at first.
-    budget : int
+    Where even one moment a second is too much, goals are left out. `panes` are the runs to be shown at first.
     """
     rate, goals = _affordable(runs, budget)
     maps: list[dict[str, Any]] = []

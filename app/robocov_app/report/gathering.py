@@ -40,23 +40,10 @@ FIGURES = (
 
 @dataclass(frozen=True)
 class Entry:
-    """One run of a result.
+    """One run of a result; `label` is the controller's name as shown to people.
 
-    Attributes
-    ----------
-    map, controller, label : str
-        `label` is the controller's name as shown to people.
-    robots : int
-    team : tuple of (name, value)
-        Parameters of the team of which the result has several values; None for no limit.
-    start : str or None
-    seed : int or None
-    gains : tuple of (name, value)
-    figures : dict of name to value
-        `FIGURES`, None where not known. Empty where the run failed.
-    error : str or None
-        Why it failed.
-    folder : Path
+    `team` are the parameters of the team of which the result has several values (None for no limit);
+    `figures` are `FIGURES` (None where not known), empty where the run failed with `error`.
     """
 
     map: str
@@ -97,27 +84,11 @@ class Damaged(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What one folder holds.
+    """What one folder holds: its runs, their maps, and how many there were to be (`wanted`).
 
-    Attributes
-    ----------
-    kind : {"run", "comparison", "sweep"}
-    folder : Path
-    entries : tuple of Entry
-    maps : dict of name to Environment
-    wanted : int
-        How many runs there were to be.
-    units : dict of gain to unit
-    meanings : dict of gain to what it is
-    facts : dict of name to value
-        What all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
-        ``versions``.
-    loaded : dict of folder to Saved
-        Runs that were read already.
-    damaged : tuple of Damaged
-        Runs that cannot be read; they are not among the entries.
-    references : dict of setting to Reference
-        The centralised references that are known (`robocov_app.report.references`).
+    `facts` are what all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
+    ``versions``. `loaded` are runs that were read already, `damaged` those that cannot be read and are no
+    entries, `references` the centralised references of settings (`robocov_app.report.references`).
     """
 
     kind: Kind
@@ -150,10 +121,7 @@ class Result:
     def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:
         """Return the result with every run that cannot be read among the damaged ones.
 
-        Parameters
-        ----------
-        tell : callable
-            Called with the number of runs that are read.
+        `tell` is called with the number of runs that are read.
         """
         kept, damaged, done = [], list(self.damaged), 0
         for entry in self.entries:

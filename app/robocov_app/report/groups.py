@@ -33,17 +33,7 @@ _DIRECT = 12
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Runs of one controller: with the same gains, or with all that were tried.
-
-    Attributes
-    ----------
-    label : str
-    controller : str
-    gains : tuple of (name, value), or None
-        None where they differ.
-    entries : tuple of Entry
-        Those that did not fail, in the result's order.
-    """
+    """Runs of one controller that did not fail: with the same gains, or with all that were tried (None)."""
 
     label: str
     controller: str

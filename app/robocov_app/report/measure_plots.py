@@ -67,15 +67,6 @@ def measure_plots(
 
     Nor are there any of very many runs or robots, or where a record does not tell the robots' ways. A
     metric that tells nothing is left out, as the gap between robots where there is one.
-
-    Parameters
-    ----------
-    result : Result
-    runs, entries : sequences
-        The runs with their records.
-    looks : dict of label to CurveStyle
-    key : str
-        For the ids of the plots.
     """
     if result.kind == "sweep" or not 0 < len(runs) <= MOST_MEASURED:
         return []

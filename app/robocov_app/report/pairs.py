@@ -54,17 +54,9 @@ class MapPairs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two groups, pair by pair.
+    """Two groups on the maps that both were run on, and their ratio over maps (of one map over its seeds).
 
-    Attributes
-    ----------
-    first, second : Group
-    maps : tuple of MapPairs
-        At least one.
-    ratio : Interval
-        Over maps; of a single map, over its seeds.
-    alone : int
-        Cases that only one of them has a result of.
+    `alone` counts cases that only one of them has a result of.
     """
 
     first: Group

@@ -38,14 +38,7 @@ MOST_ROBOTS = 400
 
 
 class Frame:
-    """Where the metres of a map are in a picture.
-
-    Parameters
-    ----------
-    environment : Environment
-    width, height : float, px
-        The picture fits into them; one of them is filled.
-    """
+    """Where the metres of a map are in a picture of at most `width` by `height` px."""
 
     def __init__(self, environment: Environment, width: float, height: float) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
@@ -77,16 +70,8 @@ def run_picture(
 ) -> str:
     """Return a picture of a whole run as an SVG element: cells, trajectories, starts, final positions.
 
-    Parameters
-    ----------
-    record : Record
-    history : CostHistory or None
-    width, height : float, px
-        The picture fits into them.
-    numbers : bool
-        Whether the robots carry their numbers where they are large enough.
-    hidden : bool
-        Whether it is hidden from screen readers, because what it stands in says it all.
+    With `numbers`, robots that are large enough carry theirs; `hidden` from screen readers is what stands in
+    something that says it all.
     """
     frame = Frame(record.environment, width, height)
     n = len(record.team)

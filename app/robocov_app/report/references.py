@@ -32,17 +32,10 @@ class Reference(NamedTuple):
 
 
 def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
-    """Return the result with the references that are in the user's cache.
+    """Return the result with the references in the user's cache; `search` for others takes some seconds each.
 
-    There are none where obstacles move or robots fail or join: the best places are of one moment.
-
-    Parameters
-    ----------
-    result : Result
-    search : bool
-        Whether to search for those that are not there: some seconds for each map and team.
-    tell : callable
-        Called with the number of maps and teams that are done.
+    There are none where obstacles move or robots fail or join: the best places are of one moment. `tell` is
+    called with the number of maps and teams that are done.
     """
     lattice = result.facts.get("lattice")
     first = {entry.setting: entry for entry in reversed(result.fine)}

@@ -79,11 +79,6 @@ def replay_part(
 ) -> str:
     """Return a replay without style and script, for a page that has `replay_css` and `replay_js` once.
 
-    Parameters
-    ----------
-    runs, panes, budget
-        As for `replay_html`.
-
     Raises
     ------
     ParameterError

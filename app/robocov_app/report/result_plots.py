@@ -57,15 +57,7 @@ WIDE = 860, 360
 
 
 class Plot(NamedTuple):
-    """A plot of the page.
-
-    Attributes
-    ----------
-    title : str
-        What stands above; may be empty.
-    svg, narrow : str
-        As it is, and for small screens; empty where it is narrow anyway.
-    """
+    """A plot of the page: its title (may be empty), its SVG, and another for small screens if it is wide."""
 
     title: str
     svg: str

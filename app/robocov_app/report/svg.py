@@ -39,13 +39,7 @@ _PLOTTED = (
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:
     """Return a figure, drawn in the colours of the light theme, as an SVG element.
 
-    Parameters
-    ----------
-    figure : matplotlib Figure
-    key : str
-        A name that no other figure of the page has; ids begin with it.
-    sentence : str
-        What the figure shows, with its numbers, for who does not see it.
+    Ids begin with `key`, which no other figure of the page has; `sentence` tells what it shows in words.
     """
     import matplotlib
 

@@ -50,19 +50,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
-
-    Attributes
-    ----------
-    caption : str
-    head : tuple of str
-        The first column names the rows.
-    rows : sequence of tuple of Cell
-    texts : frozenset of int
-        Columns of words; all others but the first are numbers.
-    notes : tuple of str
-        What stands below.
-    """
+    """A table whose first column names the rows; `texts` are other columns of words, `notes` stand below."""
 
     caption: str
     head: tuple[str, ...]
