@@ -57,10 +57,10 @@ def command(options: Arguments) -> None:
     results = [_readable(result, quiet=options.json) for result in results]
     damaged = [(result.folder, each) for result in results for each in result.damaged]
     if not any(result.entries for result in results):
-        folder, each = damaged[0]
-        raise InputError(f"{folder}: {each.folder}: {each.reason}; no run is left to report")
-    for folder, each in () if options.json else damaged:
-        print(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", file=sys.stderr)
+        folder, lost = damaged[0]
+        raise InputError(f"{folder}: {lost.folder}: {lost.reason}; no run is left to report")
+    for folder, lost in () if options.json else damaged:
+        print(f"robocov: warning: {folder}: {lost.folder} is left out: {lost.reason}", file=sys.stderr)
     results = [_with_references(result, options) for result in results]
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
