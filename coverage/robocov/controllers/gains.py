@@ -120,9 +120,7 @@ def gain(
     >>> gains_of(Mine)["k"].unit
     'N/m'
     """
-    # "1" is a unit in formulas, and nothing behind a number
-    shown_unit = "" if unit == "1" else unit
-    return field(default=default, metadata={"gain": (shown_unit, low, high, meaning, optional)})
+    return field(default=default, metadata={"gain": (unit, low, high, meaning, optional)})
 
 
 def choice(default: str, words: Sequence[str], meaning: str) -> Any:
@@ -157,6 +155,7 @@ def gains_of(controller: Any) -> dict[str, Gain | Option]:
         default = None if each.default is MISSING else each.default
         if "gain" in each.metadata:
             unit, low, high, meaning, optional = each.metadata["gain"]
+            unit = "" if unit == "1" else unit  # a unit in formulas, and nothing behind a number
         elif isinstance(default, int | float) and not isinstance(default, bool):
             # a user's plain dataclass field is a gain of any value
             unit, low, high, meaning, optional = "", -1e12, 1e12, "", False
