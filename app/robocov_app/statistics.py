@@ -27,9 +27,6 @@ LEVEL = 0.95
 RESAMPLES = 4000
 """Bootstrap samples: the ends of a 95 % interval then vary by about a fortieth of its width."""
 
-_AT_ONCE = 2_000_000
-"""Values that are held at a time."""
-
 
 @dataclass(frozen=True)
 class Interval:
@@ -78,20 +75,12 @@ def bootstrap(
         raise ParameterError(
             f"clusters: {len(labels)} labels of {len(sample)} values, but one for each was wanted"
         )
-    members = _members(labels)
-    padded = np.full((len(members), max(map(len, members))), np.nan)
-    for row, own in zip(padded, members, strict=True):
-        row[: len(own)] = sample[own]
-    of: Callable[..., Array] = np.nanmedian if statistic == "median" else np.nanmean
-
-    def drawn(numbers: IntArray, axis: int = -1) -> Array:
-        return of(padded[numbers].reshape(*numbers.shape[:-1], -1), axis=axis)
-
-    return _bootstrapped(drawn, len(members), resamples, batch=max(_AT_ONCE // padded.size, 1))
+    of: Callable[[Array], Any] = np.median if statistic == "median" else np.mean
+    return bootstrap_by(lambda rows: float(of(sample[rows])), labels, resamples=resamples)
 
 
 def bootstrap_by(
-    statistic: Callable[[list[int]], float], clusters: Sequence[object], *, resamples: int = 1000
+    statistic: Callable[[IntArray], float], clusters: Sequence[object], *, resamples: int = 1000
 ) -> Interval:
     """Return any statistic of row numbers, some of them drawn several times, one label of `clusters` a row.
 
@@ -102,12 +91,27 @@ def bootstrap_by(
     """
     if not len(clusters):
         raise ParameterError("clusters: none, but at least one was wanted")
-    members = _members(clusters)
+    rows: dict[object, list[int]] = {}
+    for row, label in enumerate(clusters):
+        rows.setdefault(label, []).append(row)
+    members = [np.array(own) for own in rows.values()]
+    estimate = float(statistic(np.arange(len(clusters))))
+    if len(members) < 2:
+        return Interval(estimate, float("nan"), float("nan"))
+    from scipy.stats import bootstrap as drawn_by
 
-    def drawn(numbers: IntArray) -> float:
-        return statistic([row for number in np.sort(numbers).tolist() for row in members[number]])
-
-    return _bootstrapped(drawn, len(members), resamples)
+    found = drawn_by(
+        (np.arange(len(members)),),
+        lambda drawn: statistic(np.concatenate([members[number] for number in drawn])),
+        n_resamples=resamples,
+        vectorized=False,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).bootstrap_distribution
+    # a resample may have no value of the statistic: its percentiles are those of the others
+    tail = (1.0 - LEVEL) / 2.0
+    low, high = np.quantile(found[np.isfinite(found)], [tail, 1.0 - tail]).tolist()
+    return Interval(estimate, low, high)
 
 
 def paired(a: ArrayLike, b: ArrayLike, clusters: Sequence[object] | None = None) -> Paired:
@@ -178,36 +182,3 @@ def _checked(name: str, values: ArrayLike) -> Array:
         k = int(np.argmin(np.isfinite(sample)))
         raise ParameterError(f"{name}[{k}]: {shown(float(sample[k]))}, but a finite number was wanted")
     return sample
-
-
-def _members(labels: Sequence[object]) -> list[list[int]]:
-    """Return the row numbers of each cluster."""
-    found: dict[object, list[int]] = {}
-    for row, label in enumerate(labels):
-        found.setdefault(label, []).append(row)
-    return list(found.values())
-
-
-def _bootstrapped(
-    statistic: Callable[..., Any], clusters: int, resamples: int, batch: int | None = None
-) -> Interval:
-    """Return the percentile interval of a statistic of cluster numbers; in batches, it takes rows of them."""
-    numbers = np.arange(clusters)
-    estimate = float(statistic(numbers))
-    if clusters < 2:
-        return Interval(estimate, float("nan"), float("nan"))
-    from scipy.stats import bootstrap as drawn_by
-
-    found = drawn_by(
-        (numbers,),
-        statistic,
-        n_resamples=resamples,
-        batch=batch,
-        vectorized=batch is not None,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).bootstrap_distribution
-    # a resample may have no value of the statistic: its percentiles are those of the others
-    tail = (1.0 - LEVEL) / 2.0
-    low, high = np.quantile(found[np.isfinite(found)], [tail, 1.0 - tail]).tolist()
-    return Interval(estimate, low, high)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov_app.paper.accounts import account_of
 from robocov_app.paper.beyond_plan import HUGE, IN_CLAIMS, LARGE, OURS
 from robocov_app.paper.claims import compared
@@ -271,11 +271,11 @@ def gap_closed(outcomes: Outcomes, ours: Contender, other: Contender) -> Claim:
         return Claim(name, RIVALS, claim, (), 0, 0, "There is no run that could tell.")
     own, theirs = fine.of(ours.key, "gap"), fine.of(other.key, "gap")
 
-    def closed(rows: Sequence[int]) -> float:
-        left = float(np.median(theirs[list(rows)]))
-        return 1.0 - float(np.median(own[list(rows)])) / left if left > 0.0 else float("nan")
+    def closed(rows: IntArray) -> float:
+        left = float(np.median(theirs[rows]))
+        return 1.0 - float(np.median(own[rows])) / left if left > 0.0 else float("nan")
 
-    if math.isnan(closed(range(len(own)))):
+    if math.isnan(closed(np.arange(len(own)))):
         return Claim(name, RIVALS, claim, (), 0, 0, f"{other.label} leaves no gap that could be closed.")
     found = bootstrap_by(closed, fine.maps)
     told = (
