@@ -109,8 +109,9 @@ def bootstrap_by(
         rng=np.random.default_rng(0),
     ).bootstrap_distribution
     # a resample may have no value of the statistic: its percentiles are those of the others
+    known = found[np.isfinite(found)]
     tail = (1.0 - LEVEL) / 2.0
-    low, high = np.quantile(found[np.isfinite(found)], [tail, 1.0 - tail]).tolist()
+    low, high = np.quantile(known, [tail, 1.0 - tail]).tolist() if len(known) else (np.nan, np.nan)
     return Interval(estimate, low, high)
 
 
