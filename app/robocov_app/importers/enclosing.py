@@ -109,24 +109,34 @@ def foreign_map(
             raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
     _require_size(area.geoms[0].bounds, shapes.where)
     used = boundary or _Enclosure(area, "")
-    blocks = [o.area for o in shapes.outlines if solid and o not in used.outlines]
-    solids = [line.solid for line in shapes.lines if line not in used.lines] + shapes.pillars
+    inner = [outline for outline in shapes.outlines if solid and outline not in used.outlines]
+    walls = [line for line in shapes.lines if line not in used.lines]
+    blocks = [outline.area for outline in inner]
+    solids = [*(line.solid for line in walls), *(pillar.polygon for pillar in shapes.pillars)]
     shapely.prepare(area)
     around = np.zeros(0, dtype=bool) if not blocks else shapely.covered_by(area, blocks)
     blocks = [block for block, outer in zip(blocks, around, strict=True) if not outer]
     outside = int((~shapely.intersects(area, [*blocks, *solids])).sum() + around.sum())
     if outside:
         shapes.leave_out("shape", "outside of the boundary", outside)
+    free = _without(area, [*blocks, *solids])
     outer = None
     if boundary is not None and (solid or boundary.area is not area):
         outer = Polygon(boundary.area.geoms[0].exterior)
+    elif solids and len(area.geoms) == len(free.geoms) == 1:  # walls that begin at the edge are no part of it
+        outer = Polygon(area.geoms[0].exterior)
     return ForeignMap(
         name=name,
         description=description,
         format=format,
-        free=_without(area, [*blocks, *solids]),
+        free=free,
         boundary=outer,
         vertices_read=shapes.vertices,
+        primitives=(
+            *(outline.circle for outline in inner if outline.circle is not None),
+            *(wall for line in walls if (wall := line.wall) is not None),
+            *shapes.pillars,
+        ),
         repaired=shapes.repaired,
         dropped=shapes.dropped,
         notes=(*notes, *_words(shapes, solid, boundary, len(blocks))),
@@ -186,7 +196,8 @@ def _largest(shapes: Shapes, solid: bool) -> _Enclosure | None:
     outline = max(shapes.outlines, key=_filled)
     inner: list[BaseGeometry] = [o.area for o in shapes.outlines if o is not outline]
     if solid:
-        inner += [*(shapely.linestrings(line.points) for line in shapes.lines), *shapes.pillars]
+        inner += [*(shapely.linestrings(line.points) for line in shapes.lines)]
+        inner += [pillar.polygon for pillar in shapes.pillars]
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from shapely import MultiPolygon, Polygon
+
+if TYPE_CHECKING:
+    from robocov_app.importers.primitives import Primitive
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,9 @@ class ForeignMap:
     cut_corners : bool
         Whether corners are cut by a step or two of a grid: simplifying then makes them whole, as
         `robocov_app.importers.corners` does.
+    primitives : tuple of CircleObstacle and WallObstacle
+        Obstacles that the file draws as such, with their names: they are not in `free`, and are kept instead
+        of the polygons that they cover where nothing speaks against it.
     repaired, dropped, notes : tuple of str
         What the reader had to put right, what it left out, and what is worth knowing besides (how
         unknown cells were taken, say): one line each, with counts and areas.
@@ -48,6 +55,7 @@ class ForeignMap:
     cell: float | None = None
     specks: float = 0.0
     cut_corners: bool = False
+    primitives: tuple[Primitive, ...] = ()
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -11,8 +11,10 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov.environment import CircleObstacle
+from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, counted, unknown_name
+from robocov.files.strictjson import one_line
+from robocov.mapfile.fields import LONGEST_LABEL
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.importers import limits
 from robocov_app.importers.fills import Rule, edges_of, enclosed, require_untangled
@@ -68,10 +70,13 @@ class Outline:
         What it encloses; valid.
     labels : tuple of str
         Its names, ids, classes, layers; the most particular first.
+    circle : CircleObstacle or None
+        The same as an obstacle of a map, where it is a disc.
     """
 
     area: MultiPolygon
     labels: tuple[str, ...] = ()
+    circle: CircleObstacle | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +115,18 @@ class Line:
             return solid
         return shapely.transform(solid, lambda places: places @ matrix[:2, :2].T + matrix[:2, 2])
 
+    @property
+    def wall(self) -> WallObstacle | None:
+        """The same as an obstacle of a map, but for its corners; None where its ends are of another kind."""
+        if self.stretched is not None or self.cap == "round":
+            return None
+        points = self.points.copy()
+        if self.cap == "square":
+            for end, inner in ((0, 1), (-1, -2)):
+                along = points[end] - self.points[inner]
+                points[end] += along / max(np.hypot(*along), 1e-300) * self.width / 2
+        return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
+
 
 @dataclass(eq=False)
 class Shapes:
@@ -136,7 +153,7 @@ class Shapes:
     options: ReadOptions
     outlines: list[Outline] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
-    pillars: list[Polygon] = field(default_factory=list)
+    pillars: list[CircleObstacle] = field(default_factory=list)
     vertices: int = 0
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     labels: dict[str, str] = field(default_factory=dict)
@@ -165,7 +182,7 @@ class Shapes:
         if not self.wants(figure.labels):
             return
         if figure.kind == "point":
-            self.add_point(figure.rings[0][0], at=figure.at)
+            self.add_point(figure.rings[0][0], figure.labels, at=figure.at)
         elif figure.kind == "line":
             self.add_line(Line(figure.rings[0], self.thickness, figure.labels), at=figure.at)
         elif not self.add_outline(figure.rings, figure.labels, at=figure.at):
@@ -227,11 +244,11 @@ class Shapes:
             As `add_outline`.
         """
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
-        disc = CircleObstacle((float(centre[0]), float(centre[1])), radius).polygon
-        (ring,) = self._checked([np.asarray(disc.exterior.coords)[:-1]], at)
-        self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels)))
+        circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
+        (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
+        self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle))
 
-    def add_point(self, point: Array, *, at: str = "") -> None:
+    def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
         """Add a pillar, if points were asked for.
 
         Raises
@@ -243,7 +260,7 @@ class Shapes:
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
         else:
-            self.pillars.append(CircleObstacle((x, y), self.options.pillar).polygon)
+            self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
 
     def leave_heights(self, heights: Array) -> None:
         """Count third coordinates, (k,), which no map has; nan is none."""
@@ -342,6 +359,12 @@ def _many(count: int, thing: str) -> str:
     '2 empty geometries'
     """
     return f"{count} {thing[:-1]}ies" if count != 1 and thing.endswith("y") else counted(count, thing)
+
+
+def name_of(labels: Sequence[str]) -> str | None:
+    """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
+    names = (one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
+    return next(names, None) or None
 
 
 def folded(labels: Iterable[str]) -> set[str]:

@@ -20,6 +20,7 @@ from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
 from robocov_app.importers.corners import sharpened
 from robocov_app.importers.passing import rooms
+from robocov_app.importers.primitives import points_of, with_primitives
 from robocov_app.importers.report import ImportReport, square_metres
 from robocov_app.importers.simplifying import simplified
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from robocov.environment import Ring
     from robocov_app.importers.foreign import ForeignMap
+    from robocov_app.importers.primitives import Primitive
 
 DEFAULT_TOLERANCE = 0.02
 """By how much walls of vector formats may move, in metres."""
@@ -173,10 +175,16 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
     if outer is not None:
         solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
+    kept: list[Primitive] = []
+    if shapely.get_num_coordinates(free) <= _SOON:
+        kept, solid = with_primitives(
+            solid, foreign.primitives, boundary, simple.tolerance, digits, shaping.radius
+        )
+    obstacles = _obstacles(solid, digits, told)
     environment = Environment(
         name=one_line(foreign.name)[:100].strip() or "map",
         boundary=_ring(boundary.exterior, digits),
-        obstacles=_obstacles(solid, digits, told),
+        obstacles=(*obstacles, *kept),
         starts=_starts(free, shaping),
         description=foreign.description[:10_000],
     )
@@ -389,11 +397,13 @@ def _obstacles(solid: list[Polygon], digits: int, told: _Told) -> tuple[PolygonO
 
 
 def _vertices(environment: Environment) -> int:
-    return len(environment.boundary) + sum(
-        len(obstacle.vertices) + sum(map(len, obstacle.holes))
-        for obstacle in environment.obstacles
-        if isinstance(obstacle, PolygonObstacle)
-    )
+    count = len(environment.boundary)
+    for obstacle in environment.obstacles:
+        if isinstance(obstacle, PolygonObstacle):
+            count += len(obstacle.vertices) + sum(map(len, obstacle.holes))
+        else:
+            count += points_of(obstacle)
+    return count
 
 
 def _clearance(shaping: Shaping) -> float:
@@ -435,7 +445,7 @@ def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
 
 def _note_unreached(environment: Environment, radius: float, told: _Told) -> None:
     """Say how much of the free space robots do not reach from where most of it is, if that is soon known."""
-    if _vertices(environment) > _SOON:
+    if shapely.get_num_coordinates(environment.free) > _SOON:
         return
     places = sorted((place.area for place in rooms(environment.free, radius)), reverse=True)[1:]
     if places:
