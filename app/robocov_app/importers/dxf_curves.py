@@ -1,4 +1,4 @@
-"""Curves of DXF entities as points of the drawing's plane, seen from above."""
+"""Curves of DXF entities that their own `flattening` does not draw, or not as they are meant."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import BSpline
 
-from robocov_app.importers.curves import arc, sampled
+from robocov.extras import extra
+from robocov_app.importers.curves import MOST_POINTS, sampled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,94 +21,43 @@ _BULGE = 1e-9
 """Edges of polylines that are bent less are straight."""
 
 
-class Plane:
-    """The plane that an entity is drawn in: turned or seen from behind where its extrusion says so.
+def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
+    """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
+
+    A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
 
     Parameters
     ----------
-    axes : (2, 3)
-        What a step along x, y and z of the entity is in the drawing, seen from above.
+    points : (k, 2)
+    bulges : (k,)
+        The last one is not used.
+    tolerance : float
+
+    Raises
+    ------
+    ValueError
+        When there would be more than `MOST_POINTS`.
     """
-
-    def __init__(self, axes: Array) -> None:
-        self.axes = axes
-
-    @classmethod
-    def of(cls, entity: Any) -> Plane:
-        """Return the plane of an ezdxf entity."""
-        ocs = entity.ocs()
-        steps = [ocs.to_wcs(step) for step in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-        return cls(np.array([(step.x, step.y) for step in steps]).T)
-
-    @property
-    def is_level(self) -> bool:
-        """Whether circles in it are circles from above."""
-        across = self.axes[:, :2]
-        return bool(np.abs(across.T @ across - np.eye(2)).max() < 1e-9)
-
-    def above(self, points: Array) -> Array:
-        """Return (k, 3) points of the plane as (k, 2) of the drawing."""
-        return np.asarray(points @ self.axes.T)
-
-    def arc(self, centre: Any, radius: float, begin: float, sweep: float, tolerance: float) -> Array:
-        """Return points of an arc, angles in radians, with its first."""
-        middle = self.above(np.array([[centre[0], centre[1], centre[2]]]))[0]
-        u, v = self.axes[:, 0] * radius, self.axes[:, 1] * radius
-        return with_start(middle, u, v, begin, sweep, tolerance)
-
-    def polyline(self, points: Array, bulges: Array, height: float, tolerance: float) -> Array:
-        """Return points of a polyline; the bulge of each point is of the edge after it.
-
-        A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
-
-        Parameters
-        ----------
-        points : (k, 2)
-        bulges : (k,)
-            The last one is not used.
-        height : float
-            Third coordinate in the plane.
-        tolerance : float
-        """
-        drawn = [points[:1]]
-        for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
-            if abs(bulge) <= _BULGE or (a == b).all():
-                drawn.append(b[None])
-                continue
-            half = (b - a) / 2
-            # from the middle of the chord to the centre, in half chords: the cotangent of half the angle
-            across = (1.0 / bulge - bulge) / 2
-            centre = a + half + across * np.array([-half[1], half[0]])
-            u = a - centre
-            curve = arc(centre, u, np.array([-u[1], u[0]]), 0.0, 4.0 * math.atan(bulge), tolerance)
-            curve[-1] = b
-            drawn.append(curve)
-        flat = np.concatenate(drawn)
-        return self.above(np.column_stack([flat, np.full(len(flat), height)]))
-
-
-def with_start(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance: float) -> Array:
-    """Return points of an elliptic arc, with its first; where it is whole, that one is the last again."""
-    first = centre + u * math.cos(begin) + v * math.sin(begin)
-    points = np.concatenate([first[None], arc(centre, u, v, begin, sweep, tolerance)])
-    if abs(sweep) >= math.tau:
-        points[-1] = points[0]
-    return points
-
-
-def ellipse(entity: Any, tolerance: float) -> Array:
-    """Return points of an ezdxf ellipse or elliptic arc."""
-    begin, end = float(entity.dxf.start_param), float(entity.dxf.end_param)
-    sweep = (end - begin) % math.tau
-    if sweep < 1e-9 or math.tau - sweep < 1e-9:
-        sweep = math.tau
-    centre, u, v = flat([entity.dxf.center, entity.dxf.major_axis, entity.minor_axis])
-    return with_start(centre, u, v, begin, sweep, tolerance)
+    arcs = extra("ezdxf.math", "dxf")
+    drawn = [points[:1]]
+    left = float(MOST_POINTS)
+    for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
+        if abs(bulge) > _BULGE and (a != b).any():
+            centre, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
+            left -= 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
+            if not left > 0.0:
+                raise ValueError(f"more than {MOST_POINTS} points, but fewer were wanted")
+            arc = arcs.ConstructionArc(centre, radius, *np.degrees([begin, end]))
+            curve = flat(list(arc.flattening(min(tolerance, radius / 8))))
+            drawn.append((curve if bulge > 0.0 else curve[::-1])[1:-1])
+        drawn.append(b[None])
+    return np.concatenate(drawn)
 
 
 def spline(entity: Any, tolerance: float) -> Array:
     """Return points of an ezdxf spline: a rational B-spline, between the knots where it is defined.
 
+    Its own `flattening` goes on to where it is not, which spoils closed ones (ezdxf 1.4).
     L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2.
 
     Raises

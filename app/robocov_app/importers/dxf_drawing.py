@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from robocov.errors import MapError, RobocovError, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.curves import TOLERANCE
-from robocov_app.importers.dxf_curves import Plane, ellipse, flat, spline
+from robocov_app.importers.dxf_curves import flat, polyline, spline
 from robocov_app.importers.limits import MAX_DEPTH
 from robocov_app.importers.shapes import Line, Shapes
 
@@ -25,6 +24,9 @@ MOST_ENTITIES = 200_000
 
 _FRAME = 16
 """Flag of a vertex that only shapes the spline of an old polyline."""
+
+_LEVEL = 1.0 - 1e-9
+"""Upward part of the direction, of length 1, that a circle is seen from as one."""
 
 _CLOSED = 1e-9
 """Curves whose ends are nearer, in parts of their coordinates, are closed."""
@@ -149,7 +151,7 @@ class DxfDrawing:
             self._arc(kind, entity, labels, at)
         elif kind == "ELLIPSE":
             self._require_near(flat([entity.dxf.center, entity.dxf.major_axis]))
-            self._curve(ellipse(entity, self._tolerance), labels, at)
+            self._curve(flat(list(entity.flattening(self._tolerance))), labels, at)
         elif kind == "SPLINE":
             self._spline(entity, labels, at)
         elif kind in ("LWPOLYLINE", "POLYLINE"):
@@ -201,18 +203,14 @@ class DxfDrawing:
         self.shapes.add_line(Line(points, drawn, labels), at=at)
 
     def _arc(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        plane, centre, radius = Plane.of(entity), entity.dxf.center, abs(float(entity.dxf.radius))
+        centre, radius = entity.dxf.center, abs(float(entity.dxf.radius))
         self._require_near(np.array([[centre[0], centre[1]], [radius, radius]]))
-        begin, sweep = 0.0, math.tau
-        if kind == "ARC":
-            begin = math.radians(entity.dxf.start_angle)
-            sweep = (math.radians(entity.dxf.end_angle) - begin) % math.tau or math.tau
-        elif plane.is_level and radius > 0.0:
+        if kind == "CIRCLE" and radius > 0.0 and abs(entity.ocs().uz.z) > _LEVEL:
             self.curved = True
             (middle,) = self._metres([entity.ocs().to_wcs(centre)])
             self.shapes.add_circle(middle, radius * self.scale, labels, at=at)
             return
-        self._curve(plane.arc(centre, radius, begin, sweep, self._tolerance), labels, at)
+        self._curve(flat(list(entity.flattening(min(self._tolerance, radius / 8)))), labels, at)
 
     def _spline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
         self._require_near(flat([*entity.control_points, *entity.fit_points]))
@@ -220,7 +218,7 @@ class DxfDrawing:
 
     def _polyline(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
         """Add a polyline with its bulges: columns are x, y, bulge and the widths at both ends of an edge."""
-        plane, height = Plane.of(entity), 0.0
+        plane, height = entity.ocs(), 0.0
         if kind == "LWPOLYLINE":
             rows = np.array(entity.get_points("xybse"), dtype=float).reshape(-1, 5)
             closed, width = bool(entity.closed), float(entity.dxf.get("const_width", 0.0))
@@ -228,7 +226,7 @@ class DxfDrawing:
         elif entity.is_2d_polyline or entity.is_3d_polyline:
             rows = _rows(entity)
             closed, width = bool(entity.is_closed), float(entity.dxf.get("default_start_width", 0.0))
-            plane = plane if entity.is_2d_polyline else Plane(np.eye(2, 3))
+            plane = plane if entity.is_2d_polyline else None
         else:
             self.shapes.leave_out("mesh")
             return
@@ -238,8 +236,10 @@ class DxfDrawing:
             self.shapes.leave_out("line", "without a length")
             return
         self._require_near(rows[:, :2])
-        points = plane.polyline(rows[:, :2], rows[:, 2], height, self._tolerance)
+        points = polyline(rows[:, :2], rows[:, 2], self._tolerance)
         self.curved |= len(points) > len(rows)
+        if plane is not None and plane.transform:
+            points = flat(list(plane.points_to_wcs([(x, y, height) for x, y in points.tolist()])))
         self._require_near(points)
         width = max(width, float(rows[:, 3:].max()))
         self._line(points * self.scale, labels, at, width)

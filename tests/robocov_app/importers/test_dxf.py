@@ -22,7 +22,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov_app.importers import IMPORTERS, ForeignMap, ReadOptions, detect
 from robocov_app.importers.dxf import UNITS
-from robocov_app.importers.dxf_curves import Plane
+from robocov_app.importers.dxf_curves import polyline
 from robocov_app.importers.dxf_drawing import MOST_ENTITIES
 
 METRES = 6
@@ -140,8 +140,7 @@ def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
 def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
     a: tuple[int, int], b: tuple[int, int], bulge: float
 ) -> None:
-    plane = Plane(np.eye(2, 3))
-    points = plane.polyline(np.array([a, b], dtype=float), np.array([bulge, 0.0]), 0.0, 1e-3)
+    points = polyline(np.array([a, b], dtype=float), np.array([bulge, 0.0]), 1e-3)
     assert points[0].tolist() == list(a)
     assert points[-1].tolist() == list(b)
     chord = math.dist(a, b)
@@ -358,6 +357,10 @@ def many(document: Any, space: Any) -> None:
         ),
         (
             lambda d, m: m.add_lwpolyline([(0, 0, 1e9), (9, 0, 0)], format="xyb"),
+            "(1 damaged shape (LWPOLYLINE",
+        ),
+        (
+            lambda d, m: m.add_lwpolyline([(k % 2, 0, 1e6) for k in range(3000)], format="xyb"),
             "(1 damaged shape (LWPOLYLINE",
         ),
         (lambda d, m: None, "no closed outline and no line, but a drawing"),
