@@ -1,10 +1,13 @@
-"""Pictures as grids of brightness: PNG of every kind, PGM plain and raw, of 1 to 16 bits.
+"""Pictures as grids of brightness: PNG, JPEG, BMP, TIFF, PBM, PGM and PPM, of 1 to 16 bits a sample.
 
-The size in the header is looked at before anything is unpacked.
+The size in the header is looked at before anything is unpacked. PGM and PPM are read here: Pillow rounds what
+has another largest value than 255 to it, which the thresholds of ROS notice, and takes half a second for a
+million of pixels.
 """
 
 from __future__ import annotations
 
+import io
 import re
 import warnings
 import zlib
@@ -38,6 +41,20 @@ _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
 
 _DIGITS = re.compile(rb"\d+")
 
+_OTHERS = {
+    "JPEG": re.compile(rb"\xff\xd8\xff"),
+    "BMP": re.compile(rb"BM.{12}[\x0c\x28\x34\x38\x40\x6c\x7c]\0\0\0", re.DOTALL),
+    "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
+    "PPM": re.compile(rb"P[14][\s#]"),
+}
+"""How other formats begin, by the names that Pillow gives them."""
+
+_ORIENTATION, _BITS, _PHOTOMETRIC = 274, 258, 262
+"""Tags of EXIF and TIFF."""
+
+_MOST_OF_JPEG = 512
+"""Pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey."""
+
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 """Samples a pixel, by the colour type of a PNG."""
 
@@ -59,17 +76,22 @@ class Brightness:
         From 0, transparent, to 255, opaque; None where the picture has no such thing.
     texts : dict of str
         What a PNG says of itself.
+    lossy : bool
+        Whether pixels may have got another brightness when it was saved, as in a JPEG.
     """
 
-    level: NDArray[np.uint8] | NDArray[np.uint16]
+    level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
     full: int
     alpha: NDArray[np.uint8] | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
+    lossy: bool = False
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins with `head` is a PNG or a PGM."""
-    return head.startswith(PNG) or re.match(rb"P[25](?:[ \t\r\n]|#)", head) is not None
+    """Return whether a file that begins with `head` is a picture of a kind that can be read."""
+    return head.startswith(PNG) or any(
+        begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_OTHERS.values())
+    )
 
 
 def read_picture(path: Path, where: str) -> Brightness:
@@ -84,19 +106,23 @@ def read_picture(path: Path, where: str) -> Brightness:
     Raises
     ------
     MapError
-        When there is no such file, it is neither PNG nor PGM, broken, cut off, or has more than
+        When there is no such file, it is no picture that can be read, broken, cut off, or has more than
         `limits.MAX_CELLS` pixels.
     """
     data = limits.content(path)
     if data.startswith(PNG):
         return _png(data, where)
-    if data[:2] in (b"P2", b"P5"):
-        return _pgm(data, where)
-    raise MapError(f"{where}: begins with {shown(data[:8])}, but a PNG or PGM (P2, P5) was wanted")
+    if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
+        return _netpbm(data, where)
+    for name, begin in _OTHERS.items():
+        if begin.match(data):
+            return _decoded(data, name, where)
+    wanted = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
+    raise MapError(f"{where}: begins with {shown(data[:8])}, but {wanted} was wanted")
 
 
-def _pgm(data: bytes, where: str) -> Brightness:
-    """Return a PGM; see https://netpbm.sourceforge.net/doc/pgm.html."""
+def _netpbm(data: bytes, where: str) -> Brightness:
+    """Return a PGM or PPM; see https://netpbm.sourceforge.net/doc/pgm.html."""
     numbers: list[int] = []
     at = 2
     for name in ("width", "height", "largest value"):
@@ -111,23 +137,25 @@ def _pgm(data: bytes, where: str) -> Brightness:
     limits.require_cells(width, height, where)
     if not 1 <= most <= 65535:
         raise MapError(f"{where}: largest value: {most}, but a number from 1 to 65535 was wanted")
-    count = width * height
+    colours = 3 if data[1:2] in b"36" else 1
+    count = width * height * colours
     level: Any
-    if data.startswith(b"P5"):
+    if data[1:2] in b"56":
         raw = np.dtype(np.uint8 if most < 256 else ">u2")
         # one blank ends the header, or a line end of two; what comes after the picture is not looked at
         at += 2 if data[at : at + 2] == b"\r\n" and len(data) - at - 2 >= count * raw.itemsize else 1
         if len(data) - at < count * raw.itemsize:
             have = max(0, len(data) - at) // raw.itemsize
-            raise MapError(f"{where}: cut off after {have} of {count} pixels")
+            raise MapError(f"{where}: cut off after {have // colours} of {count // colours} pixels")
         level = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
     else:
         level = _plain(data[at:], count, where)
-    level = level.reshape(height, width)
     highest = int(level.max())
     if highest > most:
         raise MapError(f"{where}: a pixel of {highest}, but at most {most}, the largest value, was wanted")
-    return Brightness(level, most)
+    if colours == 1:
+        return Brightness(level.reshape(height, width), most)
+    return Brightness(level.reshape(height, width, 3).sum(axis=2, dtype=np.uint32), 3 * most)
 
 
 def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
@@ -168,17 +196,7 @@ def _png(data: bytes, where: str) -> Brightness:
     width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
     limits.require_cells(width, height, where)
     _require_whole(data, width, height, where)
-    import io
-
-    import PIL.Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # our own limit is the lower one
-            with PIL.Image.open(io.BytesIO(data), formats=("PNG",)) as image:
-                return _converted(image)
-    except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
-        raise MapError(f"{where}: broken, but a whole PNG was wanted: {one_line(error)[:100]}") from None
+    return _decoded(data, "PNG", where)
 
 
 def _require_whole(data: bytes, width: int, height: int, where: str) -> None:
@@ -209,13 +227,44 @@ def _require_whole(data: bytes, width: int, height: int, where: str) -> None:
         raise MapError(f"{where}: {what}, but a whole PNG of {width} x {height} pixels was wanted")
 
 
+def _decoded(data: bytes, name: str, where: str) -> Brightness:
+    """Return a picture that Pillow reads, of the format that it calls `name`."""
+    import PIL.Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # our own limit is the lower one
+            with PIL.Image.open(io.BytesIO(data), formats=(name,)) as image:
+                limits.require_cells(*image.size, where)
+                if name == "JPEG" and image.width * image.height > _MOST_OF_JPEG * len(data):
+                    raise ValueError("cut off")
+                return _converted(image)
+    except MapError:
+        raise
+    except PIL.Image.DecompressionBombError:
+        most = limits.MAX_CELLS // 1_000_000
+        raise MapError(f"{where}: too many pixels, but at most {most} million were wanted") from None
+    except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
+        reason = one_line(error).partition(" <")[0][:100]
+        raise MapError(f"{where}: broken, but a whole {name} was wanted: {reason}") from None
+
+
 def _converted(image: Image) -> Brightness:
-    """Return a picture without its colours; only a strip of it is copied at a time."""
+    """Return a picture without its colours, turned as it says; only a strip of it is copied at a time."""
+    import PIL.ImageOps
+
+    lossy, tags = image.format == "JPEG", getattr(image, "tag_v2", {})
     image.load()
+    if image.getexif().get(_ORIENTATION, 1) != 1:
+        PIL.ImageOps.exif_transpose(image, in_place=True)
     texts = {str(key): value for key, value in image.info.items() if isinstance(value, str)}
     transparent = "transparency" in image.info
+    if image.mode == "F" or (image.mode == "I" and tags):
+        raise ValueError("samples of 32 bits or with a sign, but up to 16 bits without were wanted")
     if image.mode.startswith("I") and not transparent:
-        return Brightness(np.asarray(image).astype(np.uint16), 65535, None, texts)
+        full = (1 << tags[_BITS][0]) - 1 if tags else 65535
+        deep = np.asarray(image).astype(np.uint16)
+        return Brightness(full - deep if tags.get(_PHOTOMETRIC) == 0 else deep, full, None, texts)
     has_alpha = transparent or image.mode in ("LA", "PA", "RGBA", "La", "RGBa")
     grey = image.mode in ("1", "L", "LA") and not transparent
     mode = ("LA" if has_alpha else "L") if grey else ("RGBA" if has_alpha else "RGB")
@@ -230,4 +279,4 @@ def _converted(image: Image) -> Brightness:
         level[rows] = strip[:, :, :colours].sum(axis=2, dtype=level.dtype)
         if alpha is not None:
             alpha[rows] = strip[:, :, colours]
-    return Brightness(level, 255 * colours, alpha, texts)
+    return Brightness(level, 255 * colours, alpha, texts, lossy)

@@ -28,6 +28,9 @@ CHUNK = "robocov"
 TITLE = "Title"
 """Key of the text chunk with the name of what is shown."""
 
+_NOISE = 1.5
+"""Single cells beside dark ones come of how a JPEG is saved."""
+
 _OPAQUE = 128
 """Less opaque pixels count as transparent, of 255."""
 
@@ -61,6 +64,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         origin=origin,
         unknown=options.unknown or "obstacle",
         called="transparent",
+        noise=_NOISE if picture.lossy else 0.0,
         where=where,
     )
 
@@ -79,8 +83,8 @@ def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
 
 IMPORTER = Importer(
     name="picture",
-    title="picture: PNG or PGM, dark is an obstacle",
-    suffixes=(".png", ".pgm"),
+    title="picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
+    suffixes=(".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
     sniff=_sniff,
     read=_read,
     options=frozenset({"cell", "unknown", "threshold", "invert"}),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import struct
 import subprocess
 import sys
 import zlib
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from raster_files import PLAN, chunk, drawn, pgm, raw_png
 
 MEMORY = 200 * 2**20
@@ -63,6 +66,21 @@ def text_bomb() -> bytes:
     return good[:33] + chunk(b"zTXt", b"Comment\0\0" + packed) + good[33:]
 
 
+def large(kind: str, side: int, keep: int | None = None, **options: object) -> bytes:
+    """Return the first bytes of a white picture, with as many pixels as it says or a part of them."""
+    stream = io.BytesIO()
+    Image.new("1" if options.get("compression") == "group4" else "L", (side, side), 255).save(
+        stream, kind, **options
+    )
+    return stream.getvalue()[:keep]
+
+
+def sized(data: bytes, old: int, new: int) -> bytes:
+    """Return a picture that says that it has another size."""
+    form = ">H" if data.startswith(b"\xff") else "<H"
+    return data.replace(struct.pack(form, old), struct.pack(form, new))
+
+
 def deep_yaml() -> bytes:
     return b"image: a.pgm\nresolution: 1\norigin: " + b"[" * 30_000
 
@@ -88,6 +106,21 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     "a grid of 10^9": ("a.map", lambda: GRID % (31623, 31623), "", TOO_MANY),
     "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 letters"),
     "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
+    "10^9 of a JPEG": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
+    "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "whole JPEG"),
+    "a BMP cut off": ("a.bmp", lambda: sized(large("BMP", 997), 997, 8000), "cell", "whole BMP"),
+    "a TIFF cut off": (
+        "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "whole TIFF"
+    ),
+    "10^9 of a TIFF": ("a.tif", lambda: sized(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
+    "a TIFF of nothing": (
+        "a.tif", lambda: sized(large("TIFF", 997, compression="tiff_lzw"), 997, 8000), "cell", "whole TIFF"
+    ),
+    "a wide TIFF": (
+        "a.tif", lambda: sized(large("TIFF", 997, compression="group4"), 997, 8000), "cell", "whole TIFF"
+    ),
+    "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "cut off after 333"),
+    "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "whole PPM"),
     "laughs": ("a.yaml", laughs, "", "an anchor or alias"),
     "depth": ("a.yaml", deep_yaml, "", "nested too deeply"),
     "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "larger than"),

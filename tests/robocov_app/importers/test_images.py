@@ -153,6 +153,103 @@ def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
     np.testing.assert_array_equal(picture.level, tall.sum(axis=2))
 
 
+COLOURS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
+
+
+def saved(image: Image.Image, kind: str, **options: object) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, kind, **options)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["BMP", "TIFF", "PPM", "PNG"])
+@pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA", "I;16", "CMYK"])
+def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: str) -> None:
+    image = Image.fromarray(COLOURS.astype(np.uint8)).convert("L" if mode == "I;16" else mode)
+    if mode == "I;16":
+        image = Image.fromarray(np.asarray(image).astype(np.uint16) * 257)
+    if (kind, mode) in {("BMP", "I;16"), ("BMP", "CMYK"), ("PPM", "CMYK"), ("PNG", "CMYK"), ("PPM", "P")}:
+        pytest.skip("is never saved so")
+    data = saved(image, kind)
+    assert is_picture(data)
+    picture = read(tmp_path, data)
+    plain = image.convert("I") if mode == "I;16" else image.convert("RGB")
+    wanted = np.asarray(plain) / 65535 if mode == "I;16" else np.asarray(plain).sum(axis=2) / 765
+    np.testing.assert_allclose(shade(picture), wanted, atol=1e-9)
+    assert (picture.alpha is not None) == (mode == "RGBA" and kind in ("TIFF", "PNG"))
+    assert not picture.lossy
+
+
+@pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
+def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
+    image = Image.fromarray(np.array(GREY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
+    picture = read(tmp_path, saved(image, "TIFF", compression=compression))
+    np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
+
+
+@pytest.mark.parametrize("kind", [">u2", "<u2"])
+@pytest.mark.parametrize("white_is_zero", [False, True])
+def test_tiff_of_16_bits(tmp_path: Path, kind: str, white_is_zero: bool) -> None:
+    order = kind[0]
+    pixels = np.array([[0, 65535], [1000, 2000]]).astype(kind).tobytes()
+    tags = [
+        (256, 2),
+        (257, 2),
+        (258, 16),
+        (259, 1),
+        (262, int(not white_is_zero)),
+        (273, 8),
+        (278, 2),
+        (279, 8),
+    ]
+    entries = b"".join(struct.pack(f"{order}HHII", tag, 4, 1, value) for tag, value in tags)
+    head = (b"MM" if order == ">" else b"II") + struct.pack(f"{order}HI", 42, 16)
+    data = head + pixels + struct.pack(f"{order}H", len(tags)) + entries + b"\0\0\0\0"
+    if order == ">" and white_is_zero:  # which Pillow does not know
+        with pytest.raises(MapError, match="whole TIFF"):
+            read(tmp_path, data)
+        return
+    wanted = np.array([[0, 65535], [1000, 2000]]) / 65535
+    np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - wanted if white_is_zero else wanted)
+
+
+def test_samples_of_32_bits_are_refused(tmp_path: Path) -> None:
+    for image in (Image.new("F", (3, 3)), Image.new("I", (3, 3))):
+        with pytest.raises(MapError, match=r"whole TIFF was wanted: samples of 32 bits or with a sign"):
+            read(tmp_path, saved(image, "TIFF"))
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "TIFF", "PNG"])
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int) -> None:
+    image = Image.new("L", (16, 8), 255)
+    image.paste(0, (0, 0, 8, 8))
+    upright = {1: image, 2: image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)}
+    upright |= {3: image.rotate(180), 4: image.transpose(Image.Transpose.FLIP_TOP_BOTTOM)}
+    upright |= {5: image.transpose(Image.Transpose.TRANSPOSE), 6: image.rotate(-90, expand=True)}
+    upright |= {7: image.transpose(Image.Transpose.TRANSVERSE), 8: image.rotate(90, expand=True)}
+    exif = Image.Exif()
+    exif[274] = turn
+    picture = read(tmp_path, saved(image, kind, exif=exif))
+    np.testing.assert_array_equal(picture.level, np.asarray(upright[turn]))
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "CMYK"])
+def test_jpeg(tmp_path: Path, mode: str) -> None:
+    image = Image.new("RGB", (32, 16), (250, 240, 230))
+    image.paste((20, 0, 10), (8, 0, 24, 16))
+    picture = read(tmp_path, saved(image.convert(mode), "JPEG", quality=95))
+    assert picture.lossy and picture.level.shape == (16, 32)
+    np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
+
+
+def test_ppm_of_16_bits_and_in_words(tmp_path: Path) -> None:
+    deep = (COLOURS * 257).astype(">u2")
+    words = " ".join(map(str, COLOURS.ravel().tolist()))
+    for data in (b"P6 2 3 65535\n" + deep.tobytes(), f"P3 2 3 255 {words}".encode()):
+        np.testing.assert_array_equal(shade(read(tmp_path, data)), COLOURS.sum(axis=2) / 765)
+
+
 WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), dtype=np.uint8)))
 
 
@@ -160,8 +257,9 @@ WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), 
     ("data", "wanted"),
     [
         (b"", "begins with b''"),
-        (b"GIF89a", "begins with b'GIF89a', but a PNG or PGM (P2, P5) was wanted"),
-        (b"P6 1 1 255 abc", "but a PNG or PGM"),
+        (b"GIF89a", "begins with b'GIF89a', but a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM was wanted"),
+        (b"P6 1 1 255 ab", "cut off after 0 of 1 pixels"),
+        (b"P6 1 1 9 abc", "a pixel of 99, but at most 9"),
         (b"P5", "width: b'', but a whole number"),
         (b"P5 -3 4 255\n", "width: b'-3 4 255"),
         (b"P5 3.5 4 255\n", "height: b'.5 4"),

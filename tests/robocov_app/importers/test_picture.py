@@ -51,6 +51,18 @@ def test_a_pgm_is_a_picture_too(tmp_path: Path) -> None:
     assert read(path, cell=0.5).area == 6 / 4
 
 
+def test_single_cells_of_a_jpeg_are_noise(tmp_path: Path) -> None:
+    pixels = np.full((64, 64), 255, dtype=np.uint8)
+    pixels[20:23, 20:23] = pixels[40, 40] = 0
+    Image.fromarray(pixels).save(tmp_path / "plan.jpg", quality=100)
+    Image.fromarray(pixels).save(tmp_path / "plan.bmp")
+    lossy, report, _ = import_map(tmp_path / "plan.jpg", options=ReadOptions(cell=0.1))
+    assert len(lossy.obstacles) == 1
+    assert report.dropped == ("1 obstacle smaller than 0.015 m², 0.01 m² (--specks 0 keeps them)",)
+    exact, _, _ = import_map(tmp_path / "plan.bmp", options=ReadOptions(cell=0.1))
+    assert len(exact.obstacles) == 2
+
+
 def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
     pixels = np.full((4, 4, 4), 255, dtype=np.uint8)
     pixels[:, 2, 3] = 127
