@@ -35,7 +35,8 @@ class ReadOptions:
     invert : bool
         In a picture light is an obstacle, not dark.
     trees, water : str
-        What such cells of a MovingAI grid are: ``obstacle`` (the default) or ``free``.
+        What such cells of a MovingAI grid are, and water of OpenStreetMap: ``obstacle`` (the default) or
+        ``free``.
     anywhere : bool
         Whether a file may name another one outside of its own folder.
     scale : float, m

@@ -52,12 +52,18 @@ class Figure:
     labels : tuple of str
     at : str
         Its place in the file, for messages.
+    rule : str
+        What the rings of a polygon enclose; see `robocov_app.importers.fills.enclosed`.
+    width : float or None, m
+        Of a line, where the file says it.
     """
 
     kind: Kind
     rings: tuple[Array, ...]
     labels: tuple[str, ...] = ()
     at: str = ""
+    rule: Rule = "holes"
+    width: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +190,9 @@ class Shapes:
         if figure.kind == "point":
             self.add_point(figure.rings[0][0], figure.labels, at=figure.at)
         elif figure.kind == "line":
-            self.add_line(Line(figure.rings[0], self.thickness, figure.labels), at=figure.at)
-        elif not self.add_outline(figure.rings, figure.labels, at=figure.at):
+            width = figure.width if figure.width and self.options.thickness is None else self.thickness
+            self.add_line(Line(figure.rings[0], width, figure.labels), at=figure.at)
+        elif not self.add_outline(figure.rings, figure.labels, rule=figure.rule, at=figure.at):
             self.leave_out("outline", "without an area")
 
     def add_outline(
