@@ -28,6 +28,7 @@ from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.report import ImportReport
 from robocov_app.importers.shaping import Shaping, shaped
+from robocov_app.importers.unreadable import described, named_kind
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
@@ -83,17 +84,23 @@ def detect(path: str | Path) -> Importer:
     Raises
     ------
     MapError
-        When the file cannot be read, or is of no known format.
+        When the file cannot be read, or is of no known format; the message names what it is where it can,
+        and the way to a format that is known.
     """
     path = Path(path)
     head = limits.head(path)
+    kind = named_kind(path, head)
+    if kind is not None:
+        raise MapError(f"{one_line(path)}: {one_line(kind)}")
     for candidate in IMPORTERS.values():
         if candidate.sniff(path, head):
             return candidate
     named = [candidate for candidate in IMPORTERS.values() if path.suffix.lower() in candidate.suffixes]
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
-    raise MapError(f"{one_line(path)}: unknown format, but one of {', '.join(IMPORTERS)} was wanted")
+    raise MapError(
+        f"{one_line(path)}: unknown format ({described(head)}), but one of {', '.join(IMPORTERS)} was wanted"
+    )
 
 
 def import_map(

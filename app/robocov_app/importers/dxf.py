@@ -45,12 +45,11 @@ UNITS = {
 _BINARY = b"AutoCAD Binary DXF"
 _TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
 _POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
-_DWG = re.compile(rb"AC10\d\d|AC1\.|AC2\.")
 
 
 def is_dxf(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like DXF, or DWG, which its reader explains."""
-    return head.startswith(_BINARY) or bool(_TEXT.match(head) or _DWG.match(head))
+    """Return whether a file that begins with `head` looks like DXF."""
+    return head.startswith(_BINARY) or _TEXT.match(head) is not None
 
 
 def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
@@ -104,8 +103,6 @@ def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
 def _check(path: Path, where: str) -> None:
     """Refuse what would take long, before ezdxf sees it."""
     content = limits.content(path, limits.MAX_TEXT_BYTES)
-    if _DWG.match(content):
-        raise MapError(f"{where}: a DWG, but a DXF was wanted: save it as one")
     if not content.startswith(_BINARY):
         if not _TEXT.match(content):
             raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")

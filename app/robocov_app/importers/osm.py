@@ -240,5 +240,5 @@ IMPORTER = Importer(
     suffixes=(".osm",),
     sniff=is_osm,
     read=read_osm,
-    options=frozenset({"water", "thickness", "pillar", "boundary", "around", "only", "skip"}),
+    options=frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"}),
 )

@@ -54,7 +54,8 @@ def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
 def test_what_is_not_known(tmp_path: Path) -> None:
     path = tmp_path / "plan.xyz"
     path.write_text("nothing")
-    with pytest.raises(MapError, match=r"plan\.xyz: unknown format, but one of .*ros.* was wanted"):
+    wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), but one of .*ros.* was wanted"
+    with pytest.raises(MapError, match=wanted):
         detect(path)
     with pytest.raises(MapError, match="no such file"):
         detect(tmp_path / "none.png")
