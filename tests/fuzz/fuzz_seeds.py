@@ -89,6 +89,63 @@ _DXF = [
     *(0, "LINE", 8, "walls", 10, 5.0, 20, 0.0, 11, 5.0, 21, 2.5),
     *(0, "ARC", 8, "walls", 10, 7.0, 20, 4.0, 40, 1.0, 50, 30.0, 51, 200.0),
     *(0, "CIRCLE", 8, "pillars", 10, 3.0, 20, 3.0, 40, 0.5),
+    *(0, "LWPOLYLINE", 100, "AcDbEntity", 8, "walls", 100, "AcDbPolyline", 90, 2, 70, 0, 43, 0.2),
+    *(10, 1.0, 20, 5.0, 42, 0.5, 10, 2.0, 20, 5.0),
+    *(
+        0,
+        "ELLIPSE",
+        100,
+        "AcDbEntity",
+        8,
+        "pillars",
+        100,
+        "AcDbEllipse",
+        10,
+        6.0,
+        20,
+        1.0,
+        11,
+        0.5,
+        21,
+        0.2,
+        40,
+        0.5,
+        41,
+        0.0,
+        42,
+        6.28,
+    ),
+    *(
+        0,
+        "SPLINE",
+        100,
+        "AcDbEntity",
+        8,
+        "walls",
+        100,
+        "AcDbSpline",
+        70,
+        8,
+        71,
+        2,
+        72,
+        6,
+        73,
+        3,
+        40,
+        0,
+        40,
+        0,
+        40,
+        0,
+        40,
+        1,
+        40,
+        1,
+        40,
+        1,
+    ),
+    *(10, 1.0, 20, 1.0, 10, 2.0, 20, 2.0, 10, 3.0, 20, 1.0),
     *(0, "INSERT", 8, "chairs", 2, "CHAIR", 10, 8.0, 20, 1.5, 41, 1.0, 42, 1.0, 50, 45.0),
     *(0, "ENDSEC", 0, "EOF"),
 ]
@@ -165,6 +222,32 @@ def _rgba() -> bytes:
     return file.getvalue()
 
 
+def _saved(kind: str, **options: Any) -> bytes:
+    from PIL import Image
+
+    file = io.BytesIO()
+    picture = Image.frombytes("L", (len(GREY[0]), len(GREY)), b"".join(map(bytes, GREY)))
+    picture.convert("1" if kind == "PPM" else "RGB").save(file, kind, **options)
+    return file.getvalue()
+
+
+OSM = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<osm version="0.6">
+ <bounds minlat="50.7" minlon="6.1" maxlat="50.7003" maxlon="6.1004"/>
+ <node id="1" lat="50.7001" lon="6.1001"/><node id="2" lat="50.7001" lon="6.1002"/>
+ <node id="3" lat="50.7002" lon="6.1002"/><node id="4" lat="50.7002" lon="6.1001"/>
+ <node id="5" lat="50.70005" lon="6.1003"><tag k="natural" v="tree"/></node>
+ <way id="1"><nd ref="1"/><nd ref="2"/><nd ref="3"/></way>
+ <way id="2"><nd ref="3"/><nd ref="4"/><nd ref="1"/></way>
+ <way id="3"><nd ref="3"/><nd ref="5"/><tag k="barrier" v="wall"/><tag k="width" v="0.5 m"/></way>
+ <way id="4"><nd ref="4"/><nd ref="5"/><nd ref="3"/><nd ref="4"/><tag k="natural" v="water"/></way>
+ <relation id="1"><member type="way" ref="1" role="outer"/><member type="way" ref="2" role="outer"/>
+  <tag k="type" v="multipolygon"/><tag k="building" v="yes"/></relation>
+</osm>
+"""
+
+
 def _feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "properties": properties, "geometry": geometry}
@@ -205,6 +288,13 @@ SEEDS: dict[str, list[Case]] = {
     "picture": [
         *_one("plan.png", png(GREY), png([[257 * value for value in row] for row in GREY], 16), _rgba()),
         *_one("plan.pgm", pgm(GREY), pgm(GREY, text=True)),
+        *_one("plan.jpg", _saved("JPEG"), _saved("JPEG", progressive=True)),
+        *_one("plan.bmp", _saved("BMP"), _saved("PPM")),
+        *_one(
+            "plan.tif",
+            _saved("TIFF"),
+            *(_saved("TIFF", compression=f"tiff_{way}") for way in ("lzw", "deflate")),
+        ),
     ],
     "ros": [
         Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": pgm(GREY)}),
@@ -231,6 +321,7 @@ SEEDS: dict[str, list[Case]] = {
     "wkt": _one("plan.wkt", *WKT),
     "geojson": _one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES)),
     "svg": _one("plan.svg", SVG),
+    "osm": _one("plan.osm", OSM),
     "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
 }
 """The seeds of each target."""
@@ -383,6 +474,29 @@ TOKENS: dict[str, list[str]] = {
             "display:none",
             "url(#a)",
         ),
+    ],
+    "osm": [
+        *(
+            "<node",
+            "<way",
+            "<relation",
+            "<nd ref='1'/>",
+            "<member",
+            "type='way'",
+            "<tag k='building' v='yes'/>",
+        ),
+        *(
+            "action='delete'",
+            "lat='90'",
+            "lon='180'",
+            "nan",
+            "<bounds",
+            "<!DOCTYPE a>",
+            "&amp;",
+            "/>",
+            "</way>",
+        ),
+        *("<tag k='area' v='yes'/>", "multipolygon", "ref='-1'", "id='1'", "layer", "-1", "<osm>", "</osm>"),
     ],
     "dxf": [
         *(

@@ -385,8 +385,11 @@ def opened(path: Path, drafts: Path | None) -> Paper | Importer:
         if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
             from robocov_app.importers import detect
 
-            with suppress(MapError):
+            try:
                 return detect(path)
+            except MapError:  # which names it for what it is
+                if path.suffix.lower() != SUFFIX and not _is_map(path):
+                    raise
         raise error from None
 
 

@@ -14,7 +14,7 @@ from driven_editor import Hands, opened_editor, sheet, touched
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.errors import InputError
+from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.demo.settings import FOLDER
@@ -362,6 +362,13 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
         assert window.desk.paper.path is None and window.desk.paper.unsaved
         assert window.desk.sketch.environment().free_area == 12.0
         window.documents.leaving = True
+
+
+def test_a_file_of_no_map_is_named_for_what_it_is(places: Path) -> None:
+    (places / "plan.shp").write_bytes(b"\0\0'\x0a" + bytes(96))
+    wanted = pytest.raises(MapError, match="a shapefile, which cannot be imported: ogr2ogr")
+    with wanted, opening(places, places / "plan.shp").window():
+        pass
 
 
 def test_the_polygon_that_was_drawn_is_in_the_file(hands: Hands, tmp_path: Path) -> None:
