@@ -28,8 +28,10 @@ class Arguments:
 
       ros        YAML of ROS map_server with its PGM or PNG: --unknown --threshold --anywhere
       movingai   .map of Moving AI's benchmarks: --cell --trees --water
-      picture    PNG or PGM of a plan, dark is an obstacle: --cell --threshold --invert --unknown
+      picture    PNG, JPEG, BMP, TIFF, PGM, PPM of a plan, dark is an obstacle: --cell --threshold
+                 --invert --unknown
       houseexpo  JSON with "verts" in metres
+      osm        OpenStreetMap's buildings, water and barriers: --water --thickness --pillar --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
                  a wrong one is answered with those that there are
@@ -50,7 +52,8 @@ class Arguments:
     """Walls may move by so many metres, and corners by twice as much, where that saves vertices; 0 keeps
     all. By default one cell of a grid, 0.02 of the rest."""
     specks: float | None = None
-    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps are, else none."""
+    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
+    none."""
     keep: Literal["largest", "all"] = "largest"
     """Which connected parts of the free space stay."""
     inside: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")] = None
@@ -76,7 +79,7 @@ class Arguments:
     trees: Literal["obstacle", "free"] | None = None
     """What trees (T) in a MovingAI grid are; obstacles by default."""
     water: Literal["obstacle", "free"] | None = None
-    """What water (W) in a MovingAI grid is; obstacles by default."""
+    """What water (W) in a MovingAI grid, or of OpenStreetMap, is; obstacles by default."""
     anywhere: bool = False
     """The picture that a YAML names may be outside of its folder."""
 
