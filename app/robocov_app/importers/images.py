@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import re
 import warnings
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,9 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from PIL.Image import Image
 
-PNG = b"\x89PNG\r\n\x1a\n"
-"""A PNG file begins so."""
-
 _PIECE = 1 << 20
 """Bytes that are unpacked at a time."""
 
@@ -41,25 +37,20 @@ _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
 
 _DIGITS = re.compile(rb"\d+")
 
-_OTHERS = {
+_PILLOW = {
+    "PNG": re.compile(rb"\x89PNG\r\n\x1a\n"),
     "JPEG": re.compile(rb"\xff\xd8\xff"),
     "BMP": re.compile(rb"BM.{12}[\x0c\x28\x34\x38\x40\x6c\x7c]\0\0\0", re.DOTALL),
     "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
     "PPM": re.compile(rb"P[14][\s#]"),
 }
-"""How other formats begin, by the names that Pillow gives them."""
+"""How formats that Pillow reads begin, by the names that it gives them."""
 
 _ORIENTATION, _BITS, _PHOTOMETRIC = 274, 258, 262
 """Tags of EXIF and TIFF."""
 
 _MOST_OF_JPEG = 512
 """Pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey."""
-
-_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
-"""Samples a pixel, by the colour type of a PNG."""
-
-_PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
-"""First column and row, and steps, of the passes of an interlaced PNG."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +80,7 @@ class Brightness:
 
 def is_picture(head: bytes) -> bool:
     """Return whether a file that begins with `head` is a picture of a kind that can be read."""
-    return head.startswith(PNG) or any(
-        begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_OTHERS.values())
-    )
+    return any(begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_PILLOW.values()))
 
 
 def read_picture(path: Path, where: str) -> Brightness:
@@ -110,11 +99,9 @@ def read_picture(path: Path, where: str) -> Brightness:
         `limits.MAX_CELLS` pixels.
     """
     data = limits.content(path)
-    if data.startswith(PNG):
-        return _png(data, where)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
         return _netpbm(data, where)
-    for name, begin in _OTHERS.items():
+    for name, begin in _PILLOW.items():
         if begin.match(data):
             return _decoded(data, name, where)
     wanted = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
@@ -187,44 +174,6 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     if done < count:
         raise MapError(f"{where}: cut off after {done} of {count} pixels")
     return values
-
-
-def _png(data: bytes, where: str) -> Brightness:
-    """Return a PNG; see https://www.w3.org/TR/png/."""
-    if len(data) < 33 or data[12:16] != b"IHDR":
-        raise MapError(f"{where}: cut off in its header, but a whole PNG was wanted")
-    width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    limits.require_cells(width, height, where)
-    _require_whole(data, width, height, where)
-    return _decoded(data, "PNG", where)
-
-
-def _require_whole(data: bytes, width: int, height: int, where: str) -> None:
-    """Check that the pixels of a PNG unpack to just what its header says, before there is room made for them.
-
-    They are unpacked piece by piece, and nothing is kept.
-    """
-    bits = data[24] * _CHANNELS.get(data[25], 0)
-    passes = _PASSES if data[28] else ((0, 0, 1, 1),)
-    wanted = 0
-    for left, top, right, down in passes:
-        columns, rows = -((left - width) // right), -((top - height) // down)
-        wanted += rows * (1 + (columns * bits + 7) // 8) if columns > 0 and rows > 0 else 0
-    unpacker = zlib.decompressobj()
-    found, at = 0, 8
-    try:
-        while at + 8 <= len(data) and found <= wanted and not unpacker.eof:
-            length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
-            packed = data[at + 8 : at + 8 + length] if kind == b"IDAT" else b""
-            at += 12 + length
-            while packed and found <= wanted and not unpacker.eof:
-                found += len(unpacker.decompress(packed, _PIECE))
-                packed = unpacker.unconsumed_tail
-    except zlib.error as error:
-        raise MapError(f"{where}: broken, but a whole PNG was wanted: {one_line(error)[:100]}") from None
-    if found != wanted:
-        what = "cut off, or broken" if found < wanted else "more pixels than its header says"
-        raise MapError(f"{where}: {what}, but a whole PNG of {width} x {height} pixels was wanted")
 
 
 def _decoded(data: bytes, name: str, where: str) -> Brightness:

@@ -97,8 +97,8 @@ GRID = b"type octile\nheight %d\nwidth %d\nmap\n"
 HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     # name: (file, content, options, what it says)
     "pixels of a bomb": ("a.png", lambda: raw_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
-    "GBs of pixels": ("a.png", lambda: raw_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "cut off, or"),
-    "more than it says": ("a.png", lambda: raw_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "more pixels"),
+    "GBs of pixels": ("a.png", lambda: raw_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
+    "more than it says": ("a.png", lambda: raw_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),
     "text": ("a.png", text_bomb, "cell", "whole PNG"),
     "10^9 cells": ("a.pgm", lambda: b"P5 31623 31623 255\n" + b"\xff" * 1000, "cell", TOO_MANY),
     "10^9 plain cells": ("a.pgm", lambda: b"P2 1 999999999 255\n" + b"1 " * 1000, "cell", TOO_MANY),
