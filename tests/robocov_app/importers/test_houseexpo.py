@@ -160,7 +160,7 @@ def test_options_out_of_range(tmp_path: Path) -> None:
 
 
 def test_other_files_are_not_recognised(tmp_path: Path) -> None:
-    with pytest.raises(MapError, match=r"unknown format, but one of .*houseexpo"):
+    with pytest.raises(MapError, match=r"unknown format .*, but one of .*houseexpo"):
         detect(write(tmp_path, {"rooms": []}))
     with pytest.raises(MapError, match="no such file"):
         detect(tmp_path / "none.json")
