@@ -32,14 +32,15 @@ def with_primitives(
     boundary: Polygon,
     tolerance: float,
     digits: int,
+    places: int,
     radius: float,
 ) -> tuple[list[Primitive], list[Polygon]]:
     """Return the primitives that make up polygons of `solid`, in their order, and the polygons that stay.
 
     A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
     twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
-    along the outline, and the primitives have fewer points. All polygons stay where a robot would be parted
-    from a place that it reaches among them.
+    along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
+    where there would be more places for a robot, apart from each other, than in the file.
 
     Parameters
     ----------
@@ -51,14 +52,16 @@ def with_primitives(
         By so much walls were allowed to move.
     digits : int
         Decimals of the coordinates.
+    places : int
+        Where a robot may be, as separate places, in the file; see `robocov_app.importers.passing.rooms`.
     radius : float, m
-        Of a robot.
+        Of the robot.
 
     Examples
     --------
     >>> wall = WallObstacle(((1.0, 2.0), (3.0, 2.0)), 0.2)
     >>> desk, drawn = shapely.box(5, 1, 6, 2), shapely.box(1, 1.9, 3, 2.1)
-    >>> kept, rest = with_primitives([drawn, desk], [wall], shapely.box(0, 0, 8, 4), 0.02, 4, 0.1)
+    >>> kept, rest = with_primitives([drawn, desk], [wall], shapely.box(0, 0, 8, 4), 0.02, 4, 1, 0.1)
     >>> kept == [wall], rest == [desk]
     (True, True)
     """
@@ -73,29 +76,25 @@ def with_primitives(
     piece, source = shapely.get_parts(covered, return_index=True)
     tree = STRtree(piece)
     hair = 10.0**-digits
-    chosen: set[int] = set()
-    rest = []
+    made: list[set[int]] = []
     for part in solid:
         found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
         own = set(source[found].tolist())
         union = shapely.union_all(piece[found])
-        if (
-            own
-            and sum(points_of(usable[k]) for k in own) < shapely.get_num_coordinates(part)
+        same = (
+            sum(points_of(usable[k]) for k in own) < shapely.get_num_coordinates(part)
             and union.buffer(2 * (tolerance + hair)).covers(part)
             and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
-        ):
-            chosen |= own
-        else:
-            rest.append(part)
-    kept = [usable[k] for k in sorted(chosen)]
-    before, after = (
-        shapely.difference(boundary, shapely.union_all(obstacles))
-        for obstacles in (solid, [*rest, *(primitive.polygon for primitive in kept)])
-    )
-    if len(rooms(after, radius)) > len(rooms(before, radius)):
-        return [], list(solid)
-    return kept, rest
+        )
+        made.append(own if same else set())
+    # several may have a gap among them that was filled
+    for most in (len(usable), 1):
+        kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
+        rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
+        obstacles = [*rest, *(primitive.polygon for primitive in kept)]
+        if len(rooms(shapely.difference(boundary, shapely.union_all(obstacles)), radius)) <= places:
+            return kept, rest
+    return [], list(solid)
 
 
 def points_of(primitive: Primitive) -> int:

@@ -176,9 +176,10 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     if outer is not None:
         solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
     kept: list[Primitive] = []
-    if shapely.get_num_coordinates(free) <= _SOON:
+    if foreign.primitives and shapely.get_num_coordinates(free) <= _SOON:
+        places = len(rooms(MultiPolygon(parts), shaping.radius))
         kept, solid = with_primitives(
-            solid, foreign.primitives, boundary, simple.tolerance, digits, shaping.radius
+            solid, foreign.primitives, boundary, simple.tolerance, digits, places, shaping.radius
         )
     obstacles = _obstacles(solid, digits, told)
     environment = Environment(

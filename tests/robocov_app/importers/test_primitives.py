@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.shaping import Shaping, shaped
 
 ROOM = box(0, 0, 20, 16)
+ARC = tuple((10 + 4 * math.cos(k / 100), 5 + 4 * math.sin(k / 100)) for k in range(314))
 
 _POINT = st.tuples(*(st.floats(0.0, far).map(lambda value: round(value, 3)) for far in (20.0, 16.0)))
 _CIRCLE = st.builds(CircleObstacle, _POINT, st.floats(0.05, 2.0))
@@ -84,6 +86,11 @@ def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
         pytest.param([CircleObstacle((4, 4), 0.5)], [box(4, 3.8, 6, 4.2)], id="a part of something else"),
         pytest.param([CircleObstacle((4, 4), 0.5)], [box(3, 3, 5, 5)], id="within something else"),
         pytest.param(
+            [WallObstacle(((2, 4), (6, 4)), 0.2)], [box(1.975, 3.875, 6.025, 4.125)], id="a little larger"
+        ),
+        pytest.param([WallObstacle(ARC, 0.2)], [], id="of more points than the polygon has"),
+        pytest.param([CircleObstacle((4, 4), 1)], [box(4, 3.98, 5.4, 4.02)], id="with a thin spike"),
+        pytest.param(
             [WallObstacle(((4, 4), (8, 4), (8, 8), (4, 8), (4, 4)), 0.2)], [], id="around what is cut off"
         ),
     ],
@@ -95,12 +102,12 @@ def test_what_is_more_than_primitives_stays_a_polygon(
     assert all(isinstance(one, PolygonObstacle) for one in environment.obstacles)
 
 
-def test_a_place_that_robots_reach_is_reached() -> None:
-    # a robot just passes; a circle as a polygon leaves it more room
-    pillars = [CircleObstacle((10, 8 + side * (0.5 + 0.1)), 0.5) for side in (-1, 1)]
-    blocks = [box(9.9, 0, 10.1, 6.95), box(9.9, 9.05, 10.1, 16)]
-    free = made(pillars, *blocks, radius=0.0999, simplify=0.2).free
-    assert len(shapely.get_parts(free.buffer(-0.0999))) == 1
+def test_what_was_filled_among_several_stays_filled() -> None:
+    # below the wall a wedge is cut off, so flat that both are as good within the tolerance
+    circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
+    environment = made([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
+    assert len(environment.free.geoms) == 1
+    assert [one for one in environment.obstacles if isinstance(one, CircleObstacle)] == circles[:1]
 
 
 DXF = [
