@@ -181,6 +181,8 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         kept, solid = with_primitives(
             solid, foreign.primitives, boundary, simple.tolerance, digits, places, shaping.radius
         )
+        if kept:  # its vertices where polygons began that are gone
+            boundary = boundary.simplify(0.0)
     obstacles = _obstacles(solid, digits, told)
     environment = Environment(
         name=one_line(foreign.name)[:100].strip() or "map",

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, box
 
@@ -44,7 +44,7 @@ def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment
     return shaped(drawn(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(_CIRCLE, max_size=5),
     st.lists(_WALL, max_size=5),
