@@ -40,7 +40,7 @@ def with_primitives(
     A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
     twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
     along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
-    where there would be more places for a robot, apart from each other, than in the file.
+    where there would be more places for a robot, apart from each other.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def with_primitives(
     digits : int
         Decimals of the coordinates.
     places : int
-        Where a robot may be, as separate places, in the file; see `robocov_app.importers.passing.rooms`.
+        So many separate places a robot may be at; see `robocov_app.importers.passing.rooms`.
     radius : float, m
         Of the robot.
 
@@ -65,11 +65,12 @@ def with_primitives(
     >>> kept == [wall], rest == [desk]
     (True, True)
     """
-    rounded = dict.fromkeys(_rounded(primitive, digits) for primitive in primitives)
+    rounded = {_rounded(primitive, digits): primitive for primitive in primitives}
     usable = [primitive for primitive in rounded if _fits(primitive)]
     if not usable or len(usable) > MOST:
         return [], list(solid)
-    covered = np.array([primitive.polygon for primitive in usable], dtype=object)
+    # of another radius, however near, a circle may be drawn with another number of sides
+    covered = np.array([rounded[primitive].polygon for primitive in usable], dtype=object)
     shapely.prepare(boundary)
     outside = ~shapely.covers(boundary, covered)
     covered[outside] = shapely.intersection(covered[outside], boundary)

@@ -177,7 +177,7 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
     kept: list[Primitive] = []
     if foreign.primitives and shapely.get_num_coordinates(free) <= _SOON:
-        places = len(rooms(MultiPolygon(parts), shaping.radius))
+        places = max(len(rooms(space, shaping.radius)) for space in (MultiPolygon(parts), free))
         kept, solid = with_primitives(
             solid, foreign.primitives, boundary, simple.tolerance, digits, places, shaping.radius
         )

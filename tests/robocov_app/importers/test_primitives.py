@@ -102,6 +102,12 @@ def test_what_is_more_than_primitives_stays_a_polygon(
     assert all(isinstance(one, PolygonObstacle) for one in environment.obstacles)
 
 
+def test_a_circle_whose_rounded_twin_has_more_sides() -> None:
+    circle = CircleObstacle((4.0, 4.0), 0.50676)
+    assert len(circle.polygon.exterior.coords) != len(CircleObstacle((4, 4), 0.5068).polygon.exterior.coords)
+    assert made([circle], simplify=0.0).obstacles == (CircleObstacle((4.0, 4.0), 0.5068),)
+
+
 def test_what_was_filled_among_several_stays_filled() -> None:
     # below the wall a wedge is cut off, so flat that both are as good within the tolerance
     circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
