@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,16 +67,18 @@ def swept_together(studies: Mapping[str, Study], folder: Path, means: Means, tit
 def _filled(
     studies: Mapping[str, Study], ledgers: Mapping[str, Ledger], means: Means, title: str, stack: ExitStack
 ) -> None:
-    waiting = [
-        (ledgers[name], each)
-        for name, study in studies.items()
-        for each in tasks_of(study)
-        if ledgers[name].entry(each) is None
-    ]
-    if not waiting or means.stop.requested:
-        return
+    waiting: list[tuple[Ledger, Task]] = []
+    notes = []
+    for name, study in studies.items():
+        survey = ledgers[name].survey(tasks_of(study), keep_versions=means.keep_versions)
+        waiting += [(ledgers[name], task) for task in compress(tasks_of(study), survey.todo)]
+        notes += [f"{name}: {line}" for line in survey.words(keep_versions=means.keep_versions)]
     count = Count(len(waiting))
     tell = stack.enter_context(told(title, count, quiet=means.quiet))
+    for note in notes:
+        tell.say(note)
+    if not waiting or means.stop.requested:
+        return
     crew: Crew = stack.enter_context(LocalPool(min(means.workers, len(waiting))))
     # two studies may have a task in common
     homes: dict[str, list[Ledger]] = {}
@@ -88,6 +91,7 @@ def _filled(
             crew.submit(task)
             task = next(left, None)
         back = crew.next(_PATIENCE)
+        count.lost = crew.lost
         if back is not None:
             done, outcome = back
             for ledger in homes[done.digest]:

@@ -31,9 +31,9 @@ def task() -> Task:
 def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path / "deep" / "out", STUDY) as ledger:
         assert ledger.entry(task) is None
-        assert ledger.keep(task, DONE) == Entry(DONE.figures, None)
+        assert ledger.keep(task, DONE) == Entry(DONE.figures, None, DONE.versions)
     with opened(tmp_path / "deep" / "out", STUDY) as ledger:
-        assert ledger.entry(task) == Entry(DONE.figures, None)
+        assert ledger.entry(task) == Entry(DONE.figures, None, DONE.versions)
     folder = tmp_path / "deep" / "out" / "runs" / task.name
     assert sorted(path.name for path in folder.iterdir()) == ["cost.csv", "row.json", "run.json"]
 
@@ -41,9 +41,9 @@ def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:
 def test_a_run_takes_the_place_of_an_earlier_one(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path, STUDY) as ledger:
         ledger.keep(task, FAILED)
-        assert ledger.entry(task) == Entry({}, "it broke")
+        assert ledger.entry(task) == Entry({}, "it broke", FAILED.versions)
         ledger.keep(task, DONE)
-        assert ledger.entry(task) == Entry(DONE.figures, None)
+        assert ledger.entry(task) == Entry(DONE.figures, None, DONE.versions)
     assert not (tmp_path / "runs" / task.name / "error.json").exists()
 
 
@@ -93,13 +93,15 @@ def test_a_full_disk_leaves_nothing_of_a_run(
 def test_what_was_left_half_written_goes(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path, STUDY) as ledger:
         ledger.keep(task, DONE)
-    half = tmp_path / "runs" / ".another.part"
+    (tmp_path / "runs" / ".mine.part").mkdir()
+    (tmp_path / ".x.part.zip").touch()
+    half = tmp_path / "runs" / ".room-rapf-2-corner-0-0123456789.part"
     half.mkdir()
     (half / "run.json").write_text("{")
     (tmp_path / ".results.123.part.parquet").write_text("PAR1")
     with opened(tmp_path, STUDY):
-        assert run_folders(tmp_path) == [task.name]
-        assert not list(tmp_path.glob(".*.part.*"))
+        assert run_folders(tmp_path) == [".mine.part", task.name]
+        assert [path.name for path in tmp_path.glob(".*.part.*")] == [".x.part.zip"], "it is not ours"
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
@@ -174,7 +176,7 @@ def test_a_study_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pyt
     def full(self: Path, *_: object, **__: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(ledger_module.Path, "write_text", full)
+    monkeypatch.setattr(ledger_module.Path, "write_bytes", full)
     with (
         pytest.raises(OutputError, match=r"study.json: cannot be written: No space left"),
         opened(tmp_path, STUDY),

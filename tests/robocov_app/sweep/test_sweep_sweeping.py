@@ -162,7 +162,7 @@ def test_a_stop_keeps_what_is_done_in_the_table(
         stop.requested = calls == 7
 
     here.before = press
-    assert sweep(study, tmp_path, quiet=True, stop=stop) == Totals(7, 0, 0, True)
+    assert sweep(study, tmp_path, quiet=True, stop=stop) == Totals(7, 0, 1, True)
     here.before = lambda: None
     # rapf with k_rep 0.3 is not in the study
     done = [task.name for task in tasks_of(study) if task.name in run_folders(tmp_path)]
@@ -191,7 +191,12 @@ def test_failures_are_recorded_and_done_again_when_that_is_wanted(tmp_path: Path
     assert sorted(path.name for path in failed.iterdir()) == ["error.json", "row.json"]
 
     before = tables(out)
-    assert sweep(study, out, quiet=True) == Totals(0, 0, 8, False)
+    totals = sweep(study, out, quiet=True)
+    assert totals == Totals(0, 6, 2, False)
+    assert [error.partition(":")[0] for error in totals.errors.values()] == [
+        "controller 'Mine'",
+        "start 'corner'",
+    ]
     assert tables(out) == before
     flag.touch()
     assert sweep(study, out, quiet=True, retry_failed=True) == Totals(2, 4, 2, False)
