@@ -100,8 +100,8 @@ def tasks_of(study: Study) -> Iterator[Task]:
             if source.modules:
                 said["modules"] = {key: _digest(module.text) for key, module in source.modules.items()}
         for choice in study.gains_of(name).choices:
-            law = {"controller": name, "gains": dict(choice)}
-            laws.append(({**law, "source": source}, {**law, **said}))
+            own = {"controller": name, "gains": dict(choice)}
+            laws.append(({**own, "source": source}, {**own, **said}))
     for each in study.maps:
         document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
         short = {"document": _digest(document)}
@@ -109,14 +109,9 @@ def tasks_of(study: Study) -> Iterator[Task]:
             for team in study.teams:
                 for start in study.starts_on(each):
                     for seed in study.seeds:
-                        place: dict[str, Any] = {
-                            "map": each.name,
-                            "robots": robots,
-                            "team": dict(team),
-                            "start": start,
-                        }
+                        place = {"map": each.name, "robots": robots, "start": start, "seed": seed}
                         for law, words in laws:
-                            inputs: dict[str, Any] = {**once, **place, "seed": seed}
+                            inputs: dict[str, Any] = {**once, **place, "team": dict(team)}
                             digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
                             yield Task(**inputs, **law, document=document, digest=digest)
 

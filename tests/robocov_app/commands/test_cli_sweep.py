@@ -168,6 +168,25 @@ def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
     assert tables(again) == tables(out)
 
 
+@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "runs", "study.json", ".lock"])
+@pytest.mark.parametrize("finished", [True, False])
+def test_something_else_that_has_a_name_of_ours_is_one_line(
+    study: Path, name: str, finished: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = study.parent / "out"
+    words = ("sweep", str(study), "--out", str(out), "--workers", "1")
+    out.mkdir()
+    if finished:
+        (out / "study.json").write_text('{"format": "robocov-study"}')
+    (out / name).unlink(missing_ok=True)
+    if name == "runs":
+        (out / name).touch()
+    else:
+        (out / name / "mine").mkdir(parents=True)
+    assert str(out) in complaint(capsys, *words)
+    assert (out / name).exists() and (name == "runs" or (out / name / "mine").is_dir())
+
+
 def test_a_run_of_a_sweep_can_be_seen_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = study.parent / "out"
     answer(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")

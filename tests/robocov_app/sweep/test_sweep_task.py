@@ -6,6 +6,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from swept import HALL, ROOM, controller, small_study
@@ -120,6 +121,23 @@ def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path
         names.append([task.name for task in tasks_of(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
+
+
+def test_the_text_of_what_a_controller_imports_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "part_of_mine.py").write_text("import rest_of_mine\n")
+    name = controller(tmp_path, "        import part_of_mine\n")
+    names = []
+    for text in ("PULL = 1.0\n", "PULL = 1.0\n", "PULL = 2.0\n"):
+        (tmp_path / "rest_of_mine.py").write_text(text)
+        study = small_study(controllers=(name,))
+        names.append([task.name for task in tasks_of(study)])
+    assert names[0] == names[1]
+    assert not set(names[0]) & set(names[2])
+    (said,) = study.to_json()["controllers"]
+    assert said["modules"] == {"part_of_mine": "import rest_of_mine\n", "rest_of_mine": "PULL = 2.0\n"}
 
 
 def test_a_default_that_is_stated_is_the_same_run() -> None:
