@@ -230,12 +230,12 @@ class Ledger:
 
 
 def difference_of(versions: Mapping[str, str]) -> str:
-    """Return how versions differ from those here, as in ``numpy 2.0.1 (now 2.1.0)``.
+    """Return how versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``.
 
     Those that are not known do not differ.
     """
     return ", ".join(
-        f"{name} {versions[name]} (now {version})"
+        f"{name} {versions[name]} instead of {version}"
         for name, version in made_with().items()
         if versions.get(name, version) != version
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from swept import run_folders, small_study
 
+from robocov import __version__
 from robocov.errors import InputError, OutputError
 from robocov_app.sweep import ledger as ledger_module
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, is_sweep, opened
@@ -142,22 +143,24 @@ def test_wrong_types_in_a_row_are_damage(tmp_path: Path, task: Task, change: dic
     assert surveyed(tmp_path, task).damaged == [task.name]
 
 
-def test_runs_of_version_1_are_used_and_that_is_told(tmp_path: Path, task: Task) -> None:
-    run = kept(tmp_path, task)
-    of_version_1(run)
+def test_runs_of_version_1_can_be_kept_and_it_is_told_that_they_have_no_check_sums(
+    tmp_path: Path, task: Task
+) -> None:
+    of_version_1(kept(tmp_path, task))
     survey = surveyed(tmp_path, task)
-    assert survey == Survey(bytearray([0]), unchecked=1)
-    (told,) = survey.words(keep_versions=False)
-    assert told.startswith(
-        "1 run of an earlier version of robocov without check sums will be used; damage to"
+    assert (survey.todo, survey.damaged, survey.unchecked) == (bytearray([1]), [], 0)
+    assert survey.words(keep_versions=False)[0].startswith(
+        f"1 run made with robocov {__version__} instead of "
     )
-    (run / "run.json").write_text((run / "run.json").read_text().replace('"numpy": "', '"numpy": "0.'))
-    assert surveyed(tmp_path, task).outdated.total() == 1
+    survey = surveyed(tmp_path, task, keep_versions=True)
+    assert (survey.todo, survey.unchecked) == (bytearray([0]), 1)
+    told = survey.words(keep_versions=True)[-1]
+    assert told.startswith("1 run of an earlier version of robocov without check sums will be used; damage")
 
 
 def test_runs_of_other_versions_are_done_again_unless_they_are_to_be_kept(tmp_path: Path, task: Task) -> None:
     kept(tmp_path, task, Outcome(DONE.files, DONE.figures, versions={**DONE.versions, "numpy": "1.9"}))
-    difference = f"numpy 1.9 (now {DONE.versions['numpy']})"
+    difference = f"numpy 1.9 instead of {DONE.versions['numpy']}"
     survey = surveyed(tmp_path, task)
     assert survey == Survey(bytearray([1]), outdated=Counter([difference]))
     assert survey.words(keep_versions=False) == [
