@@ -43,6 +43,9 @@ _STUDY_FORMAT = "robocov-study"
 _LEFT_OVER = re.compile(r"\..*-[0-9a-f]{10}\.part|\.(results|study)\..*part\.(csv|parquet|json)")
 """Names of what a sweep that was killed has left half-written."""
 
+_SYNCING = ThreadPoolExecutor(8, "fsync")
+"""Most of what it takes to bring a file to the disk is waiting."""
+
 _NAMED = 5
 """Damaged runs that are named."""
 
@@ -249,9 +252,7 @@ def on_disk(paths: Iterable[Path]) -> None:
     OSError
         When a file cannot be written.
     """
-    paths = list(paths)
-    with ThreadPoolExecutor(len(paths)) as threads:
-        list(threads.map(_on_disk, paths))
+    list(_SYNCING.map(_on_disk, paths))
 
 
 def _on_disk(path: Path) -> None:
