@@ -40,7 +40,9 @@ _HEAD = {"format": "robocov-row", "version": 2}
 
 _STUDY_FORMAT = "robocov-study"
 
-_LEFT_OVER = re.compile(r"\..*-[0-9a-f]{10}\.part|\.(results|study)\..*part\.(csv|parquet|json)")
+_LEFT_OVER = re.compile(
+    r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
+)
 """Names of what a sweep that was killed has left half-written."""
 
 _SYNCING = ThreadPoolExecutor(8, "fsync")

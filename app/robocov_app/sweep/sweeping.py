@@ -230,7 +230,7 @@ def kept(ledger: Ledger, task: Task, outcome: Outcome, *, keep_versions: bool) -
     difference = difference_of(outcome.versions)
     if difference and not keep_versions:
         raise OutputError(
-            f"--scheduler: a worker has {difference}; the same versions everywhere, "
+            f"a worker has {difference}; the same versions everywhere, "
             f"or --keep-versions, was wanted"
         )
     return ledger.keep(task, outcome)

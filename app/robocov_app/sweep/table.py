@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
+from robocov.files.atomic import writable
 from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
 from robocov_app.sweep.ledger import on_disk
 from robocov_app.sweep.performing import FIGURES, TIMED
@@ -297,9 +298,7 @@ def _former_rows(folder: Path) -> tuple[int, bool]:
         When something else than a file has its name.
     """
     for name in (CSV, PARQUET):
-        path = folder / name
-        if os.path.lexists(path) and not path.is_file():
-            raise OutputError(f"{path}: cannot be written: it is no file; another --out was wanted")
+        writable(folder / name)
     with suppress(OSError), (folder / CSV).open("rb") as file:
         return max(0, sum(1 for _ in file) - 1), not (folder / PARQUET).exists()
     return 0, not (folder / PARQUET).exists()

@@ -160,7 +160,7 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet"])
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    told = pytest.raises(OutputError, match=f"{name}: cannot be written: it is no file")
+    told = pytest.raises(OutputError, match=f"{name}: is a folder, but a file was wanted")
     with told, Table(tmp_path, columns_of(small_study())):
         pass
 
