@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections import Counter, deque
+from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from itertools import chain, takewhile
+from itertools import compress, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -134,32 +134,34 @@ def sweep(
         count.reused = len(survey.todo) - sum(survey.todo)
         for line in survey.words(keep_versions=keep_versions):
             tell.say(line)
-        rows = _Rows(ledger, table)
+        rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
         def hired() -> Crew:
             if scheduler is None:
-                return stack.enter_context(LocalPool(min(workers or processors(), sum(survey.todo))))
+                return LocalPool(min(workers or processors(), sum(survey.todo)))
             from robocov_app.sweep.cluster import Cluster
 
-            return stack.enter_context(Cluster(scheduler))
+            return Cluster(scheduler)
 
-        tasks = tasks_of(study)
+        def keep(task: Task, outcome: Outcome) -> None:
+            difference = difference_of(outcome.versions)
+            if difference and not keep_versions:
+                raise OutputError(
+                    f"a worker has {difference}; the same versions everywhere, or --keep-versions, was wanted"
+                )
+            ledger.keep(task, outcome)
+            rows.finished(task)
+
         failure: RobocovError | None = None
         try:
-            for _ in _worked_off(
-                zip(survey.todo, tasks, strict=False),
-                rows,
-                hired,
-                count,
-                stopped,
-                keep_versions=keep_versions,
-            ):
+            rows.write()
+            for _ in worked_off(compress(tasks_of(study), survey.todo), hired, count, stopped, keep):
                 tell(count)
         except RobocovError as error:  # what is done belongs into the table all the same
             failure = error
         table.complete = failure is None and not stopped.requested
         if not table.complete:
-            rows.rest(tasks)
+            rows.write(whatever=True)
     if failure is not None:
         raise failure
     return Totals(
@@ -174,66 +176,46 @@ def sweep(
     )
 
 
-def _worked_off(
-    tasks: Iterable[tuple[int, Task]],
-    rows: _Rows,
+def worked_off(
+    tasks: Iterable[Task],
     hired: Callable[[], Crew],
     count: Count,
     stop: Interruption,
-    *,
-    keep_versions: bool,
+    keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
-    """Do the tasks that are to be done; yield whenever the count may have changed."""
-    crew: Crew | None = None
-    for todo, task in tasks:
-        entry = rows.expect(task)
-        if entry is not None and not todo:
-            rows.finished(task, entry)
-            continue
-        if crew is None:
-            crew = hired()
-        crew.submit(task)
-        while crew.full and not stop.requested:
-            _collected(crew, rows, count, keep_versions)
-            yield
-        if stop.requested:
-            return
-    while crew is not None and crew.busy and not stop.requested:
-        _collected(crew, rows, count, keep_versions)
-        yield
+    """Have tasks done, and keep what comes back; yield whenever the count may have changed.
 
-
-def _collected(crew: Crew, rows: _Rows, count: Count, keep_versions: bool) -> None:
-    """Keep the next run that comes back, if one does soon."""
-    back = crew.next(_PATIENCE)
-    count.waiting, count.lost = crew.waiting, crew.lost
-    if count.waiting and not count.done + count.failed:
-        count.began = time.perf_counter()
-    if back is None:
-        return
-    task, outcome = back
-    rows.finished(task, kept(rows.ledger, task, outcome, keep_versions=keep_versions))
-    if outcome.error is None:
-        count.done += 1
-    else:
-        count.failed += 1
-
-
-def kept(ledger: Ledger, task: Task, outcome: Outcome, *, keep_versions: bool) -> Entry:
-    """Keep a run, unless a machine with other versions has done it.
-
-    Raises
-    ------
-    OutputError
-        When it has other versions, or the run cannot be written.
+    Parameters
+    ----------
+    tasks : iterable of Task
+        Asked for the next one when somebody can do it.
+    hired : callable
+        Gives those who do tasks; called if there is one.
+    count : Count
+    stop : Interruption
+    keep : callable
     """
-    difference = difference_of(outcome.versions)
-    if difference and not keep_versions:
-        raise OutputError(
-            f"a worker has {difference}; the same versions everywhere, "
-            f"or --keep-versions, was wanted"
-        )
-    return ledger.keep(task, outcome)
+    with ExitStack() as stack:
+        crew: Crew | None = None
+        left = iter(tasks)
+        task = next(left, None)
+        while (task is not None or (crew is not None and crew.busy)) and not stop.requested:
+            if crew is None:
+                crew = stack.enter_context(hired())
+            while task is not None and not crew.full:
+                crew.submit(task)
+                task = next(left, None)
+            back = crew.next(_PATIENCE)
+            count.waiting, count.lost = crew.waiting, crew.lost
+            if count.waiting and not count.done + count.failed:
+                count.began = time.perf_counter()
+            if back is not None:
+                keep(*back)
+                if back[1].error is None:
+                    count.done += 1
+                else:
+                    count.failed += 1
+            yield
 
 
 class _Rows:
@@ -242,38 +224,37 @@ class _Rows:
     Of runs that are finished before others that come first in the table, only the names are kept.
     """
 
-    def __init__(self, ledger: Ledger, table: Table) -> None:
-        self.ledger, self._table = ledger, table
-        self._line: deque[Task] = deque()
+    def __init__(self, ledger: Ledger, table: Table, tasks: Iterable[tuple[int, Task]]) -> None:
+        self._ledger, self._table, self._tasks = ledger, table, iter(tasks)
+        self._head = next(self._tasks, None)
         self._finished: set[str] = set()
         self.errors: dict[str, str] = {}
         self.versions: Counter[str] = Counter()
 
-    def expect(self, task: Task) -> Entry | None:
-        """Put a task at the end of the line; return what came of it earlier."""
-        self._line.append(task)
-        return self.ledger.entry(task)
-
-    def finished(self, task: Task, entry: Entry) -> None:
+    def finished(self, task: Task) -> None:
         """Write the row of a task, and of those behind it that were finished before, when it is its turn."""
-        if task is not self._line[0]:
-            self._finished.add(task.name)
-            return
-        self._add(task, entry)
-        self._line.popleft()
-        while self._line and self._line[0].name in self._finished:
-            self._write(self._line[0])
-            self._finished.remove(self._line.popleft().name)
+        self._finished.add(task.name)
+        self.write()
 
-    def rest(self, tasks: Iterator[Task]) -> None:
-        """Write the rows of all that is there, in the line and of these tasks behind it."""
-        for task in chain(self._line, tasks):
-            self._write(task)
+    def write(self, *, whatever: bool = False) -> None:
+        """Write the next rows, up to the first run that is still to be done; or `whatever` is there.
 
-    def _write(self, task: Task) -> None:
-        entry = self.ledger.entry(task)
-        if entry is not None:
-            self._add(task, entry)
+        Raises
+        ------
+        OutputError
+            When a run that was there is not any more, or a row cannot be written.
+        """
+        while self._head is not None:
+            todo, task = self._head
+            if todo and task.name not in self._finished and not whatever:
+                return
+            entry = self._ledger.entry(task)
+            if entry is not None:
+                self._add(task, entry)
+            elif not whatever:
+                raise OutputError(f"{self._ledger.folder}: {task.name} was removed by somebody else")
+            self._finished.discard(task.name)
+            self._head = next(self._tasks, None)
 
     def _add(self, task: Task, entry: Entry) -> None:
         self._table.add(row_of(task, entry))
