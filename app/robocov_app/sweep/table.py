@@ -176,7 +176,7 @@ class Table:
         self._broken: OutputError | None = None
         self._names = [column.name for column in columns]
         self._rows: list[dict[str, Any]] = []
-        self._count = 0
+        self._count = -1  # the header is no row
 
     def __enter__(self) -> Table:
         import pyarrow.parquet as pq
@@ -211,7 +211,6 @@ class Table:
         try:
             self._write(_csv_line(values.values()))
             self._rows.append(values)
-            self._count += 1
             if len(self._rows) == ROW_GROUP:
                 self._flush()
         except OutputError as error:
@@ -231,6 +230,7 @@ class Table:
                     os.ftruncate(self._csv.fileno(), self._size)
                 raise
             self._size += len(data)
+            self._count += 1
             if self._count >= self._shown_from:
                 self._csv.close()  # open files cannot be renamed everywhere
                 (self._folder / _PART.format("csv")).replace(self._folder / CSV)

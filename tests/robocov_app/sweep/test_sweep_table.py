@@ -157,6 +157,21 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
     assert not list(tmp_path.glob(".*"))
 
 
+def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_that_was_killed(
+    tmp_path: Path,
+) -> None:
+    study = small_study()
+    written(tmp_path, study, [FIGURED] * len(study))
+    (tmp_path / "results.parquet").unlink()
+    lengths = []
+    with Table(tmp_path, columns_of(study)) as table:
+        for task in [*tasks_of(study)] * 2:
+            table.add(row_of(task, FAILED))
+            text = (tmp_path / "results.csv").read_text()
+            lengths.append(text.count("\n") - 1 if "no room" in text else None)
+    assert lengths == [None, None, None, 4, 5, 6, 7, 8]
+
+
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet"])
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
