@@ -12,7 +12,6 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
-from robocov.files.atomic import written
+from robocov.files.atomic import on_disk, written
 from robocov.files.lock import locked
 from robocov_app.sweep.performing import FIGURES, made_with
 
@@ -44,9 +43,6 @@ _LEFT_OVER = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
 """Names of what a sweep that was killed has left half-written."""
-
-_SYNCING = ThreadPoolExecutor(8, "fsync")
-"""Most of what it takes to bring a file to the disk is waiting."""
 
 _NAMED = 5
 """Damaged runs that are named."""
@@ -244,30 +240,6 @@ def difference_of(versions: Mapping[str, str]) -> str:
         for name, version in made_with().items()
         if versions.get(name, version) != version
     )
-
-
-def on_disk(paths: Iterable[Path]) -> None:
-    """Return when files and folders are on the disk; all at once, which takes as long as one of them.
-
-    Raises
-    ------
-    OSError
-        When a file cannot be written.
-    """
-    list(_SYNCING.map(_on_disk, paths))
-
-
-def _on_disk(path: Path) -> None:
-    if path.is_dir():
-        with suppress(OSError):  # not every system knows that of folders
-            descriptor = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-    else:
-        with path.open("rb+") as file:
-            os.fsync(file.fileno())
 
 
 @contextmanager

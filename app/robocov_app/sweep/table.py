@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
-from robocov.files.atomic import writable
+from robocov.files.atomic import on_disk, writable
 from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
-from robocov_app.sweep.ledger import on_disk
 from robocov_app.sweep.performing import FIGURES, TIMED
 
 if TYPE_CHECKING:
