@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NoReturn
 from xml.parsers import expat
@@ -24,7 +23,11 @@ DEEPEST = 100
 """Deepest nesting of elements and uses; drawing programs stay below 30."""
 
 _SVG = "http://www.w3.org/2000/svg"
-_TYPES = re.compile(rb"<\0*!\0*(?:D\0*O\0*C\0*T\0*Y\0*P\0*E|E\0*N\0*T\0*I\0*T\0*Y)")
+_EXPANDED = 1_000_000
+"""What entities and default attributes add to a file may be so long, in characters: those of drawing programs
+stand for names of namespaces."""
+
+_LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 
 @dataclass(eq=False, slots=True)
@@ -71,43 +74,43 @@ def read_svg_tree(path: Path) -> tuple[Element, str]:
     Raises
     ------
     MapError
-        When it cannot be read, is too large, is not XML or not SVG; when it has a document type or
-        entities, which could make it of any size; or too many elements, or too deep ones.
+        When it cannot be read, is too large, is not XML or not SVG; when it has entities that stand for other
+        files or other entities, or for too much; or too many elements, or too deep ones.
     """
     where = one_line(path)
     content = limits.content(path, limits.MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):
         raise MapError(f"{where}: compressed, but plain SVG was wanted (gunzip makes it)")
-    declared = _TYPES.search(content)
-    if declared:
-        line = content.count(b"\n", 0, declared.start()) + 1
-        raise MapError(
-            f"{where}:{line}: <!DOCTYPE or <!ENTITY, but SVG without was wanted: delete it, SVG needs neither"
-        )
     if content.count(b"=") > MOST_ATTRIBUTES:
         raise MapError(f"{where}: more than {MOST_ATTRIBUTES} attributes, but fewer were wanted")
-    return _Reader(where).root(content), where
+    return _Reader(where, content).root(), where
 
 
 class _Reader:
     """Builds the tree from what expat tells."""
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, where: str, content: bytes) -> None:
         self.where = where
+        self.content = content
+        self.references = content.count(b"&")
+        self.room = len(content) + _EXPANDED
         self.parser = expat.ParserCreate(namespace_separator=" ")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._text
-        self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.EntityDeclHandler = self._entity
+        self.parser.AttlistDeclHandler = self._declared
+        self.parser.StartNamespaceDeclHandler = self._namespace
+        self.declarations = 0
         self.open: list[Element | None] = []
         self.first: Element | None = None
         self.count = 0
 
-    def root(self, content: bytes) -> Element:
+    def root(self) -> Element:
         """Return the root element."""
         try:
-            self.parser.Parse(content, True)
+            self.parser.Parse(self.content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
             line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
             reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
@@ -125,10 +128,11 @@ class _Reader:
         if len(self.open) >= DEEPEST:
             raise MapError(f"{self.where}:{line}: elements nested deeper than {DEEPEST}, but less was wanted")
         namespace, _, tag = name.rpartition(" ")
+        plain = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
+        self._take(sum(map(len, plain)) + sum(map(len, plain.values())))
         element = None
         # what a foreign element holds is foreign as well
         if namespace in ("", _SVG) and (not self.open or self.open[-1] is not None):
-            plain = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
             element = Element(tag, plain, line)
             if self.open and self.open[-1] is not None:
                 self.open[-1].children.append(element)
@@ -140,9 +144,45 @@ class _Reader:
         self.open.pop()
 
     def _text(self, text: str) -> None:
+        self._take(len(text))
         element = self.open[-1]
         if element is not None and element.tag in ("style", "title", "desc"):
             element.text += text
 
-    def _doctype(self, *given: object) -> NoReturn:
-        raise MapError(f"{self.where}: a document type, but SVG without was wanted")
+    def _take(self, count: int) -> None:
+        """Count characters: entities and default attributes make more of them than the file has."""
+        self.room -= count
+        if self.room < 0:
+            self._refuse("its entities stand for too much")
+
+    def _entity(
+        self,
+        name: str,
+        parameter: bool,
+        value: str | None,
+        base: str | None,
+        system: str | None,
+        *rest: object,
+    ) -> None:
+        """Check an entity: it may stand for a few words, which expat puts in where it is used."""
+        self._declared()
+        if value is None:
+            self._refuse(f"entity {shown(name)} stands for another file ({shown(system)}), which is not read")
+        if parameter or "&" in value or "%" in value:
+            self._refuse(f"entity {shown(name)} stands for other entities")
+        if len(value) * self.references > _EXPANDED:
+            self._refuse(f"entity {shown(name)} stands for too much")
+
+    def _declared(self, *given: object) -> None:
+        """Count entities and attributes that are declared: expat looks through all of them each time."""
+        self.declarations += 1
+        if self.declarations > _MOST_DECLARATIONS:
+            self._refuse(f"more than {_MOST_DECLARATIONS} declarations")
+
+    def _namespace(self, prefix: str | None, name: str | None) -> None:
+        """Check the name of a namespace, which becomes part of every name in it."""
+        if name is not None and len(name) > _LONGEST_NAMESPACE:
+            self._refuse(f"a namespace of {len(name)} characters")
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {what}, but plain SVG was wanted")
