@@ -52,6 +52,7 @@ def foreign_map(
     name: str,
     description: str,
     solid: bool,
+    accessible: bool = False,
     notes: Sequence[str] = (),
 ) -> ForeignMap:
     """Return the map that the shapes of a file stand for.
@@ -72,6 +73,10 @@ def foreign_map(
     solid : bool
         What closed outlines are unless the option ``outlines`` says it: True is solid; False is free, but
         solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
+    accessible : bool
+        Whether outlines are all free in files of that format, as JuPedSim's accessible area, so that one may
+        overlap another: then 2 holds only where all others lie wholly in the largest, which would add nothing
+        to it as free space.
     notes : sequence of str
         What else is worth knowing.
 
@@ -91,7 +96,9 @@ def foreign_map(
     _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
     shapes.require_untangled()
     asked = shapes.options.outlines
-    boundary = _named(shapes) or (_largest(shapes, solid or asked == "solid") if asked != "free" else None)
+    boundary = _named(shapes)
+    if boundary is None and asked != "free":
+        boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
     if asked is None and not solid:
         solid = not shapes.outlines or (
             boundary is not None and len(shapes.outlines) > len(boundary.outlines)
@@ -179,8 +186,8 @@ def _named(shapes: Shapes) -> _Enclosure | None:
     return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
 
 
-def _largest(shapes: Shapes, solid: bool) -> _Enclosure | None:
-    """Return the largest closed outline if most others lie in it; if those are solid, of lines as well."""
+def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
+    """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
     if not shapes.outlines:
         return None
     outline = max(shapes.outlines, key=_filled)
@@ -190,7 +197,11 @@ def _largest(shapes: Shapes, solid: bool) -> _Enclosure | None:
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None
-    if inner and not _holds(outline.area, inner):
+    if wholly:
+        holds = bool(shapely.covers(outline.area, inner).all())
+    else:
+        holds = not inner or _holds(outline.area, inner)
+    if not holds:
         return None
     called = f", {shown(outline.labels[0])}," if outline.labels else ""
     words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"

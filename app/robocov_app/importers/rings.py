@@ -59,7 +59,13 @@ def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
     notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
     name = one_line(path.stem)[:60] or "map"
     return foreign_map(
-        shapes, format=IMPORTER.name, name=name, description="Imported from rings.", solid=False, notes=notes
+        shapes,
+        format=IMPORTER.name,
+        name=name,
+        description="Imported from rings.",
+        solid=False,
+        accessible=True,
+        notes=notes,
     )
 
 
