@@ -15,11 +15,12 @@ from robocov.environment.starts import GAP, DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, counted, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile import from_json, to_json
+from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
 from robocov_app.importers.corners import sharpened
-from robocov_app.importers.passing import rooms
+from robocov_app.importers.passing import moved_walls, roomiest, rooms
 from robocov_app.importers.report import ImportReport, square_metres
 from robocov_app.importers.simplifying import simplified
 
@@ -48,8 +49,11 @@ how to choose."""
 _OFFERED = 3
 """So many of the largest parts that are left out are named, with a place in each."""
 
-_SOON = 50_000
+_SOON = 10_000
 """Of maps with more vertices it takes too long to say where robots do not pass."""
+
+MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
+"""Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
 
 
 @dataclass(frozen=True)
@@ -153,13 +157,13 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     parts = _without_specks(_kept(read, shaping, least, told, where), foreign.cell, least, told)
     if shaping.inside is not None and outer is not None and outer.contains_properly(parts[0]):
         outer = None  # what is around the other parts is not around this one
+    _require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES, where)
     _require_room(parts, shaping, where)
     tolerance = shaping.simplify
     if tolerance is None:
         tolerance = _default_tolerance(foreign.cell, shaping.radius, told)
-    if foreign.cut_corners:
-        parts = [sharpened(part, tolerance) for part in parts]
-    simple = simplified(MultiPolygon(parts), tolerance, foreign.cell, shaping.radius)
+    drawn = [sharpened(part, tolerance) for part in parts] if foreign.cut_corners else parts
+    simple = simplified(MultiPolygon(drawn), tolerance, foreign.cell, shaping.radius)
     told.changed += simple.changed
     if outer is not None:
         straight = simplified(MultiPolygon([outer]), tolerance, foreign.cell, shaping.radius)
@@ -170,6 +174,13 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     free = rounded(simple.free, digits)
     if free.is_empty:
         raise MapError(f"{where}: {read.area:.3g} m² are free, but more was wanted: is the scale right?")
+    _require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT, where)
+    moved = moved_walls(MultiPolygon(parts), free)
+    if moved.distance >= 1e-3:
+        told.changed.append(
+            f"walls moved by at most {moved.distance:.2g} m; {square_metres(moved.area, 2)} changed sides, "
+            f"{100 * moved.area / free.area:.2g} % of the free area"
+        )
     boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
     if outer is not None:
         solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
@@ -184,11 +195,14 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     environment = from_json(to_json(environment), where)
     _note_unreached(environment, shaping.radius, told)
     width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
+    kept = vertex_count(environment)
+    if kept > MANY_VERTICES:
+        told.notes.append(many_vertices(kept))
     report = ImportReport(
         source=where,
         format=foreign.format,
         vertices_read=foreign.vertices_read,
-        vertices_kept=_vertices(environment),
+        vertices_kept=kept,
         area_read=float(read.area),
         area_kept=environment.free_area,
         repaired=tuple(told.repaired),
@@ -198,6 +212,8 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         size=(round(width, digits), round(height, digits)),
         obstacles=len(environment.obstacles),
         tolerance=simple.tolerance,
+        moved_area=moved.area,
+        moved=moved.distance,
         others=tuple(told.others),
     )
     return environment, report
@@ -388,17 +404,18 @@ def _obstacles(solid: list[Polygon], digits: int, told: _Told) -> tuple[PolygonO
     )
 
 
-def _vertices(environment: Environment) -> int:
-    return len(environment.boundary) + sum(
-        len(obstacle.vertices) + sum(map(len, obstacle.holes))
-        for obstacle in environment.obstacles
-        if isinstance(obstacle, PolygonObstacle)
-    )
-
-
 def _clearance(shaping: Shaping) -> float:
     """Return how far from walls a robot starts, m: the rules of maps want room for the usual one."""
     return max(DEFAULT_RADIUS, shaping.radius) * (1 + GAP)
+
+
+def _require_few(count: int, what: str, most: int, where: str) -> None:
+    """Check that a map is none that takes minutes to make, and for ever to simulate."""
+    if count > most:
+        raise MapError(
+            f"{where}: {count} {what}, but at most {most} were wanted: --specks AREA drops small "
+            "obstacles, --simplify METRES draws walls with fewer vertices"
+        )
 
 
 def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
@@ -406,8 +423,8 @@ def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
     clearance = _clearance(shaping)
     widest = 0.0
     for part in parts:
-        if math.sqrt(part.area) > widest:
-            widest = max(widest, shapely.maximum_inscribed_circle(part, tolerance=clearance / 50).length)
+        if math.sqrt(part.area / math.pi) > widest:
+            widest = max(widest, roomiest(part, clearance / 50, clearance)[1])
         if widest >= clearance:
             return
     raise MapError(
@@ -421,21 +438,20 @@ def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
     clearance = _clearance(shaping)
     part = free.geoms[0]
     # what is finer than this does not move a start by much
-    spoke = shapely.maximum_inscribed_circle(part, tolerance=max(0.01, math.sqrt(part.area) / 500))
-    x, y = spoke.coords[0]
+    (x, y), room = roomiest(part, max(0.01, math.sqrt(part.area) / 500))
     # the disc holds centres: one robot's radius stays between it and the walls
-    radius = min(spoke.length - clearance, 2.0)
+    radius = min(room - clearance, 2.0)
     starts: dict[str, StartSpec] = {"uniform": UniformStart()}
     if radius >= 0.02:
-        room = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
-        both: dict[str, StartSpec] = {"room": room, **starts}
+        disc = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+        both: dict[str, StartSpec] = {"room": disc, **starts}
         starts = both if shaping.default_start == "room" else dict(reversed(both.items()))
     return starts
 
 
 def _note_unreached(environment: Environment, radius: float, told: _Told) -> None:
     """Say how much of the free space robots do not reach from where most of it is, if that is soon known."""
-    if _vertices(environment) > _SOON:
+    if vertex_count(environment) > _SOON:
         return
     places = sorted((place.area for place in rooms(environment.free, radius)), reverse=True)[1:]
     if places:
