@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING
 from robocov.errors import MapError, ParameterError, unknown_name
 from robocov.files.strictjson import one_line
 from robocov_app.importers import (
+    argos,
     dxf,
     geojson,
     houseexpo,
+    irsim,
     limits,
     movingai,
     picture,
     rings,
     ros,
+    stage,
     svg,
     wkt,
 )
@@ -47,8 +50,11 @@ __all__ = [
 
 # the first whose `sniff` says yes has it: the surest come first
 _ALL: tuple[Importer, ...] = (
+    irsim.IMPORTER,
     ros.IMPORTER,
     movingai.IMPORTER,
+    stage.IMPORTER,
+    argos.IMPORTER,
     picture.IMPORTER,
     svg.IMPORTER,
     dxf.IMPORTER,

@@ -53,6 +53,7 @@ def foreign_map(
     description: str,
     solid: bool,
     accessible: bool = False,
+    world: MultiPolygon | None = None,
     notes: Sequence[str] = (),
 ) -> ForeignMap:
     """Return the map that the shapes of a file stand for.
@@ -77,6 +78,8 @@ def foreign_map(
         Whether outlines are all free in files of that format, as JuPedSim's accessible area, so that one may
         overlap another: then 2 holds only where all others lie wholly in the largest, which would add nothing
         to it as free space.
+    world : MultiPolygon or None, m
+        What is free before the shapes stand in it, where the format says so: then no boundary is looked for.
     notes : sequence of str
         What else is worth knowing.
 
@@ -88,17 +91,22 @@ def foreign_map(
         When a name in the options is none of the file's.
     """
     shapes.require_known_names()
-    if not shapes.outlines and not shapes.lines:
+    if world is None and not shapes.outlines and not shapes.lines:
         dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
         raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
-    everything = [*(o.area for o in shapes.outlines), *(shapely.linestrings(e.points) for e in shapes.lines)]
+    everything: list[BaseGeometry] = [] if world is None else [world]
+    everything += [o.area for o in shapes.outlines]
+    everything += [shapely.linestrings(line.points) for line in shapes.lines]
     # one of many parts may be a map, if they are not all too far from each other
     _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
     shapes.require_untangled()
     asked = shapes.options.outlines
-    boundary = _named(shapes)
-    if boundary is None and asked != "free":
-        boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
+    if world is not None:
+        boundary: _Enclosure | None = _Enclosure(world, "")
+    else:
+        boundary = _named(shapes)
+        if boundary is None and asked != "free":
+            boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
     if asked is None and not solid:
         solid = not shapes.outlines or (
             boundary is not None and len(shapes.outlines) > len(boundary.outlines)
@@ -125,7 +133,9 @@ def foreign_map(
     if outside:
         shapes.leave_out("shape", "outside of the boundary", outside)
     outer = None
-    if boundary is not None and (solid or boundary.area is not area):
+    # what is free of a grid has its own outline
+    plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
+    if boundary is not None and (solid or boundary.area is not area) and plain:
         outer = Polygon(boundary.area.geoms[0].exterior)
     return ForeignMap(
         name=name,
@@ -151,7 +161,10 @@ def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) ->
 
 def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
     """Return how the shapes were taken."""
-    told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
+    if boundary is not None and not boundary.words:  # the format says what all of it is
+        blocks, told = 0, []
+    else:
+        told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
     if blocks:
         told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
     elif not solid and len(shapes.outlines) > 1:

@@ -28,12 +28,14 @@ class ForeignMap:
     vertices_read : int
         Vertices in the file; of a raster, corners of the outline of its free cells.
     cell : float or None, m
-        Side of a cell, of rasters.
+        Side of a cell, of rasters; of cells that are no squares the longer one.
     specks : float, m²
         Smaller obstacles are noise of how such maps are made, unless somebody says otherwise.
     cut_corners : bool
         Whether corners are cut by a step or two of a grid: simplifying then makes them whole, as
         `robocov_app.importers.corners` does.
+    robots : (n, 2) m
+        Where the file places robots.
     repaired, dropped, notes : tuple of str
         What the reader had to put right, what it left out, and what is worth knowing besides (how
         unknown cells were taken, say): one line each, with counts and areas.
@@ -48,6 +50,7 @@ class ForeignMap:
     cell: float | None = None
     specks: float = 0.0
     cut_corners: bool = False
+    robots: tuple[tuple[float, float], ...] = ()
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

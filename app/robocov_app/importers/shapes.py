@@ -342,12 +342,14 @@ class Shapes:
 
 
 def _many(count: int, thing: str) -> str:
-    """Return how many things there are: of an English noun with y, too.
+    """Return how many things there are: of English nouns with y and x, too.
 
-    >>> _many(2, "empty geometry")
-    '2 empty geometries'
+    >>> _many(2, "empty geometry"), _many(2, "box")
+    ('2 empty geometries', '2 boxes')
     """
-    return f"{count} {thing[:-1]}ies" if count != 1 and thing.endswith("y") else counted(count, thing)
+    if count != 1 and thing.endswith(("y", "x")):
+        return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
+    return counted(count, thing)
 
 
 def folded(labels: Iterable[str]) -> set[str]:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import GAP, DiscStart, StartSpec, UniformStart
+from robocov.environment.starts import GAP, DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, counted, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile import from_json, to_json
@@ -188,7 +189,7 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         name=one_line(foreign.name)[:100].strip() or "map",
         boundary=_ring(boundary.exterior, digits),
         obstacles=_obstacles(solid, digits, told),
-        starts=_starts(free, shaping),
+        starts=_starts(free, shaping, foreign.robots, told),
         description=foreign.description[:10_000],
     )
     # through the rules of map files: what is imported can be saved and loaded
@@ -433,8 +434,10 @@ def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
     )
 
 
-def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
-    """Return the starts: a disc at the roomiest place, and everywhere."""
+def _starts(
+    free: MultiPolygon, shaping: Shaping, robots: tuple[tuple[float, float], ...], told: _Told
+) -> dict[str, StartSpec]:
+    """Return the starts: a disc at the roomiest place, everywhere, and where the file places robots."""
     clearance = _clearance(shaping)
     part = free.geoms[0]
     # what is finer than this does not move a start by much
@@ -446,6 +449,19 @@ def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
         disc = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
         both: dict[str, StartSpec] = {"room": disc, **starts}
         starts = both if shaping.default_start == "room" else dict(reversed(both.items()))
+    if robots:
+        given = list(dict.fromkeys(robots))
+        fits = shapely.contains_properly(free, shapely.points(given))
+        fits &= shapely.distance(free.boundary, shapely.points(given)) >= clearance
+        for one, other in sorted(cKDTree(given).query_pairs(2 * clearance)):
+            fits[other] &= not fits[one]
+        if fits.any():
+            starts["robots"] = PointsStart(
+                tuple(place for place, fit in zip(given, fits, strict=True) if fit)
+            )
+        rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
+        many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
+        told.notes.append(f'start "robots": {many} of robots in the file{rest}')
     return starts
 
 

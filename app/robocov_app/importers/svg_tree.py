@@ -1,4 +1,4 @@
-"""The elements of an SVG file, read by expat with nothing in it that could grow or reach elsewhere."""
+"""The elements of an XML file, read by expat with nothing in it that could grow or reach elsewhere."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 MOST_ELEMENTS = 100_000
@@ -32,7 +32,7 @@ _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of SVG; those of other namespaces are left out when it is read.
+    """An element of SVG, or of a format without namespaces; others are left out when it is read.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Element:
         Their names without namespaces.
     children : list of Element
     text : str
-        Of ``style``, ``title`` and ``desc`` only.
+        Of elements whose text means something only.
     line : int
         Of the file, counted from 1.
     """
@@ -74,24 +74,47 @@ def read_svg_tree(path: Path) -> tuple[Element, str]:
     Raises
     ------
     MapError
-        When it cannot be read, is too large, is not XML or not SVG; when it has entities that stand for other
-        files or other entities, or for too much; or too many elements, or too deep ones.
+        As `read_xml_tree`.
+    """
+    return read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
+
+
+def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> tuple[Element, str]:
+    """Return the root of the XML file at `path`, and what messages call the file.
+
+    Parameters
+    ----------
+    path : Path
+    root : str
+        Tag that the root has.
+    kind : str
+        What messages call the format.
+    texts : collection of str
+        Tags of elements whose text means something.
+
+    Raises
+    ------
+    MapError
+        When it cannot be read, is too large, is not XML or has another root; when it has entities
+        that stand for other files or other entities, or for too much; or too many elements, or too deep ones.
     """
     where = one_line(path)
     content = limits.content(path, limits.MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):
-        raise MapError(f"{where}: compressed, but plain SVG was wanted (gunzip makes it)")
+        raise MapError(f"{where}: compressed, but plain {kind} was wanted (gunzip makes it)")
     if content.count(b"=") > MOST_ATTRIBUTES:
         raise MapError(f"{where}: more than {MOST_ATTRIBUTES} attributes, but fewer were wanted")
-    return _Reader(where, content).root(), where
+    return _Reader(where, content, root, kind, texts).root(), where
 
 
 class _Reader:
     """Builds the tree from what expat tells."""
 
-    def __init__(self, where: str, content: bytes) -> None:
+    def __init__(self, where: str, content: bytes, wanted: str, kind: str, texts: Collection[str]) -> None:
         self.where = where
         self.content = content
+        self.wanted, self.kind = wanted, kind
+        self.texts = texts
         self.references = content.count(b"&")
         self.room = len(content) + _EXPANDED
         self.parser = expat.ParserCreate(namespace_separator=" ")
@@ -104,6 +127,7 @@ class _Reader:
         self.parser.StartNamespaceDeclHandler = self._namespace
         self.declarations = 0
         self.open: list[Element | None] = []
+        self.pieces: list[str] = []
         self.first: Element | None = None
         self.count = 0
 
@@ -115,12 +139,13 @@ class _Reader:
             line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
             reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
             raise MapError(f"{self.where}{line}: not XML: {one_line(reason)[:60]}") from None
-        if self.first is None or self.first.tag != "svg":
+        if self.first is None or self.first.tag != self.wanted:
             found = "other XML" if self.first is None else f"<{self.first.tag}>"
-            raise MapError(f"{self.where}: {found}, but <svg> was wanted")
+            raise MapError(f"{self.where}: {found}, but <{self.wanted}> was wanted")
         return self.first
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self._take_text()
         self.count += 1
         line = self.parser.CurrentLineNumber
         if self.count > MOST_ELEMENTS:
@@ -141,13 +166,19 @@ class _Reader:
         self.open.append(element)
 
     def _end(self, name: str) -> None:
+        self._take_text()
         self.open.pop()
 
     def _text(self, text: str) -> None:
         self._take(len(text))
-        element = self.open[-1]
-        if element is not None and element.tag in ("style", "title", "desc"):
-            element.text += text
+        self.pieces.append(text)
+
+    def _take_text(self) -> None:
+        """Give the innermost element the text since the last tag."""
+        element = self.open[-1] if self.open else None
+        if element is not None and element.tag in self.texts:
+            element.text += "".join(self.pieces)
+        self.pieces.clear()
 
     def _take(self, count: int) -> None:
         """Count characters: entities and default attributes make more of them than the file has."""
@@ -185,4 +216,4 @@ class _Reader:
             self._refuse(f"a namespace of {len(name)} characters")
 
     def _refuse(self, what: str) -> NoReturn:
-        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {what}, but plain SVG was wanted")
+        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {what}, but plain {self.kind} was wanted")
