@@ -24,6 +24,7 @@ from robocov_app.importers import (
     ros,
     stage,
     svg,
+    tmx,
     wkt,
 )
 from robocov_app.importers.foreign import ForeignMap
@@ -55,6 +56,7 @@ _ALL: tuple[Importer, ...] = (
     movingai.IMPORTER,
     stage.IMPORTER,
     argos.IMPORTER,
+    tmx.IMPORTER,
     picture.IMPORTER,
     svg.IMPORTER,
     dxf.IMPORTER,

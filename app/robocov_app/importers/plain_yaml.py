@@ -17,7 +17,7 @@ Value: TypeAlias = "str | list[Value] | dict[str, Value]"
 """Text as it is written, or a list or a mapping of values."""
 
 MAX_BYTES = 262_144
-"""Longest text that is read, in bytes, which takes a second: a map has 200, a world of robots some thousand."""
+"""Longest text that is read, in bytes, which takes a second: a map has 200, a world some thousand."""
 
 DEEPEST = 12
 """Deepest nesting of lists and mappings."""
