@@ -15,6 +15,7 @@ import shapely
 from shapely import MultiPolygon
 
 from robocov.errors import shown
+from robocov.files.strictjson import one_line
 from robocov.mapfile.models import LARGEST
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
@@ -95,7 +96,7 @@ def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, floa
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
     if methods[0] not in ("grid", "constant") or methods[1] != "constant":
-        shapes.leave_out(thing.tag, "that ARGoS places at random", max(quantity, 0))
+        shapes.leave_out(one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
         return
     if not 0 <= quantity <= MOST_PLACED:
         entity.refuse(where, f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")

@@ -150,6 +150,12 @@ def foreign_map(
     )
 
 
+def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
+    """Return what the shapes enclose as walls, else a rectangle around them, m; and that in words."""
+    found = _walled(shapes) or _rectangle(shapes)
+    return found.area, f"the boundary is {found.words}"
+
+
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     """Refuse what no map may be, before it is computed with."""
     x, y, right, top = bounds

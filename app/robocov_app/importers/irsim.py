@@ -164,7 +164,7 @@ def _draw(shape: _Node, frame: Array, shapes: Shapes, labels: list[str]) -> None
         return np.asarray(points @ frame[:2, :2].T + frame[:2, 2])
 
     if shape["random_shape"].text().lower() in _TRUE:
-        shapes.leave_out(name, "of a shape by chance")
+        shapes.leave_out("shape", "by chance")
     elif name == "circle":
         centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
         shapes.add_circle(placed(centre[None])[0], shape["radius"].length(0.2), labels, at=at)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
@@ -120,6 +119,9 @@ class Shaping:
             if self.keep == "all":
                 raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
+
+_MOST_ROBOTS = 1000
+"""Of a file, so many are looked at."""
 
 _ZERO = 1e-100
 """Coordinates nearer to zero, in metres, are zero; as of map files."""
@@ -450,15 +452,13 @@ def _starts(
         both: dict[str, StartSpec] = {"room": disc, **starts}
         starts = both if shaping.default_start == "room" else dict(reversed(both.items()))
     if robots:
-        given = list(dict.fromkeys(robots))
+        given = np.array(list(dict.fromkeys(robots))[:_MOST_ROBOTS])
         fits = shapely.contains_properly(free, shapely.points(given))
         fits &= shapely.distance(free.boundary, shapely.points(given)) >= clearance
-        for one, other in sorted(cKDTree(given).query_pairs(2 * clearance)):
-            fits[other] &= not fits[one]
+        for k in np.flatnonzero(fits).tolist():
+            fits[k] = (np.hypot(*(given[:k][fits[:k]] - given[k]).T) >= 2 * clearance).all()
         if fits.any():
-            starts["robots"] = PointsStart(
-                tuple(place for place, fit in zip(given, fits, strict=True) if fit)
-            )
+            starts["robots"] = PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
         rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
         many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
         told.notes.append(f'start "robots": {many} of robots in the file{rest}')

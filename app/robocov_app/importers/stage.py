@@ -21,7 +21,7 @@ from shapely import MultiPolygon, Polygon
 from robocov.errors import MapError, shown
 from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
-from robocov_app.importers.enclosing import foreign_map
+from robocov_app.importers.enclosing import foreign_map, surrounding
 from robocov_app.importers.fills import polygons_of
 from robocov_app.importers.images import read_picture
 from robocov_app.importers.named_files import named_file
@@ -125,7 +125,7 @@ def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)
     root = world.read()
-    world.place(root.inside, np.eye(3), 0)
+    world.place(root.inside, np.eye(3))
     rooms = sorted(world.rooms, key=lambda room: -room.box.area)
     places = [*(outline.area.representative_point() for outline in shapes.outlines)]
     places += [*(room.box.centroid for room in rooms), *map(shapely.Point, world.robots)]
@@ -134,13 +134,17 @@ def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
         dark = polygons_of(shapely.difference(room.box, room.free)) if room is not main else MultiPolygon()
         if not dark.is_empty:
             shapes.outlines.append(Outline(dark, room.labels))
+    free = None if main is None else main.free
+    if free is None and shapes.outlines:
+        free, words = surrounding(shapes)
+        world.notes.append(words)
     foreign = foreign_map(
         shapes,
         format=IMPORTER.name,
         name=root.text("name") or path.stem,
         description="A world of Stage, imported.",
         solid=True,
-        world=None if main is None else main.free,
+        world=free,
         notes=world.notes,
     )
     cell = max((room.cell for room in rooms if room.cell is not None), default=None)
@@ -246,23 +250,25 @@ class _World:
         entity.properties[name] = [value.text for value in values] or [""]
         return following
 
-    def place(self, entities: list[_Entity], frame: Array, depth: int) -> None:
+    def place(self, entities: list[_Entity], frame: Array) -> None:
         """Place models in the frame of their parent, a (3, 3) matrix to metres, and what is in them."""
         for given in entities:
             entity, labels = self._expanded(given)
             if entity.type in ("window", "block"):
                 continue
             here = frame @ self._pose(entity, "pose")
-            if entity.type == "position":
+            if entity.type not in ("model", "position"):
+                self.shapes.leave_out(one_line(entity.type)[:30])
+            elif not self.shapes.wants(labels):
+                continue
+            elif entity.type == "position":
                 self.robots.append((float(here[0, 2]), float(here[1, 2])))
-            elif entity.type != "model":
-                self.shapes.leave_out(entity.type)
-            elif self.shapes.wants(labels):
+            else:
                 if self._met(entity):
                     self._shape(entity, here @ self._pose(entity, "origin"), labels)
                 else:
                     self.shapes.leave_out("model", "that nothing meets")
-                self.place(entity.inside, here, depth + 1)
+                self.place(entity.inside, here)
 
     def _expanded(self, entity: _Entity) -> tuple[_Entity, tuple[str, ...]]:
         """Return an entity with all that its macros say, and its name and theirs."""
@@ -303,7 +309,7 @@ class _World:
 
         def placed(points: Array) -> Array:
             """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
-            return np.asarray((points * size) @ frame[:2, :2].T + frame[:2, 2])
+            return np.round((points * size) @ frame[:2, :2].T + frame[:2, 2], 9) + 0.0
 
         box = Polygon(placed(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])))
         rings = _blocks(entity)

@@ -172,11 +172,12 @@ class _Map:
                     self._add_cells(full, place, layer.labels)
         grids = [layer for layer in layers if layer.pieces]
         self._add_objects([layer for layer in layers if not layer.pieces], anything=not grids)
+        shapes.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
             raise MapError(
-                f"{self.where}: nothing is solid by its properties, collision objects or the name of its layer, "
-                f"but --only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
+                f"{self.where}: nothing is solid by properties, collision objects or the name of its layer, but "
+                f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
             )
         width, height = (self.pixel * self.tile).tolist()
         world = free_area(~solid, (width, height), (0.0, 0.0), self.where)
@@ -261,7 +262,7 @@ class _Map:
         encoding, packing = (data.attributes.get(key, "") for key in ("encoding", "compression"))
         if encoding == "base64" and packing in ("", "zlib", "gzip"):
             try:
-                raw = binascii.a2b_base64(part.text)
+                raw = binascii.a2b_base64("".join(part.text.split()), strict_mode=True)
                 if packing:  # not more than there should be, whatever is in it
                     raw = zlib.decompressobj(wbits=47).decompress(raw, 4 * count + 1)
             except (ValueError, zlib.error) as error:
