@@ -254,7 +254,7 @@ class _Node:
 IMPORTER = Importer(
     name="irsim",
     title="IR-SIM: YAML of a world, robots and obstacles",
-    suffixes=(".yaml", ".yml"),
+    suffixes=(),  # a .yaml is this by its content only
     sniff=is_irsim,
     read=read_irsim,
     options=frozenset({"thickness", "anywhere", "only", "skip"}),

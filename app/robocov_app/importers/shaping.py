@@ -69,7 +69,8 @@ class Shaping:
         Smaller obstacles, and smaller separate parts of the free space, are dropped; 0 keeps all. None:
         what is noise in maps of that format, as single cells are in those that robots made.
     keep : str
-        ``largest``: the largest connected part of the free space; ``all``: every part.
+        ``largest``: the largest connected part of the free space, or, where the file places robots, the one
+        with most of them; ``all``: every part.
     inside : (x, y) or None, m
         The connected part that holds this place is kept, instead of the largest: in metres of the map, as
         the report and the preview give them.
@@ -157,8 +158,10 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     outer = _valid_boundary(foreign.boundary, told)
     read = _valid(foreign.free, outer, told, where)
     least = foreign.specks if shaping.specks is None else shaping.specks
-    parts = _without_specks(_kept(read, shaping, least, told, where), foreign.cell, least, told)
-    if shaping.inside is not None and outer is not None and outer.contains_properly(parts[0]):
+    kept = _kept(read, shaping, foreign.robots, least, told, where)
+    parts = _without_specks(kept, foreign.cell, least, told)
+    chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
+    if chosen and outer is not None and outer.contains_properly(parts[0]):
         outer = None  # what is around the other parts is not around this one
     _require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES, where)
     _require_room(parts, shaping, where)
@@ -262,14 +265,26 @@ def _reason(geometry: BaseGeometry) -> str:
     return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
 
 
-def _kept(free: MultiPolygon, shaping: Shaping, specks: float, told: _Told, where: str) -> list[Polygon]:
+def _kept(
+    free: MultiPolygon,
+    shaping: Shaping,
+    robots: tuple[tuple[float, float], ...],
+    specks: float,
+    told: _Told,
+    where: str,
+) -> list[Polygon]:
     """Return the parts of the free space that stay, the largest first."""
     parts = np.array(free.geoms, dtype=object)
     area = shapely.area(parts)
     if shaping.inside is not None:
         stays = np.arange(len(parts)) == _part_around(shaping.inside, parts, where)
     elif shaping.keep == "largest":
-        stays = np.arange(len(parts)) == 0
+        shapely.prepare(parts)
+        places = shapely.points(np.array(robots[:_MOST_ROBOTS]).reshape(-1, 2))
+        most = int(np.argmax([shapely.contains(part, places).sum() for part in parts])) if robots else 0
+        stays = np.arange(len(parts)) == most
+        if most:
+            told.notes.append("the part of the free space with most robots stays, which is not the largest")
     else:
         stays = area >= max(specks, min(CRUMB, area[0]))
     kept: list[Polygon] = parts[stays].tolist()

@@ -45,7 +45,7 @@ _DARK = 127 / 255
 """Pixels that are not brighter are solid."""
 
 _TOKEN = re.compile(
-    r"(?P<blank>(?:[ \t\r\n]+|#[^\n]*)+)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
+    r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
     r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])'
 )
 _MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)

@@ -216,4 +216,5 @@ class _Reader:
             self._refuse(f"a namespace of {len(name)} characters")
 
     def _refuse(self, what: str) -> NoReturn:
-        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {what}, but plain {self.kind} was wanted")
+        line = self.parser.CurrentLineNumber
+        raise MapError(f"{self.where}:{line}: {what}, but plain {self.kind} was wanted")

@@ -176,7 +176,7 @@ class _Map:
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
             raise MapError(
-                f"{self.where}: nothing is solid by properties, collision objects or the name of its layer, but "
+                f"{self.where}: nothing is solid by properties, collision objects or names of layers, but "
                 f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
             )
         width, height = (self.pixel * self.tile).tolist()
@@ -269,17 +269,18 @@ class _Map:
                 part.refuse(self.where, f"not {packing or encoding}: {one_line(error)[:60]}")
             ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
         elif encoding == "csv":
+            more = part.text.count(",") > count  # a comma may end it
             with warnings.catch_warnings():
                 warnings.simplefilter("error", DeprecationWarning)
                 try:
-                    numbers = np.fromstring(part.text, dtype=np.int64, sep=",")
+                    numbers = np.fromstring("" if more else part.text, dtype=np.int64, sep=",")
                 except (DeprecationWarning, ValueError, OverflowError):
                     numbers = np.array([-1])
             if len(numbers) and not 0 <= numbers.min() <= numbers.max() < 2**32:
                 part.refuse(
                     self.where, "what is not whole numbers from 0, but those, with commas, were wanted"
                 )
-            ids = numbers.astype(np.uint32)
+            ids = None if more else numbers.astype(np.uint32)
         elif not encoding:
             tiles = [child for child in part.children if child.tag == "tile"]
             ids = np.array([_whole(tile, "gid", self.where, 0, "0") for tile in tiles], np.uint32)

@@ -10,7 +10,7 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.importers import ForeignMap, ReadOptions, detect, import_map
+from robocov_app.importers import ForeignMap, ReadOptions, Shaping, detect, import_map
 from robocov_app.importers.argos import IMPORTER
 
 WALL = '<box id="{}" size="{},{},0.5" movable="false"><body position="{},{},0" orientation="{},0,0"/></box>'
@@ -130,3 +130,16 @@ def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
     assert environment.free_area == pytest.approx(23)
     assert len(environment.obstacles) == 1
     assert (environment.starts["robots"].positions, report.size) == (((0.0, 0.0),), (6.0, 4.0))  # type: ignore[union-attr]
+
+
+def test_the_room_with_the_robots_stays(tmp_path: Path) -> None:
+    # walls within the arena, as in most experiments: around them is more room than in them
+    walls = [WALL.format(k, 2.1, 0.1, 0, y, 0) for k, y in enumerate((-1, 1))]
+    walls += [WALL.format(k, 0.1, 2.1, x, 0, 0) for k, x in enumerate((-1, 1))]
+    path = arena(tmp_path, "".join(walls) + ROBOT.format(0.25, 0.5), '"3,3,1"')
+    environment, report, _ = import_map(path)
+    assert shapely.Polygon(environment.boundary).equals(box(-0.95, -0.95, 0.95, 0.95))
+    assert environment.obstacles == ()
+    assert "the part of the free space with most robots stays, which is not the largest" in report.notes
+    environment, _, _ = import_map(path, shaping=Shaping(keep="all"))
+    assert environment.free_area == pytest.approx(1.9**2 + 9 - 2.1**2, abs=0.02)
