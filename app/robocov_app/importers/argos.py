@@ -16,7 +16,7 @@ from shapely import MultiPolygon
 
 from robocov.errors import shown
 from robocov.files.strictjson import one_line
-from robocov.mapfile.models import LARGEST
+from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes
@@ -106,7 +106,7 @@ def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, floa
     else:
         layout = _numbers(position, "layout", where).astype(int)
         if layout.prod() < quantity or not (layout > 0).all():
-            position.refuse(where, f"a layout for {quantity} was wanted")
+            position.refuse(where, f"layout {layout.tolist()}, but one for {quantity} was wanted")
         gaps = _numbers(position, "distances", where)
         first = _numbers(position, "center", where) + (layout - 1) * gaps / 2
         k = np.arange(quantity)
@@ -152,8 +152,8 @@ def _numbers(element: Element, name: str, where: str, default: str | None = None
         values = np.array([float(part) for part in text.split(",")])
     except ValueError:
         values = np.array([math.nan])
-    if len(values) != count or not np.isfinite(values).all():
-        wanted = "a number was" if count == 1 else f"{count} numbers were"
+    if len(values) != count or not (np.abs(values) <= FARTHEST).all():
+        wanted = "a number within 1e7 was" if count == 1 else f"{count} numbers within 1e7 were"
         element.refuse(where, f"{name} {shown(text)}, but {wanted} wanted")
     return values
 

@@ -17,6 +17,7 @@ from shapely import MultiPolygon
 
 from robocov.errors import MapError, shown
 from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits, plain_yaml
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.images import read_picture
@@ -37,8 +38,6 @@ MOST_OBJECTS = 20_000
 
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
-_LARGEST = 1e100
-"""Numbers that can be calculated with are smaller."""
 
 
 def is_irsim(path: Path, head: bytes) -> bool:
@@ -231,8 +230,8 @@ class _Node:
             value = float(self.text(str(default)))
         except ValueError:
             value = math.nan
-        if not abs(value) <= _LARGEST:
-            self.refuse("a number")
+        if not abs(value) <= FARTHEST:
+            self.refuse("a number within 1e7")
         return value
 
     def length(self, default: float) -> float:

@@ -20,6 +20,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError, shown
 from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits
 from robocov_app.importers.enclosing import foreign_map, surrounding
 from robocov_app.importers.fills import polygons_of
@@ -82,8 +83,8 @@ class _Entity:
             values = np.array([*map(float, given), *default[len(given) :]])
         except ValueError:
             values = np.array([math.nan])
-        if not np.isfinite(values).all():
-            raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers were wanted")
+        if not (np.abs(values) <= FARTHEST).all():
+            raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers within 1e7 were wanted")
         return values
 
     def number(self, name: str, default: float) -> float:
@@ -250,10 +251,12 @@ class _World:
         entity.properties[name] = [value.text for value in values] or [""]
         return following
 
-    def place(self, entities: list[_Entity], frame: Array) -> None:
+    def place(self, entities: list[_Entity], frame: Array, depth: int = 0) -> None:
         """Place models in the frame of their parent, a (3, 3) matrix to metres, and what is in them."""
         for given in entities:
             entity, labels = self._expanded(given)
+            if depth > limits.MAX_DEPTH:
+                raise MapError(f"{entity.at}: in more than {limits.MAX_DEPTH} models, but fewer were wanted")
             if entity.type in ("window", "block"):
                 continue
             here = frame @ self._pose(entity, "pose")
@@ -268,7 +271,7 @@ class _World:
                     self._shape(entity, here @ self._pose(entity, "origin"), labels)
                 else:
                     self.shapes.leave_out("model", "that nothing meets")
-                self.place(entity.inside, here)
+                self.place(entity.inside, here, depth + 1)
 
     def _expanded(self, entity: _Entity) -> tuple[_Entity, tuple[str, ...]]:
         """Return an entity with all that its macros say, and its name and theirs."""

@@ -93,13 +93,13 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
     [
         (POST, None),  # without a body it is nowhere
         (WALL.format("a", 0, 1, 0, 0, 0), "test.argos:4: <box> 'a': size '0,1,0.5', but lengths above 0"),
-        (WALL.format("a", "x", 1, 0, 0, 0), "size 'x,1,0.5', but 3 numbers were wanted"),
-        (WALL.format("a", 1, 1, "0,0", 0, 0), "position '0,0,0,0', but 3 numbers were wanted"),
+        (WALL.format("a", "x", 1, 0, 0, 0), "size 'x,1,0.5', but 3 numbers within 1e7 were wanted"),
+        (WALL.format("a", 1, 1, "0,0", 0, 0), "position '0,0,0,0', but 3 numbers within 1e7 were wanted"),
         ('<cylinder id="c" height="1"><body/></cylinder>', "no radius, but one was wanted"),
         (WALL.format("a", 1, 1, "nan", 0, 0), "position 'nan,0,0', but 3 numbers"),
-        (WALL.format("a", 1, 1, "1e8", 0, 0), "line 4: a point at [1e+08, -0.5] m"),
-        (distribute(GRID, 5, POST), "<position>: a layout for 5 was wanted"),
-        (distribute(GRID, 10**9, POST), "quantity 1000000000, but a number from 0 to 20000"),
+        (WALL.format("a", 1, 1, "1e8", 0, 0), "position '1e8,0,0', but 3 numbers within 1e7"),
+        (distribute(GRID, 5, POST), "<position>: layout [2, 2, 1], but one for 5 was wanted"),
+        (distribute(GRID, 10**6, POST), "quantity 1000000, but a number from 0 to 20000"),
         (
             distribute("", 5, POST),
             "<distribute>: <position>, <orientation> and <entity> with something in it",

@@ -160,7 +160,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
         ("model ( )\n)", ":2: '\\)', but the name of a model"),
         ("model ( pose [1 2 0 0 )", ":1: 'pose', but a \\] after its values"),
         ("model ( pose [1 x 0 0] )", ":1: 'pose', but a value"),
-        ('model ( size ["a" 1] )', ":1: size 'a 1', but numbers"),
+        ('model ( size ["a" 1] )', ":1: size 'a 1', but numbers within 1e7"),
         ("model ( size [0 1] )", ":1: size: 0.0, but a number from"),
         ("model ( ) ~", ":1: '~', but a word, a number or a bracket"),
         ("\ndefine a b ( )\ndefine b a ( )\na ( )", ":4: 'a' is made of itself"),
@@ -170,12 +170,14 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
         ("include model\nmodel ( )", "a file to include"),
         ("window ( )", "but a drawing was wanted"),
         ("model ( " * 40, "nested deeper than 32"),
+        ("define a model ( a ( ) )\na ( )", ":1: in more than 32 models"),
+        ("model ( pose [1e300 0 0 0] )", "pose '1e300 0 0 0', but numbers within"),
         (
             "define a model ( b ( ) b ( ) ) define b model ( c ( ) c ( ) )" + "a ( )" * 9000,
             "more than 20000 models",
         ),
     ],
-    ids=range(15),
+    ids=range(17),
 )
 def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, wanted: str) -> None:
     path = tmp_path / "hall.world"
