@@ -105,7 +105,7 @@ def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, floa
         places = [_numbers(position, "values", where)] * quantity
     else:
         layout = _numbers(position, "layout", where).astype(int)
-        if layout.prod() < quantity or not (layout > 0).all():
+        if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
             position.refuse(where, f"layout {layout.tolist()}, but one for {quantity} was wanted")
         gaps = _numbers(position, "distances", where)
         first = _numbers(position, "center", where) + (layout - 1) * gaps / 2
