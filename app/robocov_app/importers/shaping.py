@@ -158,8 +158,8 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     outer = _valid_boundary(foreign.boundary, told)
     read = _valid(foreign.free, outer, told, where)
     least = foreign.specks if shaping.specks is None else shaping.specks
-    kept = _kept(read, shaping, foreign.robots, least, told, where)
-    parts = _without_specks(kept, foreign.cell, least, told)
+    parts = _kept(read, shaping, foreign.robots, least, told, where)
+    parts = _without_specks(parts, foreign.cell, least, told)
     chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
     if chosen and outer is not None and outer.contains_properly(parts[0]):
         outer = None  # what is around the other parts is not around this one
