@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov_app.importers.foreign import ForeignMap
 
-MOST_PLACED = 20_000
+MOST_PLACED = 4_000
 """Entities that a file places in a grid or at one place."""
 
 _UPRIGHT = 1e-6

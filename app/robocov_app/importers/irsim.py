@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from robocov_app.importers.foreign import ForeignMap
     from robocov_app.importers.plain_yaml import Value
 
-MOST_OBJECTS = 20_000
+MOST_OBJECTS = 4_000
 """Robots and obstacles of a world."""
 
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)

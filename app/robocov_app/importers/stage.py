@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 5_000_000
 """Largest file of a world, in bytes."""
 
-MOST_TOKENS, MOST_ENTITIES = 200_000, 20_000
+MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000
 """Words and numbers in a world and all that it includes; models and blocks that macros make of them."""
 
 _DARK = 127 / 255

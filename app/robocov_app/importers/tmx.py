@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000
 """Of a map, and of all its layers together."""
 
-MOST_PARTS = 20_000
+MOST_PARTS = 10_000
 """Collision objects of tiles, each as often as its tile is on the map."""
 
 CELL = 1.0

@@ -99,7 +99,7 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
         (WALL.format("a", 1, 1, "nan", 0, 0), "position 'nan,0,0', but 3 numbers"),
         (WALL.format("a", 1, 1, "1e8", 0, 0), "position '1e8,0,0', but 3 numbers within 1e7"),
         (distribute(GRID, 5, POST), "<position>: layout [2, 2, 1], but one for 5 was wanted"),
-        (distribute(GRID, 10**6, POST), "quantity 1000000, but a number from 0 to 20000"),
+        (distribute(GRID, 10**6, POST), "quantity 1000000, but a number from 0 to 4000"),
         (
             distribute("", 5, POST),
             "<distribute>: <position>, <orientation> and <entity> with something in it",

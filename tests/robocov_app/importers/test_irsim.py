@@ -163,7 +163,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
         ("obstacle:\n  - {state: [1]}", "obstacle[0].state: ['1'], but 3 numbers"),
         ("obstacle:\n  - {state: [.nan, 1]}", "obstacle[0].state[0]: '.nan', but a number"),
         ("obstacle:\n  - {state: [1e9, 1]}", "obstacle[0].state[0]: '1e9', but a number within 1e7"),
-        ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but at most 20000 objects"),
+        ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but at most 4000 objects"),
         ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: 'x', but manual"),
         ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: [['0', '0']], but "),
         ("obstacle:\n  - &a {shape: *a}", "line 7: an anchor or alias"),

@@ -174,7 +174,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
         ("model ( pose [1e300 0 0 0] )", "pose '1e300 0 0 0', but numbers within"),
         (
             "define a model ( b ( ) b ( ) ) define b model ( c ( ) c ( ) )" + "a ( )" * 9000,
-            "more than 20000 models",
+            "more than 10000 models",
         ),
     ],
     ids=range(17),
