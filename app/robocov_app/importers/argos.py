@@ -20,7 +20,7 @@ from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes
-from robocov_app.importers.svg_tree import Element, read_xml_tree
+from robocov_app.importers.xml_tree import Element, read_xml_tree
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -25,7 +25,7 @@ from robocov_app.importers.svg_numbers import (
 )
 from robocov_app.importers.svg_path import MOST_DRAWS, subpaths
 from robocov_app.importers.svg_style import INHERITED, Style, StyleSheet, inherited, is_hidden, is_painted
-from robocov_app.importers.svg_tree import DEEPEST, MOST_ELEMENTS, Element
+from robocov_app.importers.xml_tree import DEEPEST, MOST_ELEMENTS, Element
 
 if TYPE_CHECKING:
     from robocov.arrays import Array

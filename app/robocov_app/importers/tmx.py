@@ -27,7 +27,7 @@ from robocov_app.importers.named_files import named_file
 from robocov_app.importers.raster import free_area, vertices_of
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Line, Outline, Shapes, folded
-from robocov_app.importers.svg_tree import Element, read_xml_tree
+from robocov_app.importers.xml_tree import Element, read_xml_tree
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

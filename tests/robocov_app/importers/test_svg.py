@@ -14,7 +14,7 @@ from vector_files import read, svg
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov_app.importers import IMPORTERS, ForeignMap, ReadOptions, detect
-from robocov_app.importers.svg_tree import DEEPEST, MOST_ELEMENTS
+from robocov_app.importers.xml_tree import DEEPEST, MOST_ELEMENTS
 
 PAGE = '<rect width="1000" height="600" fill="white"/>'
 BLOCK, WALL = box(1, 4, 3, 5), box(1, 4.9, 3, 5.1)
