@@ -16,7 +16,7 @@ from shapely import MultiPolygon
 
 from robocov.errors import shown
 from robocov.files.strictjson import one_line
-from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov.mapfile.models import LARGEST
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes
@@ -63,17 +63,26 @@ def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
     if arena is None:
         root.refuse(where, "no <arena>, but one was wanted")
     shapes = Shapes(where, options)
-    size, centre = _lengths(arena, "size", where)[:2], _numbers(arena, "center", where, "0,0,0")[:2]
+    size, centre = (
+        _lengths(arena, "size", where)[:2],
+        arena.numbers(where, "center", count=3, default="0,0,0")[:2],
+    )
     corner = centre - size / 2
     robots: list[tuple[float, float]] = []
     for child in arena.children:
         if child.tag == "distribute":
             _distribute(child, shapes, robots)
         else:
-            body = _child(child, "body")
+            body = child.child("body")
             if body is not None:
-                position = _numbers(body, "position", where, "0,0,0")
-                _place(child, position, _numbers(body, "orientation", where, "0,0,0"), shapes, robots)
+                position = body.numbers(where, "position", count=3, default="0,0,0")
+                _place(
+                    child,
+                    position,
+                    body.numbers(where, "orientation", count=3, default="0,0,0"),
+                    shapes,
+                    robots,
+                )
     foreign = foreign_map(
         shapes,
         format=IMPORTER.name,
@@ -88,11 +97,11 @@ def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
 def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, float]]) -> None:
     """Place what ARGoS would, where that is no matter of chance."""
     where = shapes.where
-    parts = {tag: _child(element, tag) for tag in ("position", "orientation", "entity")}
+    parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
     position, orientation, entity = parts.values()
     if position is None or orientation is None or entity is None or not entity.children:
         element.refuse(where, "<position>, <orientation> and <entity> with something in it were wanted")
-    quantity = int(_numbers(entity, "quantity", where, count=1)[0])
+    quantity = int(entity.numbers(where, "quantity", count=1)[0])
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
     if methods[0] not in ("grid", "constant") or methods[1] != "constant":
@@ -100,15 +109,15 @@ def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, floa
         return
     if not 0 <= quantity <= MOST_PLACED:
         entity.refuse(where, f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
-    turn = _numbers(orientation, "values", where)
+    turn = orientation.numbers(where, "values", count=3)
     if methods[0] == "constant":
-        places = [_numbers(position, "values", where)] * quantity
+        places = [position.numbers(where, "values", count=3)] * quantity
     else:
-        layout = _numbers(position, "layout", where).astype(int)
+        layout = position.numbers(where, "layout", count=3).astype(int)
         if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
             position.refuse(where, f"layout {layout.tolist()}, but one for {quantity} was wanted")
-        gaps = _numbers(position, "distances", where)
-        first = _numbers(position, "center", where) + (layout - 1) * gaps / 2
+        gaps = position.numbers(where, "distances", count=3)
+        first = position.numbers(where, "center", count=3) + (layout - 1) * gaps / 2
         k = np.arange(quantity)
         steps = [k % layout[0], k // layout[0] % layout[1], k // (layout[0] * layout[1])]
         places = [*(first - np.column_stack(steps) * gaps)]
@@ -139,27 +148,8 @@ def _place(
         shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")
 
 
-def _child(element: Element, tag: str) -> Element | None:
-    return next((child for child in element.children if child.tag == tag), None)
-
-
-def _numbers(element: Element, name: str, where: str, default: str | None = None, count: int = 3) -> Array:
-    """Return the numbers of an attribute, which commas separate."""
-    text = element.attributes.get(name, default)
-    if text is None:
-        element.refuse(where, f"no {name}, but one was wanted")
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.array([math.nan])
-    if len(values) != count or not (np.abs(values) <= FARTHEST).all():
-        wanted = "a number within 1e7 was" if count == 1 else f"{count} numbers within 1e7 were"
-        element.refuse(where, f"{name} {shown(text)}, but {wanted} wanted")
-    return values
-
-
 def _lengths(element: Element, name: str, where: str, count: int = 3) -> Array:
-    values = _numbers(element, name, where, count=count)
+    values = element.numbers(where, name, count=count)
     if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
         element.refuse(where, f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
     return values

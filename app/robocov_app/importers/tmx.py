@@ -11,29 +11,26 @@ import math
 import re
 import warnings
 import zlib
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-import shapely
+from numpy.typing import NDArray
 
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, listed, shown
+from robocov.errors import MapError, ParameterError, counted, listed, shown
 from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
 from robocov_app.importers.enclosing import foreign_map
-from robocov_app.importers.fills import polygons_of
 from robocov_app.importers.named_files import named_file
 from robocov_app.importers.raster import free_area, vertices_of
 from robocov_app.importers.reading import Importer, ReadOptions
-from robocov_app.importers.shapes import Line, Outline, Shapes, folded
+from robocov_app.importers.shapes import Line, Shapes, folded
 from robocov_app.importers.xml_tree import Element, read_xml_tree
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from robocov.arrays import Array, BoolArray
     from robocov_app.importers.foreign import ForeignMap
@@ -42,7 +39,7 @@ MOST_TILES, MOST_READ = 4_000_000, 16_000_000
 """Of a map, and of all its layers together."""
 
 MOST_PARTS = 10_000
-"""Collision objects of tiles, each as often as its tile is on the map."""
+"""Collision objects of tiles, each as often as its tile is on the map, and tiles beside the grid."""
 
 CELL = 1.0
 """Width of a tile in metres where none is given: the format has only pixels."""
@@ -50,7 +47,6 @@ CELL = 1.0
 _FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
 """How a tile is turned, and which one it is, in a global tile ID."""
 
-_FARTHEST = 1e9
 _RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 _ROOT = re.compile(rb"<map[\s>]")
 _SOLID = re.compile(
@@ -59,6 +55,8 @@ _SOLID = re.compile(
 )
 _DISC = CircleObstacle((0.0, 0.0), 1.0).polygon
 _START = re.compile(r"(robot|start|spawn)s?")
+
+_IDs: TypeAlias = NDArray[np.uint32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +87,12 @@ class _Layer:
         To the right and down.
     wall : bool
         Whether it is asked for, or says itself that it is solid.
-    pieces : list of (column, row, IDs)
-        Of tiles: (rows, columns) global IDs, and where the upper left one is.
     """
 
     element: Element
     labels: tuple[str, ...]
     offset: Array
     wall: bool
-    pieces: list[tuple[int, int, NDArray[np.uint32]]] = field(default_factory=list)
 
 
 def is_tmx(path: Path, head: bytes) -> bool:
@@ -151,27 +146,17 @@ class _Map:
         self.pixel = options.scale or (options.cell or CELL) / float(self.tile[0])
         limits.require_length(self.pixel * float(self.tile.max()), f"{self.where}: the side of a tile")
         self.corner = np.zeros(2)
+        self.shape = (0, 0)
 
     def read(self) -> ForeignMap:
         """Return the map."""
         shapes, tiles = self.shapes, self._tiles()
         layers = [*self._layers(self.root, (), np.zeros(2), wall=False)]
-        left, top, right, bottom = self._extent(layers)
-        self.corner = np.array([left, bottom]) * self.tile
-        solid = np.zeros((bottom - top, right - left), dtype=bool)
-        for layer in layers:
-            marked = any(np.isin(ids & _ID, [*tiles]).any() for _, _, ids in layer.pieces)
-            for x, y, ids in layer.pieces:
-                place = np.array([x, y]) * self.tile + layer.offset
-                full = (
-                    self._full(ids, tiles, place, layer.labels) if marked else (ids & _ID != 0) & layer.wall
-                )
-                if not layer.offset.any():
-                    solid[y - top : y - top + len(ids), x - left : x - left + ids.shape[1]] |= full
-                elif full.any():
-                    self._add_cells(full, place, layer.labels)
-        grids = [layer for layer in layers if layer.pieces]
-        self._add_objects([layer for layer in layers if not layer.pieces], anything=not grids)
+        grids = self._grids([layer for layer in layers if layer.element.tag == "layer"])
+        solid = np.zeros(self.shape, dtype=bool)
+        for layer, ids in grids:
+            solid |= self._solid(layer, ids, tiles)
+        self._add_objects([layer for layer in layers if layer.element.tag != "layer"], anything=not grids)
         shapes.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
@@ -209,10 +194,10 @@ class _Map:
                 self.notes += [] if note is None else [note]
                 tileset, where = read_xml_tree(file, "tileset", "TSX")
             size = np.array([_number(tileset, name, where) for name in ("tilewidth", "tileheight")])
-            drawn = _child(tileset, "tileoffset")
+            drawn = tileset.child("tileoffset")
             offset = np.array([0.0 if drawn is None else _number(drawn, name, where) for name in "xy"])
             for tile in tileset.children:
-                group = _child(tile, "objectgroup") if tile.tag == "tile" else None
+                group = tile.child("objectgroup") if tile.tag == "tile" else None
                 parts = () if group is None else tuple(group.children)
                 if tile.tag == "tile" and (parts or _says_solid(tile)):
                     found[first + _whole(tile, "id", where, 0)] = _Tile(parts, size, offset, where)
@@ -237,27 +222,60 @@ class _Map:
             elif element.tag == "group":
                 yield from self._layers(element, names, moved, wall=says)
             elif element.tag == "objectgroup" or only is None or says:
-                layer = _Layer(element, names, moved, says)
-                if element.tag == "layer":
-                    layer.pieces.extend(self._pieces(element))
-                yield layer
+                yield _Layer(element, names, moved, says)
 
-    def _pieces(self, layer: Element) -> Iterator[tuple[int, int, NDArray[np.uint32]]]:
-        """Yield the tiles of a layer: all, or, of an infinite map, chunk by chunk."""
-        data = _child(layer, "data")
+    def _grids(self, layers: list[_Layer]) -> list[tuple[_Layer, _IDs]]:
+        """Return layers of tiles with global IDs, (rows, columns) of the map, whose corner it finds."""
+        given = [(layer, [*self._pieces(layer.element)]) for layer in layers]
+        pieces = [piece for _, some in given for piece in some]
+        left, top, right, bottom = (
+            0,
+            0,
+            *(_whole(self.root, name, self.where, 1) for name in ("width", "height")),
+        )
+        infinite = bool(pieces) and self.root.attributes.get("infinite", "0") != "0"
+        if infinite:
+            left, top = min(x for x, _, _ in pieces), min(y for _, y, _ in pieces)
+            right, bottom = (max(piece[k] + piece[2].shape[1 - k] for piece in pieces) for k in (0, 1))
+        elif any((x, y, *ids.shape) != (0, 0, bottom, right) for x, y, ids in pieces):
+            what = f"a layer of another size, but one of {right} x {bottom} tiles was wanted"
+            self.root.refuse(self.where, what)
+        self.shape = bottom - top, right - left
+        if math.prod(self.shape) > MOST_TILES or math.prod(self.shape) * len(given) > MOST_READ:
+            what = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
+            self.root.refuse(self.where, f"{what}, but fewer were wanted")
+        grids = []
+        for layer, some in given:
+            grid = np.zeros(self.shape, np.uint32)
+            for x, y, ids in some:
+                grid[y - top : y - top + len(ids), x - left : x - left + ids.shape[1]] = ids
+            grids.append((layer, grid))
+        used = np.logical_or.reduce([grid & _ID != 0 for _, grid in grids]) if infinite else np.empty((0, 0))
+        if used.any():  # chunks have empty edges
+            (top_, end), (left_, side) = (
+                np.flatnonzero(used.any(axis=axis))[[0, -1]].tolist() for axis in (1, 0)
+            )
+            grids = [(layer, grid[top_ : end + 1, left_ : side + 1]) for layer, grid in grids]
+            left, bottom, self.shape = left + left_, top + end + 1, grids[0][1].shape
+        self.corner = np.array([left, bottom]) * self.tile
+        return grids
+
+    def _pieces(self, layer: Element) -> Iterator[tuple[int, int, _IDs]]:
+        """Yield the tiles of a layer: all, or, of an infinite map, chunk by chunk, with column and row."""
+        data = layer.child("data")
         chunks = [] if data is None else [child for child in data.children if child.tag == "chunk"]
         for part in chunks or ([] if data is None else [data]):
             sized = part if chunks else layer
             width, height = (_whole(sized, name, self.where, 1) for name in ("width", "height"))
             self.tiles_read += width * height
             if self.tiles_read > MOST_READ:
-                layer.refuse(
+                part.refuse(
                     self.where, f"with those before more than {MOST_READ} tiles, but fewer were wanted"
                 )
             x, y = (_whole(part, name, self.where, -MOST_READ, "0") for name in "xy") if chunks else (0, 0)
             yield x, y, self._decoded(part, data or part, width * height).reshape(height, width)
 
-    def _decoded(self, part: Element, data: Element, count: int) -> NDArray[np.uint32]:
+    def _decoded(self, part: Element, data: Element, count: int) -> _IDs:
         """Return the global IDs of so many tiles."""
         encoding, packing = (data.attributes.get(key, "") for key in ("encoding", "compression"))
         if encoding == "base64" and packing in ("", "zlib", "gzip"):
@@ -292,74 +310,42 @@ class _Map:
             part.refuse(self.where, f"{found} tiles, but {count}, as it says, were wanted")
         return ids
 
-    def _extent(self, layers: list[_Layer]) -> tuple[int, int, int, int]:
-        """Return the first and last columns and rows of the map: left, top, right, bottom."""
-        pieces = [piece for layer in layers for piece in layer.pieces]
-        right, bottom = (_whole(self.root, name, self.where, 1) for name in ("width", "height"))
-        left = top = 0
-        if self.root.attributes.get("infinite", "0") != "0":
-            across: list[int] = []
-            down: list[int] = []
-            for x, y, ids in pieces:
-                row, column = np.nonzero(ids & _ID)
-                across += [x + int(end) for end in (column.min(), column.max())] if len(column) else []
-                down += [y + int(end) for end in (row.min(), row.max())] if len(row) else []
-            if across:
-                left, right, top, bottom = min(across), max(across) + 1, min(down), max(down) + 1
-                for layer in layers:
-                    layer.pieces[:] = [_cut(piece, left, top, right, bottom) for piece in layer.pieces]
-        elif any((x, y, *ids.shape) != (0, 0, bottom, right) for x, y, ids in pieces):
-            self.root.refuse(
-                self.where, f"a layer of another size, but one of {right} x {bottom} tiles was wanted"
-            )
-        if (right - left) * (bottom - top) > MOST_TILES:
-            most = f"at most {MOST_TILES // 1_000_000} million were wanted"
-            self.root.refuse(self.where, f"{right - left} x {bottom - top} tiles, but {most}")
-        return left, top, right, bottom
-
     def _metres(self, points: Array) -> Array:
         """Return (n, 2) places in pixels, y down, in metres on the map."""
         return np.asarray((points - self.corner) * [self.pixel, -self.pixel])
 
-    def _full(
-        self, ids: NDArray[np.uint32], tiles: dict[int, _Tile], place: Array, labels: tuple[str, ...]
-    ) -> BoolArray:
-        """Return which cells are solid as a whole, and add the parts of the others."""
+    def _solid(self, layer: _Layer, ids: _IDs, tiles: dict[int, _Tile]) -> BoolArray:
+        """Return which cells a layer makes solid as a whole, and add what it makes solid besides."""
+        place = self.corner - [0.0, self.shape[0] * self.tile[1]] + layer.offset
         full = np.isin(ids & _ID, [gid for gid, tile in tiles.items() if not tile.parts])
+        if not np.isin(ids & _ID, [*tiles]).any():
+            full = (ids & _ID != 0) & layer.wall
         for gid in np.unique(ids).tolist():
             tile = tiles.get(gid & _ID)
             if tile is None or not tile.parts:
                 continue
             figures = [_figure(part, tile.where) for part in tile.parts]
-            if any(
-                figure is not None and np.array_equal(figure[1], _RECTANGLE * self.tile) for figure in figures
-            ):
+            if any(figure and np.array_equal(figure[1], _RECTANGLE * self.tile) for figure in figures):
                 full |= ids == gid
                 continue
             for row, column in np.argwhere(ids == gid).tolist():
                 corner = place + [column, row + 1] * self.tile - [0.0, tile.size[1]] + tile.offset
-                self.parts += len(figures)
-                if self.parts > MOST_PARTS:
-                    self.root.refuse(
-                        self.where,
-                        f"more than {MOST_PARTS} collision objects of tiles, but fewer were wanted",
-                    )
                 for part, figure in zip(tile.parts, figures, strict=True):
-                    self._add(
-                        part, figure and (figure[0], corner + _turned(figure[1], gid, tile.size)), labels
-                    )
+                    turned = figure and (figure[0], corner + _turned(figure[1], gid, tile.size))
+                    self._add_part(part, turned, layer.labels)
+        if layer.offset.any():  # beside the grid
+            for row, column in np.argwhere(full).tolist():
+                cell = "polygon", place + (_RECTANGLE + [column, row]) * self.tile
+                self._add_part(layer.element, cell, layer.labels)
+            full = np.zeros_like(full)
         return full
 
-    def _add_cells(self, full: BoolArray, place: Array, labels: tuple[str, ...]) -> None:
-        """Add solid cells that lie beside the grid of the map, the upper left one at a place in pixels."""
-        (rows, columns), (width, height) = full.shape, (self.pixel * self.tile).tolist()
-        x, y = self._metres(place + self.tile * [0, rows]).tolist()
-        dark = shapely.box(x, y, x + columns * width, y + rows * height)
-        if not full.all():
-            dark = shapely.difference(dark, free_area(~full, (width, height), (x, y), self.where))
-        self.shapes.outlines.append(Outline(polygons_of(dark), labels))
-        self.shapes.vertices += vertices_of(self.shapes.outlines[-1].area)
-        limits.require_drawn(self.shapes.vertices, self.where)
+    def _add_part(self, element: Element, figure: tuple[str, Array] | None, labels: tuple[str, ...]) -> None:
+        """Add a part of a layer that is no cell of the grid."""
+        self.parts += 1
+        if self.parts > MOST_PARTS:
+            self.root.refuse(self.where, f"more than {MOST_PARTS} parts of tiles, but fewer were wanted")
+        self._add(element, figure, labels)
 
     def _add_objects(self, layers: list[_Layer], *, anything: bool) -> None:
         """Add the objects that are solid, or all; those that are called robots are places to start."""
@@ -399,25 +385,13 @@ class _Map:
             shapes.leave_out("object", "of text, a template or without an area")
 
 
-def _cut(
-    piece: tuple[int, int, NDArray[np.uint32]], left: int, top: int, right: int, bottom: int
-) -> tuple[int, int, NDArray[np.uint32]]:
-    """Return what of a piece is between columns and rows."""
-    x, y, ids = piece
-    rows, columns = (
-        slice(max(low - at, 0), max(high - at, 0)) for low, high, at in ((top, bottom, y), (left, right, x))
-    )
-    return max(x, left), max(y, top), ids[rows, columns]
-
-
 def _figure(element: Element, where: str) -> tuple[str, Array] | None:
     """Return the kind of an object and its points in pixels, of a circle the centre and one of the rim.
 
     It is a polygon, a line, a circle or a point; None is something else.
     """
-    x, y, width, height, turn = (
-        _number(element, name, where) for name in ("x", "y", "width", "height", "rotation")
-    )
+    names = ("x", "y", "width", "height", "rotation")
+    x, y, width, height, turn = (_number(element, name, where) for name in names)
     kind, points = "polygon", _RECTANGLE * [width, height]
     children = {child.tag: child for child in element.children}
     if "template" in element.attributes or children.keys() & {"text", "capsule"}:
@@ -433,7 +407,10 @@ def _figure(element: Element, where: str) -> tuple[str, Array] | None:
             kind, points = "polygon", np.asarray(_DISC.exterior.coords)[:-1] * middle + middle
     for tag, name, least in (("polygon", "polygon", 3), ("polyline", "line", 2)):
         if tag in children:
-            kind, points = name, _points(children[tag], where, least)
+            flat = children[tag].numbers(where, "points")
+            if len(flat) % 2 or len(flat) < 2 * least:
+                children[tag].refuse(where, f"points: {len(flat)} numbers, but {least} points were wanted")
+            kind, points = name, flat.reshape(-1, 2)
     cos, sin = math.cos(math.radians(turn)), math.sin(math.radians(turn))
     return kind, points @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
 
@@ -453,7 +430,7 @@ def _says_solid(element: Element, names: Iterable[str] = ()) -> bool:
     classes = [element.attributes.get(key, "") for key in ("class", "type")]
     if any(_SOLID.fullmatch(_plain(name)) for name in (*names, *classes)):
         return True
-    properties = _child(element, "properties")
+    properties = element.child("properties")
     return properties is not None and any(
         _SOLID.fullmatch(_plain(child.attributes.get("name", "")))
         and child.attributes.get("value", "").casefold() not in ("false", "0", "no")
@@ -465,36 +442,8 @@ def _plain(name: str) -> str:
     return re.sub(r"[\W\d_]", "", name.casefold())
 
 
-def _child(element: Element, tag: str) -> Element | None:
-    return next((child for child in element.children if child.tag == tag), None)
-
-
-def _points(element: Element, where: str, least: int) -> Array:
-    """Return the points of an attribute: x,y x,y."""
-    text = element.attributes.get("points", "")
-    try:
-        points = np.array([[float(number) for number in pair.split(",")] for pair in text.split()])
-    except ValueError:
-        points = np.empty(0)
-    if (
-        points.ndim != 2
-        or points.shape[1] != 2
-        or len(points) < least
-        or not (abs(points) <= _FARTHEST).all()
-    ):
-        element.refuse(where, f"points {shown(text)}, but at least {least}, as x,y x,y, were wanted")
-    return points
-
-
 def _number(element: Element, name: str, where: str) -> float:
-    text = element.attributes.get(name, "0")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= _FARTHEST:
-        element.refuse(where, f"{name} {shown(text)}, but a number was wanted")
-    return value
+    return float(element.numbers(where, name, count=1, default="0")[0])
 
 
 def _whole(element: Element, name: str, where: str, least: int, default: str = "") -> int:

@@ -6,13 +6,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NoReturn
 from xml.parsers import expat
 
+import numpy as np
+
 from robocov.errors import MapError, shown
 from robocov.files.strictjson import one_line
+from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from pathlib import Path
+
+    from robocov.arrays import Array
 
 MOST_ELEMENTS = 100_000
 """In a file, and drawn of it where parts are used again."""
@@ -60,6 +65,43 @@ class Element:
             element = waiting.pop()
             yield element
             waiting += reversed(element.children)
+
+    def child(self, tag: str) -> Element | None:
+        """Return the first child with a tag, if there is one."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def numbers(
+        self, where: str, name: str, *, count: int | None = None, default: str | None = None
+    ) -> Array:
+        """Return the numbers of an attribute, which commas or blanks separate.
+
+        Parameters
+        ----------
+        where : str
+            What messages call the file.
+        name : str
+        count : int or None
+            So many are wanted.
+        default : str or None
+            What stands for an attribute that is missing.
+
+        Raises
+        ------
+        MapError
+            When there are no such numbers, or one is too large for a map.
+        """
+        text = self.attributes.get(name, default)
+        try:
+            values = np.array([float(part) for part in (text or "").replace(",", " ").split()])
+        except ValueError:
+            values = np.array([np.nan])
+        if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
+            found = "missing" if text is None else shown(text)
+            wanted = "numbers" if count is None else "a number" if count == 1 else f"{count} numbers"
+            self.refuse(
+                where, f"{name}: {found}, but {wanted} within 1e7 {'was' if count == 1 else 'were'} wanted"
+            )
+        return values
 
     def refuse(self, where: str, what: str) -> NoReturn:
         """Raise the error of this element."""

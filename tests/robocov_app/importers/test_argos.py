@@ -93,11 +93,11 @@ def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path
     [
         (POST, None),  # without a body it is nowhere
         (WALL.format("a", 0, 1, 0, 0, 0), "test.argos:4: <box> 'a': size '0,1,0.5', but lengths above 0"),
-        (WALL.format("a", "x", 1, 0, 0, 0), "size 'x,1,0.5', but 3 numbers within 1e7 were wanted"),
-        (WALL.format("a", 1, 1, "0,0", 0, 0), "position '0,0,0,0', but 3 numbers within 1e7 were wanted"),
-        ('<cylinder id="c" height="1"><body/></cylinder>', "no radius, but one was wanted"),
-        (WALL.format("a", 1, 1, "nan", 0, 0), "position 'nan,0,0', but 3 numbers"),
-        (WALL.format("a", 1, 1, "1e8", 0, 0), "position '1e8,0,0', but 3 numbers within 1e7"),
+        (WALL.format("a", "x", 1, 0, 0, 0), "size: 'x,1,0.5', but 3 numbers within 1e7 were wanted"),
+        (WALL.format("a", 1, 1, "0,0", 0, 0), "position: '0,0,0,0', but 3 numbers within 1e7 were wanted"),
+        ('<cylinder id="c" height="1"><body/></cylinder>', "radius: missing, but a number within 1e7"),
+        (WALL.format("a", 1, 1, "nan", 0, 0), "position: 'nan,0,0', but 3 numbers"),
+        (WALL.format("a", 1, 1, "1e8", 0, 0), "position: '1e8,0,0', but 3 numbers within 1e7"),
         (distribute(GRID, 5, POST), "<position>: layout [2, 2, 1], but one for 5 was wanted"),
         (distribute(GRID, 10**6, POST), "quantity 1000000, but a number from 0 to 4000"),
         (

@@ -223,11 +223,11 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
         (tiles("walls").replace('"csv"', '"base64" compression="zstd"'), "base64 zstd, but CSV, or base64"),
         (tiles("walls", "A").replace("csv", "base64"), "not base64"),
         (tiles("walls", size=(4, "9" * 9)), "more than 16000000 tiles"),  # type: ignore[arg-type]
-        (tiles("walls", more='offsetx="x"'), "offsetx 'x', but a number"),
+        (tiles("walls", more='offsetx="x"'), "offsetx: 'x', but a number within 1e7"),
         (tiles("walls", size=(4, -3)), "height '-3', but a whole number from 1"),
-        (objects("a", '<object x="nan" y="1"/>'), "x 'nan', but a number"),
-        (objects("a", '<object><polygon points="1,2 3"/></object>'), "points '1,2 3', but at least 3"),
-        (objects("a", '<object><polyline points="1,2"/></object>'), "points '1,2', but at least 2"),
+        (objects("a", '<object x="nan" y="1"/>'), "x: 'nan', but a number within 1e7"),
+        (objects("a", '<object><polygon points="1,2 3"/></object>'), "points: 3 numbers, but 3 points"),
+        (objects("a", '<object><polyline points="1,2"/></object>'), "points: 2 numbers, but 2 points"),
         ('<tileset source="a.tsx"/>', "firstgid '', but a whole number from 1"),
         ("", "but --only LAYER, with one of walls, was wanted then: there is none"),
         (tiles("walls", ROWS.replace("1", "2")), "no cell is free"),
@@ -256,7 +256,7 @@ def test_too_many_collision_objects_are_refused(tmp_path: Path) -> None:
         f'<map width="150" height="150" tilewidth="16" tileheight="16">{TILES.format(corner)}'
         f"{tiles('a', rows, size=(150, 150))}</map>"
     )
-    with pytest.raises(MapError, match="more than 10000 collision objects of tiles"):
+    with pytest.raises(MapError, match="more than 10000 parts of tiles"):
         IMPORTER.read(path, ReadOptions())
 
 
