@@ -335,7 +335,7 @@ class _Map:
                     self._add_part(part, turned, layer.labels)
         if layer.offset.any():  # beside the grid
             for row, column in np.argwhere(full).tolist():
-                cell = "polygon", place + (_RECTANGLE + [column, row]) * self.tile
+                cell = "polygon", place + np.add(_RECTANGLE, [column, row]) * self.tile
                 self._add_part(layer.element, cell, layer.labels)
             full = np.zeros_like(full)
         return full
