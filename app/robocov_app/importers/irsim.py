@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.errors import MapError, shown
+from robocov.errors import MapError, counted, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits, plain_yaml
@@ -63,9 +63,8 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
         When the file cannot be read or understood, or its world is generated.
     """
     where = one_line(path)
-    given = plain_yaml.parse(limits.content(path, plain_yaml.MAX_BYTES), where)
     shapes = Shapes(where, options)
-    root = _Node(given, f"{where}: ")
+    root = _Node(plain_yaml.parse(limits.content(path, plain_yaml.MAX_BYTES), where), f"{where}: ")
     world = root["world"]
     size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
     corner = world["offset"].numbers([0.0, 0.0])[:2]
@@ -80,11 +79,11 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.vertices += vertices_of(free)
         limits.require_drawn(shapes.vertices, where)
     robots: list[tuple[float, float]] = []
-    count = 0
+    count = moving = 0
     for kind in ("robot", "obstacle"):
         for group in root[kind].items(one=True):
-            number = int(group["number"].number(1.0))
-            count += max(number, 0)
+            number = max(int(group["number"].number(1.0)), 0)
+            count += number
             if count > MOST_OBJECTS:
                 group["number"].refuse(f"at most {MOST_OBJECTS} objects together")
             states = _states(group, number, corner + size / 2, float(size.min() / 2 - 0.5))
@@ -93,10 +92,8 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
                 continue
             names = group["name"].items(one=True)
             for k in range(number):
-                labels = [names[min(k, len(names) - 1)].text(kind)] if names else [kind]
-                labels += [
-                    label for label in (group["group_name"].text(), kind) if label and label != labels[0]
-                ]
+                given = [names[min(k, len(names) - 1)].text()] if names else []
+                labels = [label for label in (*given, group["group_name"].text()) if label]
                 x, y, turn = states[min(k, len(states) - 1)][:3]
                 if kind == "robot":
                     robots.append((float(x), float(y)))
@@ -104,8 +101,13 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
                     if group["unobstructed"].text().lower() in _TRUE:
                         shapes.leave_out(kind, "that nothing collides with")
                         continue
+                    moving += group["kinematics"].given
                     figures = group["shape"].items(one=True) or [group["shape"]]
                     _draw(figures[min(k, len(figures) - 1)], _frame(x, y, turn), shapes, labels)
+    if moving:
+        notes.append(
+            f"{counted(moving, 'obstacle')} with kinematics taken as standing where the file has them"
+        )
     foreign = foreign_map(
         shapes,
         format=IMPORTER.name,

@@ -111,7 +111,8 @@ obstacle:
   - {number: 10, distribution: {name: random, range_low: [0, 0, 0]}}
   - {number: 2, shape: [{name: polygon, random_shape: true}], state: [5, 5]}
   - {name: ghost, shape: {name: circle, radius: 1}, unobstructed: True, state: [5, 5]}
-  - {name: [post], group_name: posts, shape: {name: rectangle}, state: [7, 5]}
+  - {name: [post], group_name: posts, shape: {name: rectangle}, state: [7, 5], kinematics: {name: omni}}
+  - {number: -3, distribution: {name: random}}
 """
     foreign = read(tmp_path, text)
     assert solid(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
@@ -122,6 +123,7 @@ obstacle:
         "5 robots that IR-SIM places at random",
         "2 shapes by chance",
     )
+    assert foreign.notes == ("1 obstacle with kinematics taken as standing where the file has them",)
     assert read(tmp_path, text, skip=("posts",)).free.equals(SPACE)
     environment, _, _ = import_map(tmp_path / "world.yaml")
     assert environment.starts["robots"].positions == ((0.0, 3.0), (1.0, 3.0))  # type: ignore[union-attr]
