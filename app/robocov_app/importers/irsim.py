@@ -85,7 +85,7 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
             number = max(int(group["number"].number(1.0)), 0)
             count += number
             if count > MOST_OBJECTS:
-                group["number"].refuse(f"at most {MOST_OBJECTS} objects together")
+                group["number"].refuse(f"a number of at most {MOST_OBJECTS} together")
             states = _states(group, number, corner + size / 2, float(size.min() / 2 - 0.5))
             if states is None:
                 shapes.leave_out(kind, "that IR-SIM places at random", number)
@@ -245,7 +245,7 @@ class _Node:
         """Return a list of numbers, of which the last may be missing."""
         values = [item.number(0.0) for item in self.items()]
         if self.given and len(values) < 2:
-            self.refuse(f"{len(default)} numbers")
+            self.refuse(f"a list of {len(default)} numbers")
         return np.array([*values, *default[len(values) :]])
 
     def refuse(self, wanted: str) -> NoReturn:
