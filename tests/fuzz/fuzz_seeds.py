@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import struct
@@ -280,6 +281,114 @@ WKT = (
     "MULTIPOINT ((1 1), (2 2))\n",
 )
 
+STAGE = """\
+include "things.inc"
+name "hall"
+unit_angle "degrees"
+window ( size [ 600 400 ] scale 30.5 )
+floorplan ( name "cave" size [12.000 9.000 0.8] pose [0 0 0 0] bitmap "map.png" )
+table ( pose [1 -1 0 30] )  # a comment
+zone ( pose [2 2 0 0] size [1 1 0.01] )
+robot ( name "r0" pose [-2 -1 0 45] sensor ( range [0 5] ) )
+"""
+THINGS = """\
+define floorplan model ( color "gray30" boundary 1 obstacle_return 0 ranger_return 0.5 )
+define zone model ( obstacle_return 0 ranger_return -1 )
+define robot position ( drive "diff" size [0.3 0.3] )
+define table model
+(
+  size [1.5 0.8 0.7]
+  origin [0.1 0 0 0]
+  block ( points 4 point[0] [0 0] point[1] [2 0] point[2] [2 1] point[3] [0 1] z [0 1] )
+  block ( points 3 point[0] [0 1] point[1] [1 1] point[2] [0 2] )
+)
+"""
+
+ARGOS = """\
+<?xml version="1.0" ?>
+<argos-configuration>
+  <framework><experiment length="0" random_seed="124" /></framework>
+  <arena size="8, 6, 1" center="1,0,0.5">
+    <box id="wall" size="4,0.1,0.5" movable="false"><body position="0,1,0" orientation="30,0,0" /></box>
+    <cylinder id="c" radius="0.3" height="0.5" movable="true" mass="2"><body position="2,-1,0" /></cylinder>
+    <foot-bot id="fb"><body position="-1,-1,0" orientation="0,0,0" /></foot-bot>
+    <distribute>
+      <position method="grid" center="1,2,0" distances="1,0.5,0" layout="3,1,1" />
+      <orientation method="constant" values="0,0,0" />
+      <entity quantity="3" max_trials="100"><box id="b" size="0.2,0.2,0.2" movable="true" /></entity>
+    </distribute>
+    <distribute>
+      <position method="uniform" min="-1,-1,0" max="1,1,0" />
+      <orientation method="constant" values="0,0,0" />
+      <entity quantity="5" max_trials="100"><foot-bot id="f" /></entity>
+    </distribute>
+  </arena>
+</argos-configuration>
+"""
+
+IRSIM = """\
+world:
+  height: 9
+  width: 12
+  offset: [-1, 2]
+  step_time: 0.1
+robot:
+  - number: 2
+    distribution: {name: 'circle', radius: 3}
+    kinematics: {name: 'diff'}
+obstacle:
+  - shape: {name: 'circle', radius: 0.5}
+    state: [5, 5, 0]
+  - number: 2
+    shape:
+      - {name: 'rectangle', length: 1.5, width: 0.4}
+      - {name: 'polygon', vertices: [[0, 0], [1, 0], [1, 1]]}
+    state: [[2, 4, 0.5], [8, 8]]
+  - shape: {name: 'linestring', vertices: [[3, 3], [4, 9], [6, 9]]}
+    state: [0, 0, 0]
+    unobstructed: False
+  - number: 4
+    distribution: {name: 'random', range_low: [0, 0, -3.14]}
+"""
+
+TMX = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<map version="1.10" orientation="orthogonal" width="4" height="3" tilewidth="16" tileheight="12">
+ <tileset firstgid="1" name="t" tilewidth="16" tileheight="12" tilecount="4" columns="2">
+  <tile id="1"><properties><property name="collides" type="bool" value="true"/></properties></tile>
+  <tile id="2"><objectgroup><object x="4" y="2" width="6" height="5" rotation="10"/></objectgroup></tile>
+ </tileset>
+ <tileset firstgid="5" source="more.tsx"/>
+ <layer id="1" name="Ground" width="4" height="3"><data encoding="csv">
+2,2,1,1,
+2,0,3,1,
+2,5,2147483651,2
+</data></layer>
+ <layer id="2" name="Walls" width="4" height="3">
+  <data encoding="base64" compression="{}">{}</data></layer>
+ <objectgroup id="3" name="obstacles" offsetx="1">
+  <object id="1" x="20" y="14" width="9" height="9"><ellipse/></object>
+  <object id="2" x="40" y="4"><polygon points="0,0 8,0 8,6"/></object>
+  <object id="3" name="robot" x="30" y="30"><point/></object>
+  <object id="4" x="2" y="20"><polyline points="0,0 8,0 8,6"/></object>
+ </objectgroup>
+</map>
+"""
+CHUNKS = """\
+<map orientation="orthogonal" width="2" height="2" tilewidth="16" tileheight="16" infinite="1">
+ <group name="collision"><layer name="a" width="2" height="2"><data encoding="csv">
+  <chunk x="-2" y="0" width="2" height="2">0,1,1,0</chunk>
+  <chunk x="1" y="-3" width="3" height="1">1,0,1</chunk>
+ </data></layer></group>
+</map>
+"""
+MORE = """\
+<tileset name="more" tilewidth="16" tileheight="24" tilecount="1" columns="1">
+ <tileoffset x="1" y="2"/><tile id="0" class="wall"/>
+</tileset>
+"""
+_TILES = struct.pack("<12I", *(0, 0, 0, 1) * 3)
+
 SEEDS: dict[str, list[Case]] = {
     "map": _one("map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})),
     "check": _one("map.json", json.dumps(MAP, indent=1)),
@@ -323,6 +432,30 @@ SEEDS: dict[str, list[Case]] = {
     "svg": _one("plan.svg", SVG),
     "osm": _one("plan.osm", OSM),
     "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
+    "stage": [
+        Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": png(GREY)}),
+        Case({"hall.world": (THINGS + "table ( ) table ( pose [4 2 0 0] )").encode()}),
+    ],
+    "argos": _one("arena.argos", ARGOS),
+    "irsim": [
+        *_one("world.yaml", IRSIM),
+        Case(
+            {
+                "world.yaml": IRSIM.replace(
+                    "step_time: 0.1", "obstacle_map: map.png\n  mdownsample: 2"
+                ).encode(),
+                "map.png": png(GREY),
+            }
+        ),
+    ],
+    "tmx": [
+        Case({"map.tmx": text.encode(), "more.tsx": MORE.encode()})
+        for text in (
+            TMX.format("zlib", base64.b64encode(zlib.compress(_TILES)).decode()),
+            TMX.format("", base64.b64encode(_TILES).decode()),
+            CHUNKS,
+        )
+    ],
 }
 """The seeds of each target."""
 
@@ -527,4 +660,76 @@ TOKENS: dict[str, list[str]] = {
         ),
     ],
 }
+_XML = [
+    "<",
+    ">",
+    "/>",
+    "</",
+    '"',
+    "<!--",
+    "<!DOCTYPE a>",
+    '<!ENTITY a "b">',
+    "&a;",
+    "<![CDATA[",
+    "&#0;",
+    "\n",
+]
+TOKENS["stage"] = [
+    *(
+        "(",
+        ")",
+        "[",
+        "]",
+        '"',
+        "#",
+        "\n",
+        "define",
+        "model",
+        "position",
+        "block",
+        "points",
+        "point[0]",
+        "size",
+    ),
+    *(
+        'include "hall.world"',
+        'include "../a"',
+        "table ( )",
+        "define table table ( )",
+        "bitmap",
+        "boundary 1",
+    ),
+    *("noblocks 1", "unit_length", '"mm"', "block[0].point[1] [1 2]", "pose [1 1 30]", "origin"),
+]
+TOKENS["argos"] = [
+    *_XML,
+    *("<arena", "</arena>", "<box", "<body", "</box>", "<distribute>", "quantity='9999999'", "size='1,1,1'"),
+    *("method='grid'", "layout='0,1,1'", "orientation='0,90,0'", "radius='0'", ",", "-1"),
+]
+TOKENS["irsim"] = [
+    *("world:", "obstacle:", "robot:", "- ", "[", "]", "{", "}", ":", ",", "&a ", "*a", "!!str ", "---\n"),
+    *("number: 9999999", "name: 'compound', parts: [{name: circle}]", "state: [1]", "null", ".nan", "\n  "),
+    *("obstacle_map: {name: perlin}", "obstacle_map: ../a.png", "mdownsample: 0", "random_shape: true"),
+]
+TOKENS["tmx"] = [
+    *_XML,
+    *("<layer", "</layer>", "<data>", "<tile gid='1'/>", "<chunk x='9' y='9' width='1' height='1'>1</chunk>"),
+    *(
+        "infinite='1'",
+        "orientation='isometric'",
+        "compression='zstd'",
+        "compression='gzip'",
+        "encoding='csv'",
+    ),
+    *(
+        "source='../a.tsx'",
+        "firstgid='4294967295'",
+        "<ellipse/>",
+        "<text/>",
+        "gid='3'",
+        "points='0,0 1'",
+        ",",
+    ),
+    *("4294967295", "width='100000'", "<group offsetx='3'>", "</group>", "value='false'"),
+]
 TOKENS["check"] = TOKENS["map"]

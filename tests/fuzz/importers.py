@@ -61,6 +61,7 @@ _SHAPING: dict[str, list[Any]] = {
     "simplify": [0.0, 0.02, 0.5, 10.0],
     "specks": [0.01, 1.0, 100.0],
     "keep": ["all"],
+    "inside": [[1.0, 1.0], [5.0, 2.0]],
     "hull": [True],
     "margin": [0.1, 2.0],
     "radius": [0.01, 0.5, 3.0],

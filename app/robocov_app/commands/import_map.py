@@ -30,6 +30,9 @@ class Arguments:
       movingai   .map of Moving AI's benchmarks: --cell --trees --water
       picture    PNG, JPEG, BMP, TIFF, PGM, PPM of a plan, dark is an obstacle: --cell --threshold
                  --invert --unknown
+      stage, argos, irsim
+                 worlds of these simulators, robots as a start: --only --skip --anywhere
+      tmx        map of Tiled, --only LAYER says which tiles are solid: --cell --scale --skip --thickness
       houseexpo  JSON with "verts" in metres
       osm        OpenStreetMap's buildings, water and barriers: --water --thickness --pillar --skip
       wkt, geojson, svg, dxf, rings
@@ -68,7 +71,7 @@ class Arguments:
     """The map's default start: a disc at the roomiest place, or anywhere."""
 
     cell: float | None = None
-    """Side of a cell, or of a pixel, in metres. A MovingAI grid has 1 by default."""
+    """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
     unknown: Literal["obstacle", "free", "cut"] | None = None
     """What unknown or transparent cells are; with cut the map ends where the known cells end."""
     threshold: float | None = None
@@ -81,10 +84,10 @@ class Arguments:
     water: Literal["obstacle", "free"] | None = None
     """What water (W) in a MovingAI grid, or of OpenStreetMap, is; obstacles by default."""
     anywhere: bool = False
-    """The picture that a YAML names may be outside of its folder."""
+    """Pictures and includes that a file names may be outside of its folder."""
 
     scale: float | None = None
-    """Metres that a unit of a drawing stands for."""
+    """Metres that a unit of a drawing, or a pixel of a TMX, stands for."""
     units: Literal["metres", "degrees"] | None = None
     """What the coordinates of GeoJSON are, whatever it says of itself."""
     thickness: float | None = None

@@ -51,6 +51,8 @@ class Arguments:
     """Processes; by default one a processor."""
     scheduler: str | None = None
     """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    keep_versions: bool = False
+    """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -109,7 +111,7 @@ def command(options: Arguments) -> int:
     wanted = plan.beyond is not None and not (options.figures_only or options.without_beyond)
     alone = options.beyond_only
     with Interruption() as stop:
-        means = Means(workers, options.scheduler, quiet, stop)
+        means = Means(workers, options.scheduler, quiet, stop, options.keep_versions)
         if not quiet:
             expected = [forecast(out, plan, workers, figures_only=options.figures_only or alone)]
             if wanted:

@@ -15,8 +15,9 @@ from robocov_app.options import in_range
 if TYPE_CHECKING:
     from robocov_app.sweep.rehearsal import Rehearsal
     from robocov_app.sweep.study import Study
+    from robocov_app.sweep.sweeping import Totals
 
-INTERRUPTED = 130
+FAILED, INTERRUPTED = 1, 130
 
 
 @dataclass
@@ -24,8 +25,9 @@ class Arguments:
     """Many runs in parallel: every combination of what a study file lists, each done once.
 
     The folder holds results.csv and results.parquet, one row a run, and a folder of each run.
-    Whatever ends a sweep, the same command goes on where it was. For the same map and seed every
-    controller begins in the same places.
+    Whatever ends a sweep, the same command goes on where it was. Runs whose files were damaged, and runs
+    of other versions or of other code of your controllers, are done again. For the same map and seed every
+    controller begins in the same places. The exit status is 1 when runs have failed.
 
     A study file: maps = ["rooms", "mine.json"], controllers = ["rapf", "rpf"], seeds = 20, and under
     [gains.rapf] k_rep = [0.1, 1.0]; robots, starts, duration and [team] as the options of robocov run.
@@ -43,6 +45,8 @@ class Arguments:
     """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
     retry_failed: bool = False
     """Do runs again that have failed."""
+    keep_versions: bool = False
+    """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
     dry_run: bool = False
     """Count the runs, do one, estimate time and disk space for all, and write nothing."""
     json: bool = False
@@ -73,23 +77,36 @@ def _sweep(options: Arguments, study: Study, out: Path) -> int:
         workers=options.workers,
         scheduler=options.scheduler,
         retry_failed=options.retry_failed,
+        keep_versions=options.keep_versions,
         quiet=options.json,
     )
     if options.json:
-        print(json.dumps({"out": str(out), "runs": len(study), **totals._asdict()}))
+        print(json.dumps({"out": str(out), "runs": len(study), **asdict(totals)}))
     else:
-        words = [f"{totals.done} runs done"]
-        words += [f"{totals.failed} failed"] * (totals.failed > 0)
-        words += [f"{totals.reused} were there already"] * (totals.reused > 0)
-        print(", ".join(words))
-        if totals.failed:
-            print("why they failed is in the column error; --retry-failed does them again")
-        if totals.interrupted:
-            rest = len(study) - totals.done - totals.failed - totals.reused
-            print(f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/")
-        else:
-            print(f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}")
-    return INTERRUPTED if totals.interrupted else 0
+        _print_totals(totals, len(study), out)
+    return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0
+
+
+def _print_totals(totals: Totals, runs: int, out: Path) -> None:
+    words = [f"{totals.done} runs done"]
+    words += [f"{totals.reused} were there already"] * (totals.reused > 0)
+    print(", ".join(words))
+    if totals.failed:
+        print(f"{totals.failed} of {runs} runs failed:")
+        for run, error in totals.errors.items():
+            print(f"  {run}: {error}")
+        print("--retry-failed does them again; the column error says why each has failed")
+    if len(totals.versions) > 1:
+        print("the table has runs of different versions:")
+        for versions, count in totals.versions.items():
+            print(f"  {count} of {versions}")
+    if totals.interrupted:
+        rest = runs - totals.done - totals.failed - totals.reused
+        print(f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/")
+        if not totals.table_replaced:
+            print("the table stays as it was: it is replaced when all runs are done")
+    else:
+        print(f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}")
 
 
 def _rehearse(options: Arguments, study: Study, out: Path) -> int:
@@ -102,7 +119,13 @@ def _rehearse(options: Arguments, study: Study, out: Path) -> int:
 
         with Cluster(options.scheduler) as cluster:
             workers = max(1, cluster.threads)
-    rehearsal = rehearsed(study, out, workers=workers, retry_failed=options.retry_failed)
+    rehearsal = rehearsed(
+        study,
+        out,
+        workers=workers,
+        retry_failed=options.retry_failed,
+        keep_versions=options.keep_versions,
+    )
     if options.json:
         print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))
     else:
@@ -119,6 +142,8 @@ def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
     print(f"{'runs':<20} {rehearsal.runs:>7}", end="")
     done = rehearsal.runs - rehearsal.left
     print(f"   ({done} of them done already)" if done else "")
+    for note in rehearsal.notes:
+        print(note)
     if rehearsal.error is not None:
         print(f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}")
     print(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")

@@ -12,16 +12,20 @@ from typing import TYPE_CHECKING
 from robocov.errors import MapError, ParameterError, unknown_name
 from robocov.files.strictjson import one_line
 from robocov_app.importers import (
+    argos,
     dxf,
     geojson,
     houseexpo,
+    irsim,
     limits,
     movingai,
     osm,
     picture,
     rings,
     ros,
+    stage,
     svg,
+    tmx,
     wkt,
 )
 from robocov_app.importers.foreign import ForeignMap
@@ -49,8 +53,12 @@ __all__ = [
 
 # the first whose `sniff` says yes has it: the surest come first
 _ALL: tuple[Importer, ...] = (
+    irsim.IMPORTER,
     ros.IMPORTER,
     movingai.IMPORTER,
+    stage.IMPORTER,
+    argos.IMPORTER,
+    tmx.IMPORTER,
     picture.IMPORTER,
     osm.IMPORTER,
     svg.IMPORTER,

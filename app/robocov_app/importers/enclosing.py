@@ -52,6 +52,8 @@ def foreign_map(
     name: str,
     description: str,
     solid: bool,
+    accessible: bool = False,
+    world: MultiPolygon | None = None,
     notes: Sequence[str] = (),
 ) -> ForeignMap:
     """Return the map that the shapes of a file stand for.
@@ -72,6 +74,12 @@ def foreign_map(
     solid : bool
         What closed outlines are unless the option ``outlines`` says it: True is solid; False is free, but
         solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
+    accessible : bool
+        Whether outlines are all free in files of that format, as JuPedSim's accessible area, so that one may
+        overlap another: then 2 holds only where all others lie wholly in the largest, which would add nothing
+        to it as free space.
+    world : MultiPolygon or None, m
+        What is free before the shapes stand in it, where the format says so: then no boundary is looked for.
     notes : sequence of str
         What else is worth knowing.
 
@@ -83,15 +91,22 @@ def foreign_map(
         When a name in the options is none of the file's.
     """
     shapes.require_known_names()
-    if not shapes.outlines and not shapes.lines:
+    if world is None and not shapes.outlines and not shapes.lines:
         dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
         raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
-    everything = [*(o.area for o in shapes.outlines), *(shapely.linestrings(e.points) for e in shapes.lines)]
+    everything: list[BaseGeometry] = [] if world is None else [world]
+    everything += [o.area for o in shapes.outlines]
+    everything += [shapely.linestrings(line.points) for line in shapes.lines]
     # one of many parts may be a map, if they are not all too far from each other
     _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
     shapes.require_untangled()
     asked = shapes.options.outlines
-    boundary = _named(shapes) or (_largest(shapes, solid or asked == "solid") if asked != "free" else None)
+    if world is not None:
+        boundary: _Enclosure | None = _Enclosure(world, "")
+    else:
+        boundary = _named(shapes)
+        if boundary is None and asked != "free":
+            boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
     if asked is None and not solid:
         solid = not shapes.outlines or (
             boundary is not None and len(shapes.outlines) > len(boundary.outlines)
@@ -121,7 +136,9 @@ def foreign_map(
         shapes.leave_out("shape", "outside of the boundary", outside)
     free = _without(area, [*blocks, *solids])
     outer = None
-    if boundary is not None and (solid or boundary.area is not area):
+    # what is free of a grid has its own outline
+    plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
+    if boundary is not None and (solid or boundary.area is not area) and plain:
         outer = Polygon(boundary.area.geoms[0].exterior)
     elif solids and len(area.geoms) == len(free.geoms) == 1:  # walls that begin at the edge are no part of it
         outer = Polygon(area.geoms[0].exterior)
@@ -143,6 +160,12 @@ def foreign_map(
     )
 
 
+def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
+    """Return what the shapes enclose as walls, else a rectangle around them, m; and that in words."""
+    found = _walled(shapes) or _rectangle(shapes)
+    return found.area, f"the boundary is {found.words}"
+
+
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     """Refuse what no map may be, before it is computed with."""
     x, y, right, top = bounds
@@ -154,7 +177,10 @@ def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) ->
 
 def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
     """Return how the shapes were taken."""
-    told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
+    if boundary is not None and not boundary.words:  # the format says what all of it is
+        blocks, told = 0, []
+    else:
+        told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
     if blocks:
         told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
     elif not solid and len(shapes.outlines) > 1:
@@ -189,8 +215,8 @@ def _named(shapes: Shapes) -> _Enclosure | None:
     return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
 
 
-def _largest(shapes: Shapes, solid: bool) -> _Enclosure | None:
-    """Return the largest closed outline if most others lie in it; if those are solid, of lines as well."""
+def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
+    """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
     if not shapes.outlines:
         return None
     outline = max(shapes.outlines, key=_filled)
@@ -201,7 +227,11 @@ def _largest(shapes: Shapes, solid: bool) -> _Enclosure | None:
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None
-    if inner and not _holds(outline.area, inner):
+    if wholly:
+        holds = bool(shapely.covers(outline.area, inner).all())
+    else:
+        holds = not inner or _holds(outline.area, inner)
+    if not holds:
         return None
     called = f", {shown(outline.labels[0])}," if outline.labels else ""
     words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"

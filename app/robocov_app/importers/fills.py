@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -22,18 +24,80 @@ Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
 """The first ring with the others as holes, or what SVG calls ``fill-rule``."""
 
 MAX_CROSSINGS = 30_000
-"""Edges may cross each other so often in a file. A ring of some kB can cross itself millions of times,
-and to find all of these places takes minutes and gigabytes."""
+"""Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
+cross itself millions of times, and to find all of these places takes minutes and gigabytes."""
+
+_FEW = 12
+"""So few edges are compared each with each, which is quicker than a tree of them."""
+
+_RAYS = 500_000
+"""So many pairs of a ray and an edge are looked at together, which bounds the memory."""
 
 _SAMPLES, _TOGETHER, _WORK, _CERTAIN = 500, 20, 400_000, 50
 """Edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
 most, and crossings that are enough for one."""
 
 
+@dataclass
+class Crossings:
+    """How often edges cross each other in a file, all of its shapes together, with `MAX_CROSSINGS` at most.
+
+    Attributes
+    ----------
+    where : str
+        What messages call the file.
+    count : float
+        So far; an estimate where edges are many.
+    """
+
+    where: str = "rings"
+    count: float = 0.0
+
+    def add(self, edges: Array) -> None:
+        """Count the crossings of some edges, (n, 2, 2) m: start and end of each.
+
+        Ends that meet, and edges on each other, do not count. Where edges are many, some are looked at.
+
+        Raises
+        ------
+        MapError
+            When there are too many.
+        """
+        n = len(edges)
+        lines = shapely.linestrings(edges)
+        if n <= _FEW:
+            one, other = np.triu_indices(n, 1)
+            self.count += float(shapely.crosses(lines[one], lines[other]).sum())
+            self._require_few(self.count)
+            return
+        tree = shapely.STRtree(lines)
+        order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
+        crossings = work = seen = 0
+        for begin in range(0, len(order), _TOGETHER):
+            some = order[begin : begin + _TOGETHER]
+            one, other = tree.query(lines[some])
+            work += len(one)
+            seen += len(some)
+            crossings += int(shapely.crosses(lines[some[one]], lines[other]).sum())
+            if crossings > _CERTAIN:  # each is seen from both of its edges
+                self._require_few(self.count + crossings * n / seen / 2)
+            if work > _WORK:
+                break
+        self.count += crossings * n / seen / 2
+        self._require_few(self.count)
+
+    def _require_few(self, count: float) -> None:
+        if count > MAX_CROSSINGS:
+            raise MapError(
+                f"{self.where}: its lines cross each other some {count:.1g} times, but at most "
+                f"{MAX_CROSSINGS} times was wanted"
+            )
+
+
 def enclosed(
-    rings: Sequence[Array], rule: Rule = "holes", where: str = "rings"
-) -> tuple[MultiPolygon, str | None]:
-    """Return the valid area that rings enclose, and what was wrong with them.
+    rings: Sequence[Array], rule: Rule = "holes", crossings: Crossings | None = None
+) -> tuple[MultiPolygon, str | None, dict[str, int]]:
+    """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
 
     Parameters
     ----------
@@ -42,8 +106,8 @@ def enclosed(
     rule : str
         ``holes``: the first ring without the others. ``evenodd``, ``nonzero``: what a ray from there
         crosses an odd number of times, or what the rings wind around (SVG 2, 13.3.3).
-    where : str
-        What messages call the file.
+    crossings : Crossings or None
+        Of the file so far.
 
     Returns
     -------
@@ -51,11 +115,13 @@ def enclosed(
         The largest part first; empty where nothing is enclosed.
     reason : str or None
         Where a ring meets itself or another one, of polygons with holes; fills may.
+    lost : dict of str to int
+        How many holes of a polygon take nothing out of it, by the reason.
 
     Raises
     ------
     MapError
-        When the rings cross each other more often than `MAX_CROSSINGS`.
+        When the rings cross each other too often.
 
     Examples
     --------
@@ -63,18 +129,20 @@ def enclosed(
     >>> [enclosed([square, inner], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
     [12.0, 12.0, 16.0]
     """
-    good = [len(np.unique(ring, axis=0)) >= 3 for ring in rings]
+    crossings = Crossings() if crossings is None else crossings
+    good = [_has_three(ring) for ring in rings]
+    lost = Counter({"of fewer than three points": good[1:].count(False)} if rule == "holes" else {})
     if not any(good) or (rule == "holes" and not good[0]):
-        return MultiPolygon(), None
+        return MultiPolygon(), None, {}
     rings = [ring for ring, whole in zip(rings, good, strict=True) if whole]
     plain = Polygon(rings[0], rings[1:])
     if (rule == "holes" or len(rings) == 1) and plain.is_valid:
-        return polygons_of(plain), None
-    require_untangled(edges_of(rings, closed=True), where)
+        return polygons_of(plain), None, +lost
+    crossings.add(edges_of(rings, closed=True))
     if rule == "holes":
-        area = _mended(rings)
-        return area, None if area.is_empty else shapely.is_valid_reason(plain)
-    return _filled(rings, rule), None
+        area = _mended(rings, lost)
+        return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
+    return _filled(rings, rule), None, {}
 
 
 def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
@@ -91,44 +159,6 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     return shapely.union_all(areas, grid_size=GRID)
 
 
-def require_untangled(edges: Array, where: str) -> None:
-    """Check that edges do not cross each other more often than `MAX_CROSSINGS`, by some of them.
-
-    Parameters
-    ----------
-    edges : (n, 2, 2) m
-        Start and end of each.
-    where : str
-        What messages call the file.
-
-    Raises
-    ------
-    MapError
-        When they do. Ends that meet, and edges on each other, do not count.
-    """
-    n = len(edges)
-    if n * n < MAX_CROSSINGS:
-        return
-    lines = shapely.linestrings(edges)
-    tree = shapely.STRtree(lines)
-    order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
-    crossings = work = 0
-    for begin in range(0, len(order), _TOGETHER):
-        some = order[begin : begin + _TOGETHER]
-        one, other = tree.query(lines[some])
-        work += len(one)
-        crossings += int(shapely.crosses(lines[some[one]], lines[other]).sum())
-        # each is seen from both of its edges
-        found = crossings * n / (begin + len(some)) / 2
-        if crossings > _CERTAIN and found > MAX_CROSSINGS:
-            raise MapError(
-                f"{where}: its lines cross each other some {found:.1g} times, but at most {MAX_CROSSINGS} "
-                "times was wanted"
-            )
-        if work > _WORK:
-            break
-
-
 def edges_of(rings: Sequence[Array], *, closed: bool) -> Array:
     """Return the (n, 2, 2) edges of rings, or of lines."""
     parts = [
@@ -141,10 +171,19 @@ def edges_of(rings: Sequence[Array], *, closed: bool) -> Array:
     return np.concatenate(parts) if parts else np.empty((0, 2, 2))
 
 
-def _mended(rings: Sequence[Array]) -> MultiPolygon:
+def _has_three(ring: Array) -> bool:
+    """Return whether there are three different points in a ring; ten times as fast as to sort them."""
+    others = ring[(ring != ring[:1]).any(axis=1)]
+    return bool((others != others[:1]).any())
+
+
+def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
     """Return the area of a polygon that is not valid: of the outer ring, without those of the holes."""
     areas = [shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False) for ring in rings]
-    outer, holes = areas[0], [polygons_of(area) for area in areas[1:]]
+    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
+    lost["without an area"] += len(areas) - 1 - len(holes)
+    shapely.prepare(outer)
+    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
     return polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
 
 
@@ -156,7 +195,11 @@ def _filled(rings: Sequence[Array], rule: Rule) -> MultiPolygon:
     if not len(faces):
         return MultiPolygon()
     inside = shapely.get_coordinates(shapely.point_on_surface(faces))
-    winding, crossings = _windings(inside, edges_of(rings, closed=True))
+    edges = edges_of(rings, closed=True)
+    tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
+    most = max(_RAYS // len(edges), 1)
+    parts = [_windings(inside[k : k + most], edges, tree) for k in range(0, len(inside), most)]
+    winding, crossings = (np.concatenate(part) for part in zip(*parts, strict=True))
     chosen = crossings % 2 == 1 if rule == "evenodd" else winding != 0
     try:
         return polygons_of(shapely.coverage_union_all(faces[chosen]))
@@ -164,11 +207,9 @@ def _filled(rings: Sequence[Array], rule: Rule) -> MultiPolygon:
         return polygons_of(shapely.union_all(faces[chosen], grid_size=GRID))
 
 
-def _windings(points: Array, edges: Array) -> tuple[Array, Array]:
+def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array, Array]:
     """Return how often edges wind around each of (m, 2) points, and how many a ray to the right crosses."""
     start, end = edges[:, 0], edges[:, 1]
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     which, near = tree.query(shapely.linestrings(np.stack([points, far], axis=1)))
     p, a, b = points[which], start[near], end[near]

@@ -32,7 +32,7 @@ class ForeignMap:
     vertices_read : int
         Vertices in the file; of a raster, corners of the outline of its free cells.
     cell : float or None, m
-        Side of a cell, of rasters.
+        Side of a cell, of rasters; of cells that are no squares the longer one.
     specks : float, m²
         Smaller obstacles are noise of how such maps are made, unless somebody says otherwise.
     cut_corners : bool
@@ -41,6 +41,8 @@ class ForeignMap:
     primitives : tuple of CircleObstacle and WallObstacle
         Obstacles that the file draws as such, with their names: they are not in `free`, and are kept instead
         of the polygons that they cover where nothing speaks against it.
+    robots : (n, 2) m
+        Where the file places robots.
     repaired, dropped, notes : tuple of str
         What the reader had to put right, what it left out, and what is worth knowing besides (how
         unknown cells were taken, say): one line each, with counts and areas.
@@ -56,6 +58,7 @@ class ForeignMap:
     specks: float = 0.0
     cut_corners: bool = False
     primitives: tuple[Primitive, ...] = ()
+    robots: tuple[tuple[float, float], ...] = ()
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

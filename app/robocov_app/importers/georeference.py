@@ -13,6 +13,7 @@ import numpy as np
 from robocov.errors import MapError, RobocovError, shown
 from robocov.extras import extra
 from robocov.mapfile.models import LARGEST
+from robocov_app.importers.limits import require_shapes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,10 +63,12 @@ def in_metres(
     Raises
     ------
     MapError
-        When a system is needed that is unknown, or that needs pyproj where it is not installed.
+        When a system is needed that is unknown, or that needs pyproj where it is not installed; or there are
+        too many shapes.
     """
     if not figures:
         return [], []
+    require_shapes(sum(figure.kind != "point" for figure in figures), where)
     if options.units == "metres" or (crs is None and options.units is None and not _on_globe(figures, globe)):
         scale = 1.0 if options.scale is None else options.scale
         notes = [] if scale == 1.0 else [f"a unit is {scale:g} m"]

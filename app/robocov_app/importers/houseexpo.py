@@ -10,7 +10,7 @@ from shapely import MultiPolygon, Polygon
 from robocov.errors import MapError, counted
 from robocov.files.strictjson import one_line
 from robocov.mapfile.models import FARTHEST
-from robocov_app.importers.fills import edges_of, enclosed, require_untangled
+from robocov_app.importers.fills import Crossings, edges_of, enclosed
 from robocov_app.importers.foreign import ForeignMap
 from robocov_app.importers.json_file import begins_with, located_errors, read_json, refused
 from robocov_app.importers.reading import Importer, ReadOptions
@@ -49,7 +49,7 @@ def read_houseexpo(path: Path, options: ReadOptions) -> ForeignMap:
     document, content, where = read_json(path)
     with located_errors(content, where):
         vertices = _vertices(document, where)
-        require_untangled(edges_of([vertices], closed=True), where)
+        Crossings(where).add(edges_of([vertices], closed=True))
         repaired: list[str] = []
         parts = _parts(vertices, where, repaired)
     small = [hole for part in parts for hole in map(Polygon, part.interiors) if hole.area < _MIN_HOLE]
@@ -87,7 +87,7 @@ def _parts(vertices: Array, where: str, repaired: list[str]) -> list[Polygon]:
         repaired.append(f"{len(vertices) - len(ring)} repeated vertices taken out")
     if len(ring) < 3:
         raise MapError(f"{where}: verts: {len(ring)} different points, but at least 3 were wanted")
-    area, reason = enclosed([ring])
+    area, reason, _ = enclosed([ring])
     if reason is not None:
         repaired.append(f"the outline met itself: {reason}")
     if area.is_empty:

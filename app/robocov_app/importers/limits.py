@@ -22,11 +22,14 @@ MAX_TEXT_BYTES = 50_000_000
 MAX_CELLS = 64_000_000
 """Largest raster, in cells: 8000 x 8000."""
 
-MAX_VERTICES = 2_000_000
+MAX_VERTICES = 500_000
 """Most vertices of a foreign map."""
 
 MAX_DRAWN = 500_000
 """Most vertices of a drawing: a file of a vector format, whose rings cost more than those of a raster."""
+
+MAX_SHAPES = 20_000
+"""Most shapes of a drawing, of a file: each costs a quarter of a millisecond, whatever its size."""
 
 MAX_DEPTH = 32
 """Deepest nesting of collections, groups, blocks, lists."""
@@ -88,8 +91,7 @@ def require_vertices(count: int, where: str) -> None:
         When there are more than `MAX_VERTICES`.
     """
     if count > MAX_VERTICES:
-        most = MAX_VERTICES // 1_000_000
-        raise MapError(f"{where}: {count} vertices, but at most {most} million were wanted")
+        raise MapError(f"{where}: {count} vertices, but at most {MAX_VERTICES} were wanted")
 
 
 def require_drawn(count: int, where: str) -> None:
@@ -102,6 +104,18 @@ def require_drawn(count: int, where: str) -> None:
     """
     if count > MAX_DRAWN:
         raise MapError(f"{where}: some {count} vertices, but at most {MAX_DRAWN} were wanted")
+
+
+def require_shapes(count: int, where: str) -> None:
+    """Check the number of shapes of a drawing.
+
+    Raises
+    ------
+    MapError
+        When there are more than `MAX_SHAPES`.
+    """
+    if count > MAX_SHAPES:
+        raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
 
 
 def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:

@@ -40,6 +40,9 @@ _SIZES = 16
 _FINEST = 0.4
 """Of smaller ones less is, but always so much, in cells."""
 
+_RIGHT = 1e-5
+"""Lines whose cosine of the angle between them is smaller are at right angles."""
+
 _SQUARE = 0.2
 """Lines whose sine of the angle between them is smaller meet nowhere in particular."""
 
@@ -61,7 +64,7 @@ class Outline:
     neck : (k,)
         Whether two obstacles touch there: the vertex stands for a neck as `tracing` makes them.
     cell : float or None, m
-        Side of the cells that it is the outline of.
+        Side of the cells that it is the outline of, the longer one.
     """
 
     points: Array
@@ -133,13 +136,16 @@ def outline_of(parts: MultiPolygon | list[Polygon], cell: float | None) -> Outli
     begin = np.searchsorted(ring, np.arange(len(rings)))
     neck = np.zeros(len(points), dtype=bool)
     if cell is not None:
-        # the two ends of a neck become the corner between them
+        # the two ends of a neck, a short side between two at right angles, become the corner between them
         after, before = neighbours(begin, len(points))
-        length = np.hypot(*(points[after] - points).T)
-        neck = np.abs(length - np.sqrt(2) * NECK * cell) < 1e-3 * NECK * cell
-        along = points - points[before]
-        along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
-        points = np.where(neck[:, None], points + NECK * cell * along, points)
+        side = points[after] - points
+        length = np.hypot(*side.T)
+        along = side[before] / np.maximum(length[before], 1e-300)[:, None]
+        square = np.abs(np.einsum("kd,kd->k", along, along[after[after]])) < _RIGHT
+        neck = square & (length < np.minimum(length[before], length[after]))
+        neck &= length < 1.001 * np.sqrt(2) * NECK * cell
+        to_corner = np.einsum("kd,kd->k", side, along)[:, None] * along
+        points = np.where(neck[:, None], points + to_corner, points)
         keep = ~neck[before]
         points, neck, ring = points[keep], neck[keep], ring[keep]
         begin = np.searchsorted(ring, np.arange(len(rings)))

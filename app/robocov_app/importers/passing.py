@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +16,21 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from robocov.arrays import Array, IntArray
+    from robocov.environment import Point
 
 _CHUNK = 2048
 """Sides that are looked at together, which bounds the memory."""
+
+_SQUARES = 1024
+"""So many squares are looked at more closely, at each size."""
+
+_SQUARED_WORK, _WORK = 5_000_000, 300_000_000
+"""So many sides may be crossed by the rays that tell whether squares of one size, and gaps, are inside."""
+
+_QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
+
+_MOST_GAPS = 200_000
+"""So many gaps are looked at."""
 
 _CLEARLY = 1 + 1e-6
 """A gap of just a robot's diameter is none."""
@@ -31,10 +45,87 @@ def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
     return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
 
 
+def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[Point, float]:
+    """Return the place farthest from the walls, and how far that is, m; or any that is far enough.
+
+    Squares that may hold a place that is better by `tolerance` are cut into four, `_SQUARES` of them, the
+    most promising: where there are more, as in a long hall, a place may be a bit better than what is found.
+    """
+    sides = _sides(free)
+    walls = STRtree(sides)
+    shapely.prepare(free)
+    low_x, low_y, high_x, high_y = free.bounds
+    width, height = high_x - low_x, high_y - low_y
+    some = np.linspace(low_y, high_y, _SQUARES)
+    squares = max(min(_SQUARES, _SQUARES * _SQUARED_WORK // max(_rays(sides, some), 1)), 16)
+    side = max(min(width, height), max(width, height) / squares)
+    centres = (
+        np.stack(
+            np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side)), axis=-1
+        ).reshape(-1, 2)
+        + side / 2
+    )
+    best, place = -math.inf, centres[0]
+    while len(centres) and best < enough:
+        _, away = walls.query_nearest(shapely.points(centres), return_distance=True, all_matches=False)
+        away = np.where(shapely.contains_xy(free, *centres.T), away, -away)
+        if away.max() > best:
+            best, place = float(away.max()), centres[away.argmax()]
+        hopeful = away + side * math.sqrt(0.5)
+        order = np.argsort(-hopeful, kind="stable")[:squares]
+        better = best + tolerance if enough == math.inf else max(best + tolerance, enough)
+        centres = centres[order[hopeful[order] > better]]
+        side /= 2
+        centres = (centres[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
+    return (float(place[0]), float(place[1])), best
+
+
+@dataclass(frozen=True)
+class Moved:
+    """By how much the walls of a free space moved.
+
+    Attributes
+    ----------
+    area : float, m²
+        That was free and is not, or is and was not.
+    distance : float, m
+        From a vertex of one outline to the other outline, at most.
+    """
+
+    area: float
+    distance: float
+
+
+def moved_walls(before: MultiPolygon, after: MultiPolygon) -> Moved:
+    """Return by how much walls moved from one free space to another."""
+    distance = 0.0
+    for one, other in ((before, after), (after, before)):
+        points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
+        _, away = STRtree(_sides(other)).query_nearest(points, return_distance=True, all_matches=False)
+        distance = max(distance, float(away.max()))
+    return Moved(float(shapely.symmetric_difference(before, after).area), distance)
+
+
+def _sides(area: Polygon | MultiPolygon) -> Array:
+    """Return the sides of the rings of an area, as linestrings."""
+    rings = shapely.get_rings(shapely.get_parts(area))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    along = ring[1:] == ring[:-1]
+    sides: Array = shapely.linestrings(np.stack([points[:-1][along], points[1:][along]], axis=1))
+    return sides
+
+
+def _rays(sides: Array, y: Array) -> int:
+    """Return how many sides horizontal lines at `y` cross, together: the cost of telling what is inside."""
+    bounds = shapely.bounds(sides)
+    low, high = np.sort(bounds[:, 1]), np.sort(bounds[:, 3])
+    return int((np.searchsorted(low, y, side="right") - np.searchsorted(high, y)).sum())
+
+
 def closed_gaps(
     sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
-) -> tuple[IntArray, Array]:
-    """Return which gaps have become too narrow.
+) -> tuple[IntArray, Array] | None:
+    """Return which gaps have become too narrow; None where there are too many to look at.
 
     A gap is where two sides face each other across the free space. It was wide enough if what these sides
     stand for is further apart there.
@@ -72,8 +163,12 @@ def closed_gaps(
         distance = shapely.distance(lines[one], lines[other])
         narrow = (distance < width) & (distance > width - 2 * moved)
         pairs = np.concatenate([pairs, np.column_stack([one[narrow], other[narrow]])])
+        if len(pairs) > _MOST_GAPS:
+            return None
     ends = shapely.get_coordinates(shapely.shortest_line(lines[pairs[:, 0]], lines[pairs[:, 1]]))
     places = ends.reshape(-1, 2, 2).mean(axis=1)
+    if _rays(lines, places[:, 1]) > _WORK:
+        return None
     shapely.prepare(free)
     across = shapely.contains_xy(free, *places.T)
     pairs, places = pairs[across], places[across]

@@ -1,4 +1,4 @@
-"""YAML as the files of maps need it: one mapping of names to values and flat lists, and no more.
+"""YAML as the files of maps need it: mappings, lists and plain values, and no more.
 
 Tags, anchors and aliases are refused, so that no text can stand for more than what is written, nor for
 anything but text: what a value is, who asks for it decides.
@@ -13,11 +13,14 @@ import yaml
 from robocov.errors import MapError, shown
 from robocov.files.strictjson import one_line
 
-Value: TypeAlias = str | list[str] | None
-"""Text, a flat list of it, or None for what is nested deeper."""
+Value: TypeAlias = "str | list[Value] | dict[str, Value]"
+"""Text as it is written, or a list or a mapping of values."""
 
-MAX_BYTES = 65_536
-"""Longest text that is read, in bytes: the YAML of a map has about 200."""
+MAX_BYTES = 262_144
+"""Longest text that is read, in bytes, which takes a second: a map has 200, a world some thousand."""
+
+DEEPEST = 12
+"""Deepest nesting of lists and mappings."""
 
 
 def parse(text: bytes, where: str) -> dict[str, Value]:
@@ -57,9 +60,8 @@ def parse(text: bytes, where: str) -> dict[str, Value]:
 
 def _mapping(text: str, where: str) -> dict[str, Value]:
     result: dict[str, Value] = {}
-    depth = 0
-    key: str | None = None
-    items: list[str] | None = None
+    # the collections that are open, each with the name that waits for its value
+    path: list[tuple[list[Value] | dict[str, Value], str | None]] = []
     # the events come as they are read: a bomb is refused at its first fuse
     for event in yaml.parse(text, Loader=yaml.BaseLoader):
         line = f"{where}: line {event.start_mark.line + 1 if event.start_mark else 0}"
@@ -70,31 +72,39 @@ def _mapping(text: str, where: str) -> dict[str, Value]:
             raise MapError(f"{line}: the tag {shown(tag)}, but a plain value was wanted")
         if isinstance(event, yaml.DocumentStartEvent) and result:
             raise MapError(f"{line}: a second document, but one was wanted")
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth == 1 and not isinstance(event, yaml.MappingStartEvent):
-                raise MapError(f"{line}: a list, but a mapping (name: value) was wanted")
-            if depth > 1 and key is None:
-                raise MapError(f"{line}: a name that is a collection, but a word was wanted")
-            if depth > 3:
-                raise MapError(f"{line}: nested too deeply, but at most 3 levels were wanted")
-            items = [] if depth == 2 and isinstance(event, yaml.SequenceStartEvent) else None
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-            if depth == 1 and key is not None:
-                result[key] = items
-                key = None
-        elif isinstance(event, yaml.ScalarEvent):
-            if depth == 0:
-                raise MapError(f"{line}: {shown(event.value)}, but a mapping (name: value) was wanted")
-            if depth > 1:
-                if depth == 2 and items is not None:
-                    items.append(event.value)
-            elif key is None:
-                key = event.value
-                if key in result:
-                    raise MapError(f"{line}: {one_line(key)}: given twice, but once was wanted")
-            else:
-                result[key] = event.value
-                key = None
+        if isinstance(event, yaml.CollectionEndEvent):
+            path.pop()
+            continue
+        if not isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent):
+            continue
+        value: Value = {} if isinstance(event, yaml.MappingStartEvent) else []
+        if isinstance(event, yaml.ScalarEvent):
+            value = event.value
+        if not path:
+            if not isinstance(value, dict):
+                found = "a list" if isinstance(value, list) else shown(value)
+                raise MapError(f"{line}: {found}, but a mapping (name: value) was wanted")
+            result = value
+        else:
+            _put(path, value, line)
+        if not isinstance(value, str):
+            path.append((value, None))
+        if len(path) > DEEPEST:
+            raise MapError(f"{line}: nested too deeply, but at most {DEEPEST} levels were wanted")
     return result
+
+
+def _put(path: list[tuple[list[Value] | dict[str, Value], str | None]], value: Value, line: str) -> None:
+    """Put a value into the innermost collection that is open: an item, a name, or what a name stands for."""
+    inside, key = path[-1]
+    if isinstance(inside, list):
+        inside.append(value)
+    elif key is not None:
+        inside[key] = value
+        path[-1] = (inside, None)
+    elif not isinstance(value, str):
+        raise MapError(f"{line}: a name that is a collection, but a word was wanted")
+    elif value in inside:
+        raise MapError(f"{line}: {one_line(value)}: given twice, but once was wanted")
+    else:
+        path[-1] = (inside, value)

@@ -103,15 +103,14 @@ def foreign_map(
             )
         free &= main
         boundary = _around(main, where)
-    outline = _traced(free, where)
+    area = _moved(_traced(free, where), cell, origin, yaw)
     return ForeignMap(
         name=name,
         description=description,
         format=format,
-        free=_moved(outline, cell, origin, yaw),
+        free=area,
         boundary=None if boundary is None else _moved(boundary, cell, origin, yaw),
-        vertices_read=int(shapely.get_num_coordinates(shapely.get_rings(list(outline.geoms))).sum())
-        - sum(1 + len(part.interiors) for part in outline.geoms),
+        vertices_read=vertices_of(area),
         cell=cell,
         specks=noise * cell * cell,
         repaired=repaired,
@@ -120,7 +119,40 @@ def foreign_map(
     )
 
 
-def _placed(points: Array, cell: float, origin: tuple[float, float], yaw: float) -> Array:
+def free_area(
+    free: BoolArray, cell: tuple[float, float], origin: tuple[float, float], where: str
+) -> MultiPolygon:
+    """Return the free cells as polygons, in metres.
+
+    Parameters
+    ----------
+    free : (rows, columns)
+        The top row first.
+    cell : (width, height), m
+        Sides of a cell.
+    origin : (x, y), m
+        Lower left corner of the lower left cell.
+    where : str
+        What messages call the file.
+
+    Raises
+    ------
+    MapError
+        When no cell is free, or their outline is too rough.
+    """
+    if not free.any():
+        raise MapError(f"{where}: no cell is free, but some were wanted")
+    return _moved(_traced(free[::-1], where), cell, origin, 0.0)
+
+
+def vertices_of(area: MultiPolygon) -> int:
+    """Return the number of vertices of polygons."""
+    return int(shapely.get_num_coordinates(area)) - sum(1 + len(part.interiors) for part in area.geoms)
+
+
+def _placed(
+    points: Array, cell: float | tuple[float, float], origin: tuple[float, float], yaw: float
+) -> Array:
     """Return (n, 2) places in the grid, in cells, in metres on the map."""
     x, y = (points * cell).T
     if yaw:
@@ -128,7 +160,9 @@ def _placed(points: Array, cell: float, origin: tuple[float, float], yaw: float)
     return np.column_stack([x + origin[0], y + origin[1]])
 
 
-def _moved(outline: MultiPolygon, cell: float, origin: tuple[float, float], yaw: float) -> MultiPolygon:
+def _moved(
+    outline: MultiPolygon, cell: float | tuple[float, float], origin: tuple[float, float], yaw: float
+) -> MultiPolygon:
     """Return `outline`, in cells, in metres on the map."""
     placed: MultiPolygon = shapely.transform(outline, lambda points: _placed(points, cell, origin, yaw))
     return placed

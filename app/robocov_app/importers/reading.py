@@ -25,7 +25,7 @@ class ReadOptions:
     Attributes
     ----------
     cell : float, m
-        Side of a cell of a grid, metres a pixel of a picture.
+        Side of a cell of a grid, width of a tile, metres a pixel of a picture.
     unknown : str
         What unknown or transparent cells are: ``obstacle`` (the default), ``free``, or ``cut``: outside
         of the map, which ends where the known cells end.
@@ -40,7 +40,7 @@ class ReadOptions:
     anywhere : bool
         Whether a file may name another one outside of its own folder.
     scale : float, m
-        Metres that a unit of a vector format stands for.
+        Metres that a unit of a vector format, or a pixel of a tile map, stands for.
     units : str
         What coordinates on the globe are: ``degrees``, or ``metres``, whatever the file says of itself.
     thickness : float, m

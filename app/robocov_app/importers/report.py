@@ -42,6 +42,8 @@ class ImportReport:
         By how much walls were allowed to move.
     moved_area : float, m²
         Area that was free and is not, or is and was not, for the simplification.
+    moved : float, m
+        By how much a wall moved for it, at most.
     others : tuple of (x, y), m
         A place in each of the largest parts of the free space that were left out, as `Shaping.inside` takes
         it; empty where what was left out is not worth a word.
@@ -61,6 +63,7 @@ class ImportReport:
     obstacles: int = 0
     tolerance: float = 0.0
     moved_area: float = 0.0
+    moved: float = 0.0
     others: tuple[tuple[float, float], ...] = ()
 
     def lines(self) -> list[str]:
@@ -88,6 +91,7 @@ class ImportReport:
             "obstacles": self.obstacles,
             "tolerance_m": self.tolerance,
             "moved_area_m2": self.moved_area,
+            "moved_m": self.moved,
             "other_parts_m": [list(place) for place in self.others],
             "repaired": list(self.repaired),
             "dropped": list(self.dropped),

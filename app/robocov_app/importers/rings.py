@@ -11,6 +11,7 @@ import numpy as np
 from robocov.files.strictjson import one_line
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.json_file import located_errors, positions, read_json, refused
+from robocov_app.importers.limits import require_shapes
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes
 
@@ -53,13 +54,20 @@ def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
     scale = 1.0 if options.scale is None else options.scale
     with located_errors(content, where):
         polygons = _polygons(document, where, shapes)
+    require_shapes(len(polygons), where)
     for number, rings in enumerate(polygons, start=1):
         if not shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}"):
             shapes.leave_out("outline", "without an area")
     notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
     name = one_line(path.stem)[:60] or "map"
     return foreign_map(
-        shapes, format=IMPORTER.name, name=name, description="Imported from rings.", solid=False, notes=notes
+        shapes,
+        format=IMPORTER.name,
+        name=name,
+        description="Imported from rings.",
+        solid=False,
+        accessible=True,
+        notes=notes,
     )
 
 

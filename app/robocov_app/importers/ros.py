@@ -16,7 +16,7 @@ in the free space are taken as noise, and dropped, unless the size of specks say
 from __future__ import annotations
 
 import math
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ from robocov.errors import MapError, ParameterError, shown
 from robocov.files.strictjson import one_line
 from robocov_app.importers import limits, plain_yaml
 from robocov_app.importers.images import Brightness, read_picture
+from robocov_app.importers.named_files import named_file
 from robocov_app.importers.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
 
@@ -35,9 +36,6 @@ _OCCUPIED, _FREE = 0.65, 0.196
 """Thresholds of a file that gives none, as map_server writes them."""
 
 _KNOWN = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
-
-_LONG = 400
-"""Longest name of a picture, in characters."""
 
 _NOISE = 1.5
 """In maps that robots made single cells are noise."""
@@ -68,7 +66,10 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, "
             f"but numbers from 0 to 1 were wanted, the first not the larger"
         )
-    image, moved = _image(path, _text(given, "image", where), bool(options.anywhere), where)
+    name = _text(given, "image", where)
+    image, moved = named_file(
+        path, name, anywhere=bool(options.anywhere), at=f"{where}: image", what="picture"
+    )
     picture = read_picture(image, one_line(image))
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
@@ -149,40 +150,6 @@ def _doubted(picture: Brightness, negate: bool, free: float) -> list[str]:
     ]
 
 
-def _image(path: Path, name: str, anywhere: bool, where: str) -> tuple[Path, str | None]:
-    """Return the picture that the file at `path` names, and what was put right about it.
-
-    It must be in the file's folder or below. Savers write where it was when it was saved, often from
-    the root, and it may have moved with the file: one of the same name beside it is as good.
-    """
-    if not name:
-        raise MapError(f"{where}: image: empty, but the name of a picture was wanted")
-    if len(name) > _LONG:
-        raise MapError(
-            f"{where}: image: {shown(name)}: {len(name)} characters, but a shorter name was wanted"
-        )
-    named = path.parent / name
-    beside = path.parent / PureWindowsPath(name).name
-    try:
-        allowed = anywhere or _inside(named, path.parent)
-        if not (allowed and named.exists()) and beside.is_file() and _inside(beside, path.parent):
-            return beside, f"image: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
-        raise MapError(f"{where}: image: {shown(name)}: {reason}") from None
-    if not allowed:
-        raise MapError(
-            f"{where}: image: {shown(name)} is outside of the file's folder, but a picture in it was wanted "
-            f"(--anywhere allows it)"
-        )
-    return named, None
-
-
-def _inside(image: Path, folder: Path) -> bool:
-    """Return whether `image` is in `folder` or below, links followed."""
-    return image.resolve().is_relative_to(folder.resolve())
-
-
 def _origin(given: dict[str, plain_yaml.Value], where: str) -> tuple[float, float, float]:
     """Return x, y (m) and yaw (rad) of the lower left corner."""
     values = given.get("origin", ["0", "0", "0"])
@@ -216,9 +183,9 @@ def _number(given: dict[str, plain_yaml.Value], key: str, where: str, default: f
     return _parsed(_text(given, key, where), f"{where}: {key}")
 
 
-def _parsed(text: str, where: str) -> float:
+def _parsed(text: plain_yaml.Value, where: str) -> float:
     try:
-        value = float(text)
+        value = float(text) if isinstance(text, str) else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -17,7 +17,7 @@ from robocov.files.strictjson import one_line
 from robocov.mapfile.fields import LONGEST_LABEL
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.importers import limits
-from robocov_app.importers.fills import Rule, edges_of, enclosed, require_untangled
+from robocov_app.importers.fills import Crossings, Rule, edges_of, enclosed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -166,6 +166,10 @@ class Shapes:
     mended: Counter[tuple[str, str]] = field(default_factory=Counter)
     _heights: list[Array] = field(default_factory=list)
     _met: list[str] = field(default_factory=list)
+    _crossings: Crossings = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._crossings = Crossings(self.where)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
@@ -206,7 +210,9 @@ class Shapes:
             When a coordinate is out of range, or there are too many vertices or crossings.
         """
         rings = self._checked(rings, at)
-        area, reason = enclosed(rings, rule, self.where)
+        area, reason, lost = enclosed(rings, rule, self._crossings)
+        for why, count in lost.items():
+            self.leave_out("hole", why, count)
         if reason is not None:
             self._met.append(f"{at}: {reason}" if at else reason)
         if not area.is_empty:
@@ -341,7 +347,7 @@ class Shapes:
             for ring in (part.exterior, *part.interiors)
         ]
         lines = edges_of([line.points for line in self.lines], closed=False)
-        require_untangled(np.concatenate([edges_of(rings, closed=True), lines]), self.where)
+        Crossings(self.where).add(np.concatenate([edges_of(rings, closed=True), lines]))
 
     def _checked(self, rings: Sequence[Array], at: str) -> list[Array]:
         """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
@@ -360,12 +366,14 @@ class Shapes:
 
 
 def _many(count: int, thing: str) -> str:
-    """Return how many things there are: of an English noun with y, too.
+    """Return how many things there are: of English nouns with y and x, too.
 
-    >>> _many(2, "empty geometry")
-    '2 empty geometries'
+    >>> _many(2, "empty geometry"), _many(2, "box")
+    ('2 empty geometries', '2 boxes')
     """
-    return f"{count} {thing[:-1]}ies" if count != 1 and thing.endswith("y") else counted(count, thing)
+    if count != 1 and thing.endswith(("y", "x")):
+        return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
+    return counted(count, thing)
 
 
 def name_of(labels: Sequence[str]) -> str | None:

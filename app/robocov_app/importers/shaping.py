@@ -11,16 +11,17 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import GAP, DiscStart, StartSpec, UniformStart
+from robocov.environment.starts import GAP, DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, counted, shown
 from robocov.files.strictjson import one_line
 from robocov.mapfile import from_json, to_json
+from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers.bounding import CRUMB, bounded, filled, polygons, rounded
 from robocov_app.importers.corners import sharpened
-from robocov_app.importers.passing import rooms
-from robocov_app.importers.primitives import points_of, with_primitives
+from robocov_app.importers.passing import moved_walls, roomiest, rooms
+from robocov_app.importers.primitives import with_primitives
 from robocov_app.importers.report import ImportReport, square_metres
 from robocov_app.importers.simplifying import simplified
 
@@ -50,8 +51,11 @@ how to choose."""
 _OFFERED = 3
 """So many of the largest parts that are left out are named, with a place in each."""
 
-_SOON = 50_000
+_SOON = 10_000
 """Of maps with more vertices it takes too long to say where robots do not pass."""
+
+MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
+"""Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,8 @@ class Shaping:
         Smaller obstacles, and smaller separate parts of the free space, are dropped; 0 keeps all. None:
         what is noise in maps of that format, as single cells are in those that robots made.
     keep : str
-        ``largest``: the largest connected part of the free space; ``all``: every part.
+        ``largest``: the largest connected part of the free space, or, where the file places robots, the one
+        with most of them; ``all``: every part.
     inside : (x, y) or None, m
         The connected part that holds this place is kept, instead of the largest: in metres of the map, as
         the report and the preview give them.
@@ -118,6 +123,9 @@ class Shaping:
                 raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
 
+_MOST_ROBOTS = 1000
+"""Of a file, so many are looked at."""
+
 _ZERO = 1e-100
 """Coordinates nearer to zero, in metres, are zero; as of map files."""
 
@@ -152,16 +160,18 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     outer = _valid_boundary(foreign.boundary, told)
     read = _valid(foreign.free, outer, told, where)
     least = foreign.specks if shaping.specks is None else shaping.specks
-    parts = _without_specks(_kept(read, shaping, least, told, where), foreign.cell, least, told)
-    if shaping.inside is not None and outer is not None and outer.contains_properly(parts[0]):
+    parts = _kept(read, shaping, foreign.robots, least, told, where)
+    parts = _without_specks(parts, foreign.cell, least, told)
+    chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
+    if chosen and outer is not None and outer.contains_properly(parts[0]):
         outer = None  # what is around the other parts is not around this one
+    _require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES, where)
     _require_room(parts, shaping, where)
     tolerance = shaping.simplify
     if tolerance is None:
         tolerance = _default_tolerance(foreign.cell, shaping.radius, told)
-    if foreign.cut_corners:
-        parts = [sharpened(part, tolerance) for part in parts]
-    simple = simplified(MultiPolygon(parts), tolerance, foreign.cell, shaping.radius)
+    drawn = [sharpened(part, tolerance) for part in parts] if foreign.cut_corners else parts
+    simple = simplified(MultiPolygon(drawn), tolerance, foreign.cell, shaping.radius)
     told.changed += simple.changed
     if outer is not None:
         straight = simplified(MultiPolygon([outer]), tolerance, foreign.cell, shaping.radius)
@@ -172,34 +182,44 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     free = rounded(simple.free, digits)
     if free.is_empty:
         raise MapError(f"{where}: {read.area:.3g} m² are free, but more was wanted: is the scale right?")
+    _require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT, where)
+    moved = moved_walls(MultiPolygon(parts), free)
+    if moved.distance >= 1e-3:
+        told.changed.append(
+            f"walls moved by at most {moved.distance:.2g} m; {square_metres(moved.area, 2)} changed sides, "
+            f"{100 * moved.area / free.area:.2g} % of the free area"
+        )
     boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
     if outer is not None:
         solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
-    kept: list[Primitive] = []
+    drawn_as: list[Primitive] = []
     if foreign.primitives and shapely.get_num_coordinates(free) <= _SOON:
         places = max(len(rooms(space, shaping.radius)) for space in (MultiPolygon(parts), free))
-        kept, solid = with_primitives(
+        drawn_as, solid = with_primitives(
             solid, foreign.primitives, boundary, simple.tolerance, digits, places, shaping.radius
         )
-        if kept:  # its vertices where polygons began that are gone
+        if drawn_as:  # its vertices where polygons began that are gone
             boundary = boundary.simplify(0.0)
     obstacles = _obstacles(solid, digits, told)
     environment = Environment(
         name=one_line(foreign.name)[:100].strip() or "map",
         boundary=_ring(boundary.exterior, digits),
-        obstacles=(*obstacles, *kept),
-        starts=_starts(free, shaping),
+        obstacles=(*obstacles, *drawn_as),
+        starts=_starts(free, shaping, foreign.robots, told),
         description=foreign.description[:10_000],
     )
     # through the rules of map files: what is imported can be saved and loaded
     environment = from_json(to_json(environment), where)
     _note_unreached(environment, shaping.radius, told)
     width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
+    kept = vertex_count(environment)
+    if kept > MANY_VERTICES:
+        told.notes.append(many_vertices(kept))
     report = ImportReport(
         source=where,
         format=foreign.format,
         vertices_read=foreign.vertices_read,
-        vertices_kept=_vertices(environment),
+        vertices_kept=kept,
         area_read=float(read.area),
         area_kept=environment.free_area,
         repaired=tuple(told.repaired),
@@ -209,6 +229,8 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
         size=(round(width, digits), round(height, digits)),
         obstacles=len(environment.obstacles),
         tolerance=simple.tolerance,
+        moved_area=moved.area,
+        moved=moved.distance,
         others=tuple(told.others),
     )
     return environment, report
@@ -254,14 +276,26 @@ def _reason(geometry: BaseGeometry) -> str:
     return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
 
 
-def _kept(free: MultiPolygon, shaping: Shaping, specks: float, told: _Told, where: str) -> list[Polygon]:
+def _kept(
+    free: MultiPolygon,
+    shaping: Shaping,
+    robots: tuple[tuple[float, float], ...],
+    specks: float,
+    told: _Told,
+    where: str,
+) -> list[Polygon]:
     """Return the parts of the free space that stay, the largest first."""
     parts = np.array(free.geoms, dtype=object)
     area = shapely.area(parts)
     if shaping.inside is not None:
         stays = np.arange(len(parts)) == _part_around(shaping.inside, parts, where)
     elif shaping.keep == "largest":
-        stays = np.arange(len(parts)) == 0
+        shapely.prepare(parts)
+        places = shapely.points(np.array(robots[:_MOST_ROBOTS]).reshape(-1, 2))
+        most = int(np.argmax([shapely.contains(part, places).sum() for part in parts])) if robots else 0
+        stays = np.arange(len(parts)) == most
+        if most:
+            told.notes.append("the part of the free space with most robots stays, which is not the largest")
     else:
         stays = area >= max(specks, min(CRUMB, area[0]))
     kept: list[Polygon] = parts[stays].tolist()
@@ -399,19 +433,18 @@ def _obstacles(solid: list[Polygon], digits: int, told: _Told) -> tuple[PolygonO
     )
 
 
-def _vertices(environment: Environment) -> int:
-    count = len(environment.boundary)
-    for obstacle in environment.obstacles:
-        if isinstance(obstacle, PolygonObstacle):
-            count += len(obstacle.vertices) + sum(map(len, obstacle.holes))
-        else:
-            count += points_of(obstacle)
-    return count
-
-
 def _clearance(shaping: Shaping) -> float:
     """Return how far from walls a robot starts, m: the rules of maps want room for the usual one."""
     return max(DEFAULT_RADIUS, shaping.radius) * (1 + GAP)
+
+
+def _require_few(count: int, what: str, most: int, where: str) -> None:
+    """Check that a map is none that takes minutes to make, and for ever to simulate."""
+    if count > most:
+        raise MapError(
+            f"{where}: {count} {what}, but at most {most} were wanted: --specks AREA drops small "
+            "obstacles, --simplify METRES draws walls with fewer vertices"
+        )
 
 
 def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
@@ -419,8 +452,8 @@ def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
     clearance = _clearance(shaping)
     widest = 0.0
     for part in parts:
-        if math.sqrt(part.area) > widest:
-            widest = max(widest, shapely.maximum_inscribed_circle(part, tolerance=clearance / 50).length)
+        if math.sqrt(part.area / math.pi) > widest:
+            widest = max(widest, roomiest(part, clearance / 50, clearance)[1])
         if widest >= clearance:
             return
     raise MapError(
@@ -429,20 +462,32 @@ def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
     )
 
 
-def _starts(free: MultiPolygon, shaping: Shaping) -> dict[str, StartSpec]:
-    """Return the starts: a disc at the roomiest place, and everywhere."""
+def _starts(
+    free: MultiPolygon, shaping: Shaping, robots: tuple[tuple[float, float], ...], told: _Told
+) -> dict[str, StartSpec]:
+    """Return the starts: a disc at the roomiest place, everywhere, and where the file places robots."""
     clearance = _clearance(shaping)
     part = free.geoms[0]
     # what is finer than this does not move a start by much
-    spoke = shapely.maximum_inscribed_circle(part, tolerance=max(0.01, math.sqrt(part.area) / 500))
-    x, y = spoke.coords[0]
+    (x, y), room = roomiest(part, max(0.01, math.sqrt(part.area) / 500))
     # the disc holds centres: one robot's radius stays between it and the walls
-    radius = min(spoke.length - clearance, 2.0)
+    radius = min(room - clearance, 2.0)
     starts: dict[str, StartSpec] = {"uniform": UniformStart()}
     if radius >= 0.02:
-        room = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
-        both: dict[str, StartSpec] = {"room": room, **starts}
+        disc = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+        both: dict[str, StartSpec] = {"room": disc, **starts}
         starts = both if shaping.default_start == "room" else dict(reversed(both.items()))
+    if robots:
+        given = np.array(list(dict.fromkeys(robots))[:_MOST_ROBOTS])
+        fits = shapely.contains_properly(free, shapely.points(given))
+        fits &= shapely.distance(free.boundary, shapely.points(given)) >= clearance
+        for k in np.flatnonzero(fits).tolist():
+            fits[k] = (np.hypot(*(given[:k][fits[:k]] - given[k]).T) >= 2 * clearance).all()
+        if fits.any():
+            starts["robots"] = PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
+        rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
+        many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
+        told.notes.append(f'start "robots": {many} of robots in the file{rest}')
     return starts
 
 

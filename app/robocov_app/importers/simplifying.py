@@ -46,8 +46,8 @@ _HALVINGS = 3
 _PATIENCE = 24
 """After so many rounds all of a wall stays where something is wrong."""
 
-_ROUNDS = 60
-"""After so many everything stays everywhere."""
+_ROUNDS, _WORK = 60, 1_000_000
+"""After so many everything stays everywhere, and after so many times the vertices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
         allowed[blocks[outline.ring]] = 0.0
     fixed = np.zeros(len(outline.points), dtype=bool)
     found = _Found(2 * radius)
-    for attempt in range(_ROUNDS):
+    for attempt in range(min(_ROUNDS, 1 + _WORK // len(allowed))):
         drawing = balanced(outline, drawn(outline, allowed, fixed), allowed)
         wrong, far = _misdrawn(outline, drawing, allowed, tolerance, found)
         parts = None
@@ -132,6 +132,8 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
             allowed[allowed < 0.75 * tolerance * 0.5**_HALVINGS] = 0.0
             continue
         narrow = _narrowed(outline, drawing, parts, allowed, tolerance, found)
+        if narrow is None:
+            return Simplified(free, 0.0, ("not simplified: too many gaps that a robot may pass or not",))
         if not narrow.any():
             return Simplified(parts, tolerance, found.lines())
         allowed[narrow] = 0.0
@@ -225,15 +227,21 @@ def _met(
 
 def _narrowed(
     outline: Outline, drawing: Drawing, parts: MultiPolygon, allowed: Array, tolerance: float, found: _Found
-) -> BoolArray:
-    """Return which vertices of the outline are about gaps that a robot does not pass any more."""
+) -> BoolArray | None:
+    """Return which vertices of the outline are about gaps that a robot does not pass any more.
+
+    None where there are too many gaps to look at.
+    """
     after, _ = neighbours(drawing.begin, len(drawing.points))
     sides = np.stack([drawing.points, drawing.points[after]], axis=1)
     # a side from or to the middle of a short one stands for all of that
     first, last = drawing.source.astype(np.intp), np.ceil(drawing.source[after]).astype(np.intp)
     ring = np.searchsorted(outline.begin, first, side="right") - 1
     paths = paths_of(outline.points, outline.begin[ring], outline.size[ring], first, last)
-    pairs, places = closed_gaps(sides, paths, parts, found.width, 3 * tolerance)
+    closed = closed_gaps(sides, paths, parts, found.width, 3 * tolerance)
+    if closed is None:
+        return None
+    pairs, places = closed
     wrong = np.zeros(len(outline.points), dtype=bool)
     if len(pairs):
         side = _sides(outline, drawing)

@@ -14,7 +14,7 @@ from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes
 from robocov_app.importers.svg_drawing import SvgDrawing, view_box
 from robocov_app.importers.svg_numbers import PIXEL, affine, composed, fitted, length, numbers
-from robocov_app.importers.svg_tree import Element, read_svg_tree
+from robocov_app.importers.xml_tree import Element, read_svg_tree
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,7 @@ import numpy as np
 from robocov.errors import MapError
 from robocov_app.importers.curves import TOLERANCE, arc
 from robocov_app.importers.fills import Rule
-from robocov_app.importers.limits import MAX_DRAWN
+from robocov_app.importers.limits import MAX_DRAWN, require_shapes
 from robocov_app.importers.shapes import Line, Shapes
 from robocov_app.importers.svg_numbers import (
     affine,
@@ -25,7 +25,7 @@ from robocov_app.importers.svg_numbers import (
 )
 from robocov_app.importers.svg_path import MOST_DRAWS, subpaths
 from robocov_app.importers.svg_style import INHERITED, Style, StyleSheet, inherited, is_hidden, is_painted
-from robocov_app.importers.svg_tree import DEEPEST, MOST_ELEMENTS, Element
+from robocov_app.importers.xml_tree import DEEPEST, MOST_ELEMENTS, Element
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
@@ -129,10 +129,10 @@ class SvgDrawing:
 
     def _require_few(self) -> None:
         """Count what will be drawn, uses and all, without drawing it: a few kB may stand for billions."""
-        counted: dict[Element, int] = {}
+        counted: dict[Element, tuple[int, int]] = {}
         inside: set[Element] = set()
 
-        def count(element: Element, depth: int) -> int:
+        def count(element: Element, depth: int) -> tuple[int, int]:
             if element in inside:
                 element.refuse(self.where, "is used within itself, but an end was wanted")
             if depth > DEEPEST:
@@ -143,15 +143,21 @@ class SvgDrawing:
                 target = self._target(element)
                 if target is not None:
                     inner.append(target)
-                counted[element] = 1 + sum(count(each, depth + 1) for each in inner)
+                elements, shapes = 1, int(element.tag in SHAPES)
+                for each in inner:
+                    more = count(each, depth + 1)
+                    elements, shapes = elements + more[0], shapes + more[1]
+                counted[element] = elements, shapes
                 inside.discard(element)
             return counted[element]
 
-        if count(self.root, 0) > MOST_ELEMENTS:
+        elements, shapes = count(self.root, 0)
+        if elements > MOST_ELEMENTS:
             raise MapError(
-                f"{self.where}: {counted[self.root]:.3g} elements to be drawn, uses and all, but at most "
+                f"{self.where}: {elements:.3g} elements to be drawn, uses and all, but at most "
                 f"{MOST_ELEMENTS} were wanted"
             )
+        require_shapes(shapes, self.where)
 
     def _target(self, element: Element) -> Element | None:
         """Return what a ``use`` uses, if it is in this file."""

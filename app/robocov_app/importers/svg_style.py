@@ -11,7 +11,7 @@ from robocov.errors import MapError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from robocov_app.importers.svg_tree import Element
+    from robocov_app.importers.xml_tree import Element
 
 Style: TypeAlias = "Mapping[str, str]"
 """Properties by name, as they are written."""

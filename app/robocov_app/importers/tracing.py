@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 NECK = 1 / 32
 """Where obstacles touch at a corner, so much of each side of the two free cells is cut off, in cells."""
 
+_STRIP = 512
+"""Rows that are looked at together."""
+
 
 def traced(free: BoolArray, where: str) -> MultiPolygon:
     """Return the union of the free cells, one polygon for each of their connected parts.
@@ -71,20 +74,25 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
 
 
 def _corners(free: BoolArray, where: str) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return column and row of the corners of the outline, row by row, and where two meet in one.
-
-    They are counted before there is room made for them.
-    """
-    padded = np.pad(free, 1)
-    south_west, south_east = padded[:-1, :-1], padded[:-1, 1:]
-    north_west, north_east = padded[1:, :-1], padded[1:, 1:]
-    twins = (south_west == north_east) & (south_east == north_west) & (south_west != south_east)
-    corners = south_west ^ south_east ^ north_west ^ north_east
-    corners |= twins
-    # where two meet, each is a neck of two
-    require_vertices(int(np.count_nonzero(corners)) + 3 * int(np.count_nonzero(twins)), where)
-    row, column = corners.nonzero()
-    return column, row, twins[row, column]
+    """Return column and row of the corners of the outline, row by row, and where two meet in one."""
+    row, column, twin = [], [], []
+    count = 0
+    for low in range(0, len(free) + 1, _STRIP):  # which bounds the memory
+        strip = np.pad(free[max(low - 1, 0) : low + _STRIP], ((low == 0, 0), (1, 1)))
+        padded = np.pad(strip, ((0, low + _STRIP > len(free)), (0, 0)))
+        south_west, south_east = padded[:-1, :-1], padded[:-1, 1:]
+        north_west, north_east = padded[1:, :-1], padded[1:, 1:]
+        twins = (south_west == north_east) & (south_east == north_west) & (south_west != south_east)
+        corners = south_west ^ south_east ^ north_west ^ north_east
+        corners |= twins
+        # where two meet, each is a neck of two
+        count += int(np.count_nonzero(corners)) + 3 * int(np.count_nonzero(twins))
+        require_vertices(count, where)
+        rows, columns = corners.nonzero()
+        row.append(rows + low)
+        column.append(columns)
+        twin.append(twins[rows, columns])
+    return np.concatenate(column), np.concatenate(row), np.concatenate(twin)
 
 
 def _links(
@@ -104,10 +112,15 @@ def _links(
     points : (k, 2, 2)
         Where the outline comes to it, and where it leaves it: the same but for necks.
     """
-    labels = ndimage.label(np.pad(free, 1))[0]
-    south_west, south_east, north_west, north_east = (
-        labels[row + up, column + right].repeat(1 + twin) for up in (0, 1) for right in (0, 1)
-    )
+    labels = ndimage.label(free)[0]
+
+    def around(up: int, right: int) -> NDArray[np.int32]:
+        y, x = row + up - 1, column + right - 1
+        within = (y >= 0) & (y < free.shape[0]) & (x >= 0) & (x < free.shape[1])
+        part = np.where(within, labels[np.where(within, y, 0), np.where(within, x, 0)], 0)
+        return np.asarray(part.repeat(1 + twin))
+
+    south_west, south_east, north_west, north_east = (around(up, right) for up in (0, 1) for right in (0, 1))
     west = (south_west > 0) != (north_west > 0)
     north = (north_west > 0) != (north_east > 0)
     first = (np.arange(len(twin)) + np.cumsum(twin) - twin)[twin]

@@ -33,10 +33,11 @@ def is_wkt(path: Path, head: bytes) -> bool:
 def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that the geometries of a file of well-known text stand for.
 
-    Polygons are free space, and their holes are obstacles: JuPedSim's walkable areas. Where one polygon holds
-    most of the others, those are obstacles in it; where there are only lines they are walls. The option
-    ``outlines`` says it otherwise; see `robocov_app.importers.enclosing.foreign_map`. Third coordinates and
-    measures are left out. Coordinates are metres, unless a prefix ``SRID=...;`` names a system other than 0.
+    Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
+    Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
+    it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
+    `robocov_app.importers.enclosing.foreign_map`. Third coordinates and measures are left out. Coordinates
+    are metres, unless a prefix ``SRID=...;`` names a system other than 0.
 
     Parameters
     ----------
@@ -59,7 +60,13 @@ def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.join_lines()
     name = one_line(path.stem)[:60] or "map"
     return foreign_map(
-        shapes, format=IMPORTER.name, name=name, description="Imported from WKT.", solid=False, notes=notes
+        shapes,
+        format=IMPORTER.name,
+        name=name,
+        description="Imported from WKT.",
+        solid=False,
+        accessible=True,
+        notes=notes,
     )
 
 

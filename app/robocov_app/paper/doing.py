@@ -5,24 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov_app.paper.studying import Stopped, swept
 from robocov_app.sweep.ledger import opened
 from robocov_app.sweep.pool import LocalPool
+from robocov_app.sweep.sweeping import worked_off
 from robocov_app.sweep.task import tasks_of
 from robocov_app.sweep.telling import Count, told
 
 if TYPE_CHECKING:
     from robocov_app.paper.studying import Means
-    from robocov_app.sweep.crew import Crew
     from robocov_app.sweep.ledger import Ledger
+    from robocov_app.sweep.performing import Outcome
     from robocov_app.sweep.study import Study
     from robocov_app.sweep.task import Task
-
-_PATIENCE = 0.2
-"""Seconds between two looks whether somebody has pressed Ctrl-C."""
 
 
 def swept_together(studies: Mapping[str, Study], folder: Path, means: Means, title: str) -> None:
@@ -66,34 +65,27 @@ def swept_together(studies: Mapping[str, Study], folder: Path, means: Means, tit
 def _filled(
     studies: Mapping[str, Study], ledgers: Mapping[str, Ledger], means: Means, title: str, stack: ExitStack
 ) -> None:
-    waiting = [
-        (ledgers[name], each)
-        for name, study in studies.items()
-        for each in tasks_of(study)
-        if ledgers[name].entry(each) is None
-    ]
-    if not waiting or means.stop.requested:
+    waiting: list[tuple[Ledger, Task]] = []
+    notes = []
+    for name, study in studies.items():
+        survey = ledgers[name].survey(tasks_of(study), keep_versions=means.keep_versions)
+        waiting += [(ledgers[name], task) for task in compress(tasks_of(study), survey.todo)]
+        notes += [f"{name}: {line}" for line in survey.words(keep_versions=means.keep_versions)]
+    if not waiting and not notes:
         return
-    count = Count(len(waiting))
+    tasks = {task.digest: task for _, task in waiting}.values()
+    count = Count(len(tasks))
     tell = stack.enter_context(told(title, count, quiet=means.quiet))
-    crew: Crew = stack.enter_context(LocalPool(min(means.workers, len(waiting))))
+    for note in notes:
+        tell.say(note)
     # two studies may have a task in common
     homes: dict[str, list[Ledger]] = {}
-    for ledger, each in waiting:
-        homes.setdefault(each.digest, []).append(ledger)
-    left = iter({each.digest: each for _, each in waiting}.values())
-    task: Task | None = next(left, None)
-    while (task is not None or crew.busy) and not means.stop.requested:
-        while task is not None and not crew.full:
-            crew.submit(task)
-            task = next(left, None)
-        back = crew.next(_PATIENCE)
-        if back is not None:
-            done, outcome = back
-            for ledger in homes[done.digest]:
-                ledger.keep(done, outcome)
-                if outcome.error is None:
-                    count.done += 1
-                else:
-                    count.failed += 1
+    for ledger, task in waiting:
+        homes.setdefault(task.digest, []).append(ledger)
+
+    def keep(task: Task, outcome: Outcome) -> None:
+        for ledger in homes[task.digest]:
+            ledger.keep(task, outcome)
+
+    for _ in worked_off(tasks, lambda: LocalPool(min(means.workers, len(tasks))), count, means.stop, keep):
         tell(count)

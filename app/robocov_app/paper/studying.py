@@ -51,12 +51,15 @@ class Means:
     quiet : bool
         Tell nothing.
     stop : Interruption
+    keep_versions : bool
+        Use runs that other versions of robocov, or of what it computes with, have done.
     """
 
     workers: int
     scheduler: str | None
     quiet: bool
     stop: Interruption
+    keep_versions: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,6 +341,7 @@ def swept(study: Study, folder: Path, name: str, means: Means) -> None:
         target,
         workers=means.workers,
         scheduler=means.scheduler,
+        keep_versions=means.keep_versions,
         quiet=means.quiet,
         title=f"paper: {name}",
         stop=means.stop,

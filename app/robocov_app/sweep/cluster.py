@@ -63,7 +63,7 @@ class Cluster(Crew):
         except (OSError, ValueError, TypeError, TimeoutError) as error:
             reason = " ".join(str(error).split()) or f"no answer in {PATIENCE:g} s"
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
-        self._most, self._asked = _LEAST, -math.inf
+        self._threads, self._asked = 0, -math.inf
         # what it has to say of a scheduler that goes is said here, in one line
         self._talk = logging.getLogger("distributed.client")
         self._level = self._talk.level
@@ -79,16 +79,22 @@ class Cluster(Crew):
     @property
     def most(self) -> int:
         """Twice as many as there are threads: on its way to a worker, a task takes time."""
-        if time.monotonic() - self._asked > _LOOK:
-            self._most, self._asked = max(_LEAST, 2 * self.threads), time.monotonic()
-        return self._most
+        return max(_LEAST, 2 * self.threads)
 
     @property
     def threads(self) -> int:
         """How many tasks the cluster does at once."""
-        with suppress(Exception):  # the scheduler may be gone
-            return int(sum(self._client.nthreads().values()))
-        return 0
+        if time.monotonic() - self._asked > _LOOK:
+            self._threads = 0
+            with suppress(Exception):  # the scheduler may be gone
+                self._threads = sum(self._client.nthreads().values())
+            self._asked = time.monotonic()
+        return self._threads
+
+    @property
+    def waiting(self) -> str:
+        """That there is nobody, where there is nobody."""
+        return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _hand_out(self, task: Task) -> None:
         self._submitted += 1

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from typing import TYPE_CHECKING, NamedTuple, Self, TypeAlias
 
+from robocov.errors import OutputError
 from robocov_app.sweep.performing import Outcome, failed
 
 if TYPE_CHECKING:
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
 
 _ENDS = 2
 """How often a worker may end through a task before the task counts as failed."""
+
+_IN_A_ROW = 20
+"""How many workers may end one after the other, without a run in between that comes to an end."""
 
 
 class Lost(NamedTuple):
@@ -40,7 +44,12 @@ class Crew(ABC):
 
     A task whose worker has ended is done again. Where it is not certain that the task is to blame (another
     one may have taken all the memory), it is done alone, with nothing else going on. When workers have
-    ended twice through it, it has failed.
+    ended twice through it, it has failed. When workers end again and again, whatever they do, all ends.
+
+    Attributes
+    ----------
+    lost : int
+        How many workers have ended in the midst of a task.
     """
 
     def __init__(self) -> None:
@@ -49,6 +58,7 @@ class Crew(ABC):
         self._ends: Counter[str] = Counter()
         self._out = 0
         self._lonely = False  # whether the one that is out is to be alone
+        self.lost = self._in_a_row = 0
 
     def __enter__(self) -> Self:
         return self
@@ -68,6 +78,11 @@ class Crew(ABC):
     @abstractmethod
     def _returned(self, timeout: float) -> Returned | None:
         """Return a task that was handed out, and what came of it; None where none is for so many seconds."""
+
+    @property
+    def waiting(self) -> str:
+        """What all of them wait for, in words; empty where somebody is at work."""
+        return ""
 
     @property
     def busy(self) -> int:
@@ -90,7 +105,7 @@ class Crew(ABC):
         Raises
         ------
         OutputError
-            When nobody can do tasks any more.
+            When nobody can do tasks any more, or workers end again and again.
         """
         self._feed()
         back = self._returned(timeout)
@@ -99,6 +114,7 @@ class Crew(ABC):
         task, came = back
         together, self._lonely = self._out > 1, False
         self._out -= 1
+        self._in_a_row = self._in_a_row + 1 if isinstance(came, Lost) else 0
         outcome = self._considered(task, came, together) if isinstance(came, Lost) else came
         self._feed()
         return None if outcome is None else (task, outcome)
@@ -118,6 +134,12 @@ class Crew(ABC):
 
     def _considered(self, task: Task, lost: Lost, together: bool) -> Outcome | None:
         """Return that a task has failed, None where it is to be done again."""
+        self.lost += 1
+        if self._in_a_row > max(_IN_A_ROW, 4 * self.most):
+            raise OutputError(
+                f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}; "
+                f"what is done is kept, and the same command goes on"
+            )
         if together and not lost.blamed:
             self._alone.append(task)
             return None

@@ -1,21 +1,27 @@
 """The folder of a sweep: which runs are done, which have failed, and what the table holds of them.
 
-Every run has a folder of its own, which is written aside and renamed: it is there whole or not at all.
+Every run has a folder of its own, which is written aside, brought to the disk and renamed: it is there
+whole or not at all. Its ``row.json`` has check sums of itself and of the other files: damage is noticed.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from robocov.errors import InputError, OutputError
-from robocov.files.atomic import written
+from robocov.errors import InputError, OutputError, counted
+from robocov.files.atomic import on_disk, written
 from robocov.files.lock import locked
+from robocov_app.sweep.performing import FIGURES, made_with
 
 if TYPE_CHECKING:
     from robocov_app.sweep.performing import Outcome
@@ -29,9 +35,17 @@ STUDY = "study.json"
 _ROW = "row.json"
 """What the table holds of a run, in its folder."""
 
-_HEAD = {"format": "robocov-row", "version": 1}
+_HEAD = {"format": "robocov-row", "version": 2}
 
 _STUDY_FORMAT = "robocov-study"
+
+_LEFT_OVER = re.compile(
+    r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
+)
+"""Names of what a sweep that was killed has left half-written."""
+
+_NAMED = 5
+"""Damaged runs that are named."""
 
 
 class Entry(NamedTuple):
@@ -42,10 +56,64 @@ class Entry(NamedTuple):
     figures : dict of name to value
         Empty where it failed.
     error : str or None
+    versions : dict of name to str
+        Of what it was made with; empty where that is not known.
+    checked : bool
+        Whether it has check sums: those of version 1 have none.
     """
 
     figures: Mapping[str, float | int | None]
     error: str | None
+    versions: Mapping[str, str] = {}
+    checked: bool = True
+
+
+class Damaged(Exception):  # noqa: N818 - it is handled
+    """A run is there, but is not as it was written."""
+
+
+@dataclass
+class Survey:
+    """Which runs of a study there are.
+
+    Attributes
+    ----------
+    todo : bytearray
+        1 for each task that is to be done, in their order.
+    damaged : list of str
+        Names of runs that are done again because their files are not as they were written.
+    outdated : Counter
+        How many runs were made with other versions than those here, by how these differ.
+    unchecked : int
+        Runs without check sums, kept by an earlier version.
+    failed : int
+        Runs that have failed and are not to be done again.
+    """
+
+    todo: bytearray = field(default_factory=bytearray)
+    damaged: list[str] = field(default_factory=list)
+    outdated: Counter[str] = field(default_factory=Counter)
+    unchecked: int = 0
+    failed: int = 0
+
+    def words(self, *, keep_versions: bool) -> list[str]:
+        """Return what people should know before the runs begin, line by line."""
+        lines = []
+        if self.damaged:
+            count, rest = len(self.damaged), len(self.damaged) - _NAMED
+            names = ", ".join(self.damaged[:_NAMED]) + (f" and {rest} more" if rest > 0 else "")
+            lines.append(f"{counted(count, 'damaged run')} will be done again: {names}")
+        for difference, count in self.outdated.items():
+            then = "will be used all the same" if keep_versions else "will be done again"
+            lines.append(f"{counted(count, 'run')} made with {difference} {then}")
+        if self.outdated and not keep_versions:
+            lines.append("--keep-versions uses them as they are")
+        if self.unchecked:
+            lines.append(
+                f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums will "
+                f"be used; damage to their cost curves and trajectories would not be noticed"
+            )
+        return lines
 
 
 class Ledger:
@@ -56,15 +124,74 @@ class Ledger:
         self._runs = folder / RUNS
 
     def entry(self, task: Task) -> Entry | None:
-        """Return what came of a task, None where nothing (or nothing that can be read) is there."""
-        try:
-            content = json.loads((self._runs / task.name / _ROW).read_bytes())
-            if content["digest"] != task.digest or content["format"] != _HEAD["format"]:
-                return None
-            figures, error = dict(content["figures"]), content["error"]
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        """Return what came of a task, None where nothing (or nothing that can be used) is there."""
+        with suppress(Damaged):
+            return self._entry(task)
+        return None
+
+    def survey(
+        self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
+    ) -> Survey:
+        """Check all files of all runs; return which are to be done, and why again.
+
+        Parameters
+        ----------
+        tasks : iterable of Task
+        retry_failed : bool
+            Do runs again that have failed.
+        keep_versions : bool
+            Use runs that were made with other versions of robocov or what it computes with.
+        """
+        found = Survey()
+        for task in tasks:
+            try:
+                entry = self._entry(task, files=True)
+            except Damaged:
+                found.damaged.append(task.name)
+                entry = None
+            todo = entry is None or (retry_failed and entry.error is not None)
+            if entry is not None and not todo:
+                difference = difference_of(entry.versions)
+                if difference:
+                    found.outdated[difference] += 1
+                    todo = not keep_versions
+                found.unchecked += not todo and not entry.checked
+                found.failed += not todo and entry.error is not None
+            found.todo.append(todo)
+        return found
+
+    def _entry(self, task: Task, *, files: bool = False) -> Entry | None:
+        """Return what came of a task, None where nothing is there; with `files`, all its files are checked.
+
+        Raises
+        ------
+        Damaged
+        """
+        folder = self._runs / task.name
+        if not os.path.lexists(folder):
             return None
-        return Entry(figures, error)
+        try:
+            row = json.loads(_content(folder / _ROW))
+            if row["format"] != _HEAD["format"] or row["digest"] != task.digest:
+                raise Damaged
+            figures, error = row["figures"], row["error"]
+            if not all(value is None or type(value) in (int, float) for value in figures.values()):
+                raise Damaged
+            if not isinstance(error, str | None):
+                raise Damaged
+            if row["version"] == 1 and "check_sum" not in row:
+                run = _content(folder / ("run.json" if error is None else "error.json"))
+                return Entry(figures, error, _versions_1(json.loads(run), figures, error), checked=False)
+            if row.pop("check_sum") != _check_sum(row):
+                raise Damaged
+            if files:
+                for name, (size, digest) in row["files"].items():
+                    content = _content(folder / name)
+                    if len(content) != size or _digest(content) != digest:
+                        raise Damaged
+            return Entry(figures, error, row["versions"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
+            raise Damaged from fault
 
     def keep(self, task: Task, outcome: Outcome) -> Entry:
         """Write the folder of a run, in the place of an earlier one, and return its entry.
@@ -76,28 +203,43 @@ class Ledger:
         """
         target = self._runs / task.name
         part = self._runs / f".{task.name}.part"
-        row = {**_HEAD, "digest": task.digest, "figures": dict(outcome.figures), "error": outcome.error}
+        row: dict[str, Any] = {**_HEAD, "digest": task.digest, "versions": dict(outcome.versions)}
+        row |= {"figures": dict(outcome.figures), "error": outcome.error}
+        row["files"] = {name: (len(content), _digest(content)) for name, content in outcome.files.items()}
+        row["check_sum"] = _check_sum(row)
         files = {**outcome.files, _ROW: (json.dumps(row, allow_nan=False) + "\n").encode()}
         try:
             _remove(part)
             part.mkdir()
             for name, content in files.items():
                 (part / name).write_bytes(content)
+            on_disk([*(part / name for name in files), part])
             _remove(target)
             part.rename(target)
         except OSError as error:
             with suppress(OSError):
                 _remove(part)
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
-        return Entry(outcome.figures, outcome.error)
+        return Entry(outcome.figures, outcome.error, outcome.versions)
 
     def _tidy(self) -> None:
         """Remove what a sweep that was killed has left half-written."""
-        for part in self._runs.glob(".*.part"):
-            _remove(part)
-        for pattern in (".robocov-*.part.*", ".study.*.part.json", ".results.*.part.*"):
-            for part in self.folder.glob(pattern):
-                part.unlink()
+        for folder in (self._runs, self.folder):
+            for part in folder.glob(".*"):
+                if _LEFT_OVER.fullmatch(part.name):
+                    _remove(part)
+
+
+def difference_of(versions: Mapping[str, str]) -> str:
+    """Return how versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``.
+
+    Those that are not known do not differ.
+    """
+    return ", ".join(
+        f"{name} {versions[name]} instead of {version}"
+        for name, version in made_with().items()
+        if versions.get(name, version) != version
+    )
 
 
 @contextmanager
@@ -108,7 +250,8 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     ----------
     folder : Path
     study : dict
-        The content of ``study.json``; that of an earlier study is replaced.
+        The content of ``study.json``; that of an earlier study is replaced, unless its tables are whole: then
+        it is replaced with them, by `Table`.
 
     Raises
     ------
@@ -132,26 +275,64 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
         ledger = Ledger(folder)
         try:
             ledger._tidy()
-            with written(folder / STUDY) as part:
-                part.write_text(json.dumps(study, allow_nan=False, indent=1) + "\n", encoding="utf-8")
+            # first: it says that the folder is ours
+            if not (folder / "results.parquet").exists():
+                with written(folder / STUDY) as part:
+                    part.write_bytes(study_bytes(study))
             (folder / RUNS).mkdir(exist_ok=True)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
+            at = error.filename or folder
+            raise OutputError(f"{at}: cannot be used for results: {error.strerror or error}") from error
         yield ledger
 
 
+def study_bytes(study: Mapping[str, Any]) -> bytes:
+    """Return the content of the file ``study.json``."""
+    return (json.dumps(study, allow_nan=False, indent=1) + "\n").encode()
+
+
 def is_sweep(folder: Path) -> bool:
-    """Return whether a folder is that of a sweep."""
+    """Return whether a folder is that of a sweep, also of one whose ``study.json`` is damaged."""
     try:
-        content = json.loads((folder / STUDY).read_bytes())
-    except (OSError, ValueError, RecursionError):
+        content = json.loads(_content(folder / STUDY))
+    except OSError:
         return False
+    except (ValueError, RecursionError):
+        return (folder / RUNS).is_dir() and (folder / ".lock").is_file()
     return isinstance(content, dict) and content.get("format") == _STUDY_FORMAT
 
 
-def _remove(folder: Path) -> None:
-    """Remove the folder of a run; links are not followed."""
-    if folder.is_symlink() or folder.is_file():
-        folder.unlink()
-    elif folder.exists():
-        shutil.rmtree(folder)
+def _versions_1(run: Mapping[str, Any], figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
+    """Return what a run of version 1 was made with, if its row agrees with its other file."""
+    if error is not None:
+        if run["error"] != error:
+            raise Damaged
+        return {}
+    for name in FIGURES:
+        value = run["summary"][name]
+        if figures[name] != (sum(value) / len(value) if isinstance(value, list) else value):
+            raise Damaged
+    return dict(run["versions"])
+
+
+def _content(path: Path) -> bytes:
+    """Return the content of a file; anything else, which might have no end, is none."""
+    if not path.is_file():
+        raise FileNotFoundError(path)
+    return path.read_bytes()
+
+
+def _digest(content: bytes) -> str:
+    return blake2b(content, digest_size=16).hexdigest()
+
+
+def _check_sum(row: Mapping[str, Any]) -> str:
+    return _digest(json.dumps(row, sort_keys=True, allow_nan=False).encode())
+
+
+def _remove(path: Path) -> None:
+    """Remove the folder of a run, or a file; links are not followed."""
+    if path.is_symlink() or path.is_file():
+        path.unlink()
+    elif path.exists():
+        shutil.rmtree(path)

@@ -7,27 +7,28 @@ import io
 import json
 import threading
 import traceback
-from collections import OrderedDict
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robocov.controllers import make_controller
+from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
 from robocov.files.array_cache import ArrayCache
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.record import ARRAYS
+from robocov.record import ARRAYS, versions
 from robocov.record.recorder import Recorder
 from robocov.simulation import Simulation
 from robocov_app.output import csv_text, finite
 from robocov_app.run import cost_columns, cost_rows
 from robocov_app.sweep.circumstances import conditions_of
-from robocov_app.sweep.study import team_of
+from robocov_app.sweep.study import source_json, team_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -53,6 +54,18 @@ TIMED = "mean_time_s"
 """What it holds as well where robots are not equally fast."""
 
 
+_RESULTS = 2
+"""Counted up whenever the same inputs give other results: 2 since contacts are solved more exactly."""
+
+
+@cache
+def made_with() -> dict[str, str]:
+    """Return the versions that results of this process depend on."""
+    found = versions()
+    del found["python"]
+    return found | {"robocov": f"{found['robocov']} (results {_RESULTS})"}
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What came of a task.
@@ -65,11 +78,14 @@ class Outcome:
         What the table holds of the run, empty where it failed.
     error : str or None
         Why it failed, one line.
+    versions : dict of name to str
+        Of what it was made with.
     """
 
     files: Mapping[str, bytes]
     figures: Mapping[str, float | int | None]
     error: str | None = None
+    versions: Mapping[str, str] = field(default_factory=made_with)
 
 
 def perform(task: Task) -> Outcome:
@@ -96,8 +112,12 @@ def failed(message: str, details: str) -> Outcome:
 
 def simulated(task: Task, environment: Environment) -> Record:
     """Simulate a run, and return the whole of it."""
-    source = None if task.path is None or task.source is None else (task.path, task.source)
-    controller = make_controller(task.controller, task.gains, source=source)
+    with provided(task.source.modules if task.source else {}):
+        return _simulated(task, environment)
+
+
+def _simulated(task: Task, environment: Environment) -> Record:
+    controller = make_controller(task.controller, task.gains, source=task.source)
     team = team_of(task.robots, task.team)
     start = environment.start(task.start)
     positions = start.sample(task.robots, seed=task.seed, radius=float(team.radius.max()))
@@ -122,17 +142,14 @@ def simulated(task: Task, environment: Environment) -> Record:
 
 def prepared(task: Task) -> tuple[Environment, CoverageCost]:
     """Return the map of a task and its cost, those of the last few maps as they were."""
-    key = task.document, task.lattice
-    if key not in _KNOWN:
-        environment = from_json(json.loads(task.document), task.map)
-        _KNOWN[key] = environment, CoverageCost(environment, task.lattice, cache=ArrayCache.of_user())
-        if len(_KNOWN) > _REMEMBERED:
-            _KNOWN.popitem(last=False)
-    _KNOWN.move_to_end(key)
-    return _KNOWN[key]
+    return _prepared(task.document, task.map, task.lattice)
 
 
-_KNOWN: OrderedDict[tuple[str, int], tuple[Environment, CoverageCost]] = OrderedDict()
+@lru_cache(_REMEMBERED)
+def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
+    environment = from_json(json.loads(document), name)
+    return environment, CoverageCost(environment, lattice, cache=ArrayCache.of_user())
+
 
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -177,7 +194,7 @@ def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[st
     content = record.to_json(summary, lattice=task.lattice)
     content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
     if task.source is not None:
-        content["controller"]["source"] = task.source
+        content["controller"] |= source_json(task.source)
     kept = record.thinned(task.record_hz)
     arrays = io.BytesIO()
     np.savez_compressed(arrays, **{name: getattr(kept, name) for name in ARRAYS})

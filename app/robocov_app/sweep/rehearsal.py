@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
-from robocov_app.sweep.ledger import Ledger
+from robocov_app.sweep.ledger import Ledger, Survey
 from robocov_app.sweep.performing import perform, prepared
 from robocov_app.sweep.task import tasks_of
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from robocov_app.sweep.study import Study
-    from robocov_app.sweep.task import Task
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Rehearsal:
         For all that are left, on so many workers.
     bytes : int
         For all runs together.
+    notes : list of str
+        What of that which is there is done again, and why.
     """
 
     runs: int
@@ -50,9 +52,17 @@ class Rehearsal:
     bytes_a_run: int
     seconds: float
     bytes: int
+    notes: list[str]
 
 
-def rehearsed(study: Study, folder: Path | None, *, workers: int, retry_failed: bool = False) -> Rehearsal:
+def rehearsed(
+    study: Study,
+    folder: Path | None,
+    *,
+    workers: int,
+    retry_failed: bool = False,
+    keep_versions: bool = False,
+) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing.
 
     Parameters
@@ -62,19 +72,15 @@ def rehearsed(study: Study, folder: Path | None, *, workers: int, retry_failed: 
         Where runs may be that are done already.
     workers : int
         On which the time is estimated.
-    retry_failed : bool
-        Count runs that have failed as left.
+    retry_failed, keep_versions : bool
+        As of a sweep.
     """
-    ledger = None if folder is None else Ledger(folder)
-    chosen: Task | None = None
-    left = 0
-    for task in tasks_of(study):
-        entry = None if ledger is None else ledger.entry(task)
-        if entry is None or (retry_failed and entry.error is not None):
-            chosen = task if left == 0 else chosen
-            left += 1
-    if chosen is None:
-        chosen = next(tasks_of(study))
+    survey = Survey(bytearray(b"\x01") * len(study))
+    if folder is not None:
+        ledger = Ledger(folder)
+        survey = ledger.survey(tasks_of(study), retry_failed=retry_failed, keep_versions=keep_versions)
+    left = sum(survey.todo)
+    chosen = next(compress(tasks_of(study), survey.todo), None) or next(tasks_of(study))
     prepared(chosen)  # once for all runs on a map
     began = time.perf_counter()
     outcome = perform(chosen)
@@ -90,6 +96,7 @@ def rehearsed(study: Study, folder: Path | None, *, workers: int, retry_failed: 
         bytes_a_run=size,
         seconds=seconds * left / max(1, min(workers, left)),
         bytes=size * len(study),
+        notes=survey.words(keep_versions=keep_versions),
     )
 
 

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from robocov.controllers import controller_kind
+from robocov.controllers.user_modules import Source, own_modules
 from robocov.errors import InputError, ParameterError, shown, unknown_name
 from robocov.files.strictjson import place
 from robocov.mapfile import to_json
@@ -62,20 +63,6 @@ class StudyMap:
     environment: Environment
 
 
-class Source(NamedTuple):
-    """The file of a controller of one's own.
-
-    Attributes
-    ----------
-    path : str
-        Absolute.
-    text : str
-    """
-
-    path: str
-    text: str
-
-
 @dataclass(frozen=True, eq=False)
 class Study:
     """What a sweep runs: every combination of what is given.
@@ -119,7 +106,8 @@ class Study:
     folder : Path
         Where relative paths of controllers begin.
     sources : dict of controller to Source
-        The files of controllers that are none of the project's; read when the study is made.
+        The files of controllers that are none of the project's, and their authors' modules that they import;
+        read when the study is made.
     teams : tuple of dict
         Every combination of the parameters of a team, and of the conditions that are given.
 
@@ -233,7 +221,7 @@ class Study:
             "runs": len(self),
             "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
             "controllers": [
-                {"name": name, **({"source": self.sources[name].text} if name in self.sources else {})}
+                {"name": name, **(source_json(self.sources[name]) if name in self.sources else {})}
                 for name in self.controllers
             ],
             "gains": {
@@ -331,10 +319,21 @@ class Study:
                 kind = self.kind(name)
             except ParameterError as error:
                 raise ParameterError(f"controllers[{k}]: {error}") from error
+            if name in self.sources:
+                # now: it may have added folders to sys.path
+                source = self.sources[name]
+                sources = {**self.sources, name: source._replace(modules=own_modules(source.text))}
+                object.__setattr__(self, "sources", sources)
             found[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
         if self.sampling is not None and not any(gains.ranges for gains in found.values()):
             raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
         return found
+
+
+def source_json(source: Source) -> dict[str, Any]:
+    """Return what files say of a controller's source: its text, and those of the modules that it imports."""
+    modules = {name: module.text for name, module in source.modules.items()}
+    return {"source": source.text, **({"modules": modules} if modules else {})}
 
 
 def _number(at: str, value: object, most: float) -> float:

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections import deque
+import time
+from collections import Counter
 from contextlib import ExitStack
-from itertools import chain
+from dataclasses import dataclass, field
+from itertools import compress, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from robocov.errors import ParameterError, RobocovError, shown
+from robocov.errors import OutputError, ParameterError, RobocovError, shown
 from robocov_app.interruption import Interruption
-from robocov_app.sweep.ledger import opened
+from robocov_app.sweep.ledger import difference_of, opened, study_bytes
 from robocov_app.sweep.pool import LocalPool, processors
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.task import tasks_of
 from robocov_app.sweep.telling import Count, told
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from robocov_app.sweep.crew import Crew
     from robocov_app.sweep.ledger import Entry, Ledger
+    from robocov_app.sweep.performing import Outcome
     from robocov_app.sweep.study import Study
     from robocov_app.sweep.task import Task
 
@@ -29,24 +32,42 @@ MOST_WORKERS = 1024
 _PATIENCE = 0.2
 """Seconds between two looks at what else there is to do."""
 
+_ERRORS = 3
+"""Different errors of runs that are told."""
 
-class Totals(NamedTuple):
+
+@dataclass
+class Totals:
     """What became of the runs of a study.
 
     Attributes
     ----------
-    done, failed : int
-        Runs that were done now, well or not.
+    done : int
+        Runs that were done now, and well.
+    failed : int
+        Runs that failed, now or earlier.
     reused : int
-        Runs that were there already, as they were.
+        Runs that were there already, done well.
     interrupted : bool
         Whether some are left, as somebody has stopped the sweep.
+    errors : dict of name of run to str
+        Why the first runs failed that did so for different reasons.
+    damaged : list of str
+        Runs that were there, but not as they were written, and were to be done again.
+    versions : dict of str to int
+        How many runs of the table were made with which versions; of several the table is mixed.
+    table_replaced : bool
+        Whether the table holds these runs; the one that was there stays where this one would be shorter.
     """
 
     done: int
     failed: int
     reused: int
     interrupted: bool
+    errors: dict[str, str] = field(default_factory=dict, compare=False)
+    damaged: list[str] = field(default_factory=list, compare=False)
+    versions: dict[str, int] = field(default_factory=dict, compare=False)
+    table_replaced: bool = field(default=True, compare=False)
 
 
 def sweep(
@@ -56,13 +77,16 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry_failed: bool = False,
+    keep_versions: bool = False,
     quiet: bool = False,
     title: str = "sweep",
     stop: Interruption | None = None,
 ) -> Totals:
     """Do all runs of a study that are not done yet, and write its table.
 
-    Whatever ends it, the same call goes on where it was, and ends with the same table, byte for byte.
+    Whatever ends it, the same call goes on where it was, and ends with the same table, byte for byte. Runs
+    whose files were damaged are done again, and so are those that other versions of robocov, numpy, scipy,
+    shapely or pymunk have done.
 
     Parameters
     ----------
@@ -76,6 +100,8 @@ def sweep(
         Address of a Dask scheduler whose workers do the runs instead.
     retry_failed : bool
         Do runs again that have failed.
+    keep_versions : bool
+        Use runs that other versions have done.
     quiet : bool
         Tell nothing.
     title : str
@@ -88,7 +114,8 @@ def sweep(
     InputError
         When the folder holds something else, or the scheduler cannot be reached.
     OutputError
-        When something cannot be written, or another sweep is at work in the folder. What is done is kept.
+        When something cannot be written, another sweep is at work in the folder, workers end again and
+        again, or those of a cluster have other versions. What is done is kept.
     """
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise ParameterError(
@@ -97,76 +124,98 @@ def sweep(
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop
-        ledger = stack.enter_context(opened(folder, study.to_json()))
-        table = stack.enter_context(Table(folder, columns_of(study)))
+        content = study.to_json()
+        ledger = stack.enter_context(opened(folder, content))
+        table = stack.enter_context(Table(folder, columns_of(study), study_bytes(content)))
         count = Count(len(study))
         tell = stack.enter_context(told(title, count, quiet=quiet))
-        rows = _Rows(ledger, table)
+        looked = takewhile(lambda _: not stopped.requested, tasks_of(study))
+        survey = ledger.survey(looked, retry_failed=retry_failed, keep_versions=keep_versions)
+        count.reused = len(survey.todo) - sum(survey.todo)
+        for line in survey.words(keep_versions=keep_versions):
+            tell.say(line)
+        rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
         def hired() -> Crew:
             if scheduler is None:
-                rest = len(study) - count.reused
-                return stack.enter_context(LocalPool(min(workers or processors(), rest)))
+                return LocalPool(min(workers or processors(), sum(survey.todo)))
             from robocov_app.sweep.cluster import Cluster
 
-            return stack.enter_context(Cluster(scheduler))
+            return Cluster(scheduler)
 
-        tasks = tasks_of(study)
+        def keep(task: Task, outcome: Outcome) -> None:
+            difference = difference_of(outcome.versions)
+            if difference and not keep_versions:
+                raise OutputError(
+                    f"a worker has {difference}; the same versions everywhere, or --keep-versions, was wanted"
+                )
+            ledger.keep(task, outcome)
+            rows.finished(task)
+
         failure: RobocovError | None = None
         try:
-            for _ in _worked_off(tasks, rows, hired, count, stopped, retry_failed=retry_failed):
+            rows.write()
+            for _ in worked_off(compress(tasks_of(study), survey.todo), hired, count, stopped, keep):
                 tell(count)
         except RobocovError as error:  # what is done belongs into the table all the same
             failure = error
-        if stopped.requested or failure is not None:
-            rows.rest(tasks)
+        table.complete = failure is None and not stopped.requested
+        if not table.complete:
+            rows.write(whatever=True)
     if failure is not None:
         raise failure
-    interrupted = count.done + count.failed + count.reused < count.total
-    return Totals(count.done, count.failed, count.reused, interrupted)
+    return Totals(
+        done=count.done,
+        failed=count.failed + survey.failed,
+        reused=count.reused - survey.failed,
+        interrupted=count.done + count.failed + count.reused < count.total,
+        errors={run: error for error, run in rows.errors.items()},
+        damaged=survey.damaged,
+        versions=dict(rows.versions),
+        table_replaced=table.replaced,
+    )
 
 
-def _worked_off(
-    tasks: Iterator[Task],
-    rows: _Rows,
+def worked_off(
+    tasks: Iterable[Task],
     hired: Callable[[], Crew],
     count: Count,
     stop: Interruption,
-    *,
-    retry_failed: bool,
+    keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
-    """Do the tasks; yield whenever the count may have changed."""
-    crew: Crew | None = None
-    for task in tasks:
-        entry = rows.expect(task)
-        if entry is not None and not (retry_failed and entry.error is not None):
-            rows.finished(task, entry)
-            count.reused += 1
-            continue
-        if crew is None:
-            crew = hired()
-        crew.submit(task)
-        while crew.full and not stop.requested:
-            _collected(crew, rows, count)
+    """Have tasks done, and keep what comes back; yield whenever the count may have changed.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+        Asked for the next one when somebody can do it.
+    hired : callable
+        Gives those who do tasks; called if there is one.
+    count : Count
+    stop : Interruption
+    keep : callable
+    """
+    with ExitStack() as stack:
+        crew: Crew | None = None
+        left = iter(tasks)
+        task = next(left, None)
+        while (task is not None or (crew is not None and crew.busy)) and not stop.requested:
+            if crew is None:
+                crew = stack.enter_context(hired())
+            while task is not None and not crew.full:
+                crew.submit(task)
+                task = next(left, None)
+            back = crew.next(_PATIENCE)
+            count.waiting, count.lost = crew.waiting, crew.lost
+            if count.waiting and not count.done + count.failed:
+                count.began = time.perf_counter()
+            if back is not None:
+                keep(*back)
+                if back[1].error is None:
+                    count.done += 1
+                else:
+                    count.failed += 1
             yield
-        if stop.requested:
-            return
-    while crew is not None and crew.busy and not stop.requested:
-        _collected(crew, rows, count)
-        yield
-
-
-def _collected(crew: Crew, rows: _Rows, count: Count) -> None:
-    """Keep the next run that comes back, if one does soon."""
-    back = crew.next(_PATIENCE)
-    if back is None:
-        return
-    task, outcome = back
-    rows.finished(task, rows.ledger.keep(task, outcome))
-    if outcome.error is None:
-        count.done += 1
-    else:
-        count.failed += 1
 
 
 class _Rows:
@@ -175,33 +224,41 @@ class _Rows:
     Of runs that are finished before others that come first in the table, only the names are kept.
     """
 
-    def __init__(self, ledger: Ledger, table: Table) -> None:
-        self.ledger, self._table = ledger, table
-        self._line: deque[Task] = deque()
+    def __init__(self, ledger: Ledger, table: Table, tasks: Iterable[tuple[int, Task]]) -> None:
+        self._ledger, self._table, self._tasks = ledger, table, iter(tasks)
+        self._head = next(self._tasks, None)
         self._finished: set[str] = set()
+        self.errors: dict[str, str] = {}
+        self.versions: Counter[str] = Counter()
 
-    def expect(self, task: Task) -> Entry | None:
-        """Put a task at the end of the line; return what came of it earlier."""
-        self._line.append(task)
-        return self.ledger.entry(task)
-
-    def finished(self, task: Task, entry: Entry) -> None:
+    def finished(self, task: Task) -> None:
         """Write the row of a task, and of those behind it that were finished before, when it is its turn."""
-        if task is not self._line[0]:
-            self._finished.add(task.name)
-            return
+        self._finished.add(task.name)
+        self.write()
+
+    def write(self, *, whatever: bool = False) -> None:
+        """Write the next rows, up to the first run that is still to be done; or `whatever` is there.
+
+        Raises
+        ------
+        OutputError
+            When a run that was there is not any more, or a row cannot be written.
+        """
+        while self._head is not None:
+            todo, task = self._head
+            if todo and task.name not in self._finished and not whatever:
+                return
+            entry = self._ledger.entry(task)
+            if entry is not None:
+                self._add(task, entry)
+            elif not whatever:
+                raise OutputError(f"{self._ledger.folder}: {task.name} was removed by somebody else")
+            self._finished.discard(task.name)
+            self._head = next(self._tasks, None)
+
+    def _add(self, task: Task, entry: Entry) -> None:
         self._table.add(row_of(task, entry))
-        self._line.popleft()
-        while self._line and self._line[0].name in self._finished:
-            self._write(self._line[0])
-            self._finished.remove(self._line.popleft().name)
-
-    def rest(self, tasks: Iterator[Task]) -> None:
-        """Write the rows of all that is finished, in the line and of these tasks behind it."""
-        for task in chain(self._line, tasks):
-            self._write(task)
-
-    def _write(self, task: Task) -> None:
-        entry = self.ledger.entry(task)
-        if entry is not None:
-            self._table.add(row_of(task, entry))
+        if entry.versions:
+            self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
+        if entry.error is not None and (entry.error in self.errors or len(self.errors) < _ERRORS):
+            self.errors.setdefault(entry.error, task.name)

@@ -1,22 +1,23 @@
-"""The table of a sweep: ``results.csv``, which grows, and ``results.parquet``, which appears at the end."""
+"""The table of a sweep: ``results.csv``, which grows in a first sweep, and ``results.parquet``."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import os
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
-from robocov.files.atomic import written
+from robocov.files.atomic import on_disk, writable
 from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
 from robocov_app.sweep.performing import FIGURES, TIMED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     import pyarrow as pa
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
     from robocov_app.sweep.ledger import Entry
     from robocov_app.sweep.study import Study
     from robocov_app.sweep.task import Task
+
+CSV, PARQUET = "results.csv", "results.parquet"
+
+_PART = ".results.part.{}"
+"""What they are called while they are written."""
 
 ROW_GROUP = 4096
 """Rows of a row group, and the most that are in memory."""
@@ -138,13 +144,24 @@ def row_of(task: Task, entry: Entry) -> dict[str, Any]:
 class Table:
     """Writes the rows of a sweep in the order in which they come; a context.
 
-    ``results.csv`` grows row by row. ``results.parquet`` is written aside, and gets its name when the
-    context ends well; an earlier one, perhaps of another study, goes at the beginning.
+    Both files are written aside. When the context ends well they replace those of an earlier sweep, and
+    ``study.json`` with them; but those of a sweep that is not `complete` replace none with more rows. Where
+    there is no ``results.parquet`` yet, ``results.csv`` appears as soon as it is no shorter than the one that
+    is there, and grows row by row.
 
     Parameters
     ----------
     folder : Path
     columns : sequence of Column
+    study : bytes or None
+        The content of ``study.json`` to which the rows belong; None: the file stays as it is.
+
+    Attributes
+    ----------
+    complete : bool
+        Whether all rows are there that there will be.
+    replaced : bool
+        Whether the files are those of these rows; known when the context has ended.
 
     Raises
     ------
@@ -152,36 +169,38 @@ class Table:
         When something cannot be written; no half of a row is left then, and no other row is taken.
     """
 
-    def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[Column], study: bytes | None = None) -> None:
+        self.complete, self.replaced = True, False
+        self._folder, self._columns, self._study = folder, columns, study
         self._broken: OutputError | None = None
-        self._folder, self._columns = folder, columns
         self._names = [column.name for column in columns]
         self._rows: list[dict[str, Any]] = []
-        self._stack = ExitStack()
+        self._count = -1  # the header is no row
 
     def __enter__(self) -> Table:
         import pyarrow.parquet as pq
 
+        self._former, grows = _former_rows(self._folder)
+        self._shown_from = self._former if grows else math.inf
+        self._schema = _schema(self._columns)
         with ExitStack() as stack:
-            self._path = self._folder / "results.csv"
-            self._csv = stack.enter_context(_LineFile(self._path))
-            self._csv.write(_csv_line(self._names))
-            parquet = self._folder / "results.parquet"
-            parquet.unlink(missing_ok=True)
-            part = stack.enter_context(written(parquet))
-            self._schema = _schema(self._columns)
-            self._parquet = stack.enter_context(pq.ParquetWriter(part, self._schema))
+            for suffix in ("csv", "parquet"):
+                stack.callback((self._folder / _PART.format(suffix)).unlink, missing_ok=True)
+            with _told(self._folder / CSV):
+                self._csv = (self._folder / _PART.format("csv")).open("wb", buffering=0)
+            stack.callback(lambda: self._csv.close())  # it may be another one by then
+            with _told(self._folder / PARQUET):
+                self._parquet = pq.ParquetWriter(self._folder / _PART.format("parquet"), self._schema)
+            stack.callback(self._close_parquet)
+            self._size = 0
+            self._write(_csv_line(self._names))
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(self, *exception: Any) -> bool | None:
-        if exception[0] is None:
-            try:
-                self._flush()
-            except BaseException as error:
-                self._stack.__exit__(type(error), error, error.__traceback__)
-                raise
-        return self._stack.__exit__(*exception)
+    def __exit__(self, *exception: Any) -> None:
+        with self._stack:
+            if exception[0] is None:
+                self._finish()
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Append a row; what it does not hold is null."""
@@ -189,7 +208,7 @@ class Table:
             raise self._broken
         values = {column.name: _cell(row.get(column.name), column.kind) for column in self._columns}
         try:
-            self._csv.write(_csv_line(values.values()))
+            self._write(_csv_line(values.values()))
             self._rows.append(values)
             if len(self._rows) == ROW_GROUP:
                 self._flush()
@@ -197,48 +216,91 @@ class Table:
             self._broken = error
             raise
 
+    def _write(self, line: str) -> None:
+        """Append a line to the CSV file, all of it or nothing, and show the file when it is time."""
+        with _told(self._folder / CSV):
+            data = line.encode()
+            try:
+                rest = memoryview(data)
+                while rest:
+                    rest = rest[self._csv.write(rest) :]
+            except OSError:
+                with suppress(OSError):
+                    os.ftruncate(self._csv.fileno(), self._size)
+                raise
+            self._size += len(data)
+            self._count += 1
+            if self._count >= self._shown_from:
+                self._csv.close()  # open files cannot be renamed everywhere
+                (self._folder / _PART.format("csv")).replace(self._folder / CSV)
+                self._csv = (self._folder / CSV).open("ab", buffering=0)
+                self._shown_from, self.replaced = math.inf, True
+
     def _flush(self) -> None:
         import pyarrow as pa
 
-        if not self._rows:
+        if self._rows:
+            table = pa.Table.from_pylist(self._rows, schema=self._schema)
+            self._rows.clear()
+            with _told(self._folder / PARQUET):
+                self._parquet.write_table(table, row_group_size=ROW_GROUP)
+
+    def _close_parquet(self) -> None:
+        with suppress(OSError):
+            self._parquet.close()
+
+    def _finish(self) -> None:
+        """Replace the files of an earlier sweep by those of this one, all after another at once."""
+        self._flush()
+        with _told(self._folder / PARQUET):
+            self._parquet.close()
+        self._csv.close()
+        if not self.complete and self._count < self._former and not self.replaced:
             return
-        table = pa.Table.from_pylist(self._rows, schema=self._schema)
-        self._rows.clear()
-        try:
-            self._parquet.write_table(table, row_group_size=ROW_GROUP)
-        except OSError as error:
-            path = self._folder / "results.parquet"
-            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        names = {PARQUET: _PART.format("parquet")}
+        names |= {} if self.replaced else {CSV: _PART.format("csv")}
+        with _told(self._folder / PARQUET):
+            if self._study is not None and not _holds(self._folder / "study.json", self._study):
+                names["study.json"] = ".study.part.json"
+                (self._folder / names["study.json"]).write_bytes(self._study)
+            on_disk([self._folder / part for part in names.values()] + [self._folder / CSV] * self.replaced)
+            for name, part in names.items():
+                (self._folder / part).replace(self._folder / name)
+            on_disk([self._folder])
+        self.replaced = True
 
 
-class _LineFile:
-    """A text file of whole lines, whatever happens."""
+def _holds(path: Path, content: bytes) -> bool:
+    return path.is_file() and path.read_bytes() == content
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
 
-    def __enter__(self) -> _LineFile:
-        try:
-            self._file = self._path.open("wb", buffering=0)
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
-        self._size = 0
-        return self
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Tell of a file that cannot be written.
 
-    def __exit__(self, *exception: object) -> None:
-        self._file.close()
+    Raises
+    ------
+    OutputError
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
-    def write(self, line: str) -> None:
-        data = line.encode()
-        try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[self._file.write(rest) :]
-        except OSError as error:
-            with suppress(OSError):
-                os.ftruncate(self._file.fileno(), self._size)
-            raise OutputError(f"{self._path}: cannot be written: {error.strerror or error}") from error
-        self._size += len(data)
+
+def _former_rows(folder: Path) -> tuple[int, bool]:
+    """Return how many rows an earlier table has, and whether it may be replaced by one that grows.
+
+    Raises
+    ------
+    OutputError
+        When something else than a file has its name.
+    """
+    for name in (CSV, PARQUET):
+        writable(folder / name)
+    with suppress(OSError), (folder / CSV).open("rb") as file:
+        return max(0, sum(1 for _ in file) - 1), not (folder / PARQUET).exists()
+    return 0, not (folder / PARQUET).exists()
 
 
 def _csv_line(values: Any) -> str:

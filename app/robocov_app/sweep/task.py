@@ -14,10 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from robocov.controllers.gains import Value
+    from robocov.controllers.user_modules import Source
     from robocov_app.sweep.study import Study, TeamValue
 
 _FORMAT = "robocov-task 1"
-"""Another one whenever the same inputs give other results: what is done already is then done anew."""
+"""What digests are made of; that the same inputs give other results is told by `made_with`."""
 
 _SHORT = 24
 """Characters of each name in the name of a folder."""
@@ -37,8 +38,8 @@ class Task:
     document : str
         The whole map as JSON.
     controller : str
-    path, source : str or None
-        Of a controller of one's own, the file and its text.
+    source : Source or None
+        Of a controller of one's own: its file, and its author's modules that it imports.
     gains : dict of name to value
         All of them.
     robots : int
@@ -53,14 +54,13 @@ class Task:
     metrics : bool
         Whether the table is to hold the metrics of the end.
     digest : str
-        Of all of this but `path`: tasks of one digest have one result.
+        Of all of this but where files are: tasks of one digest have one result.
     """
 
     map: str
     document: str
     controller: str
-    path: str | None
-    source: str | None
+    source: Source | None
     gains: Mapping[str, Value]
     robots: int
     team: Mapping[str, TeamValue]
@@ -91,15 +91,17 @@ def tasks_of(study: Study) -> Iterator[Task]:
     once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
     if study.metrics:
         once["metrics"] = True
-    laws: list[dict[str, Any]] = []
+    laws: list[tuple[dict[str, Any], dict[str, Any]]] = []  # what tasks hold of them, what their digests say
     for name in study.controllers:
         source = study.sources.get(name)
-        path, text = (None, None) if source is None else (source.path, source.text)
-        laws += [
-            {"controller": name, "path": path, "source": text, "gains": dict(choice)}
-            for choice in study.gains_of(name).choices
-        ]
-    sources = {text: _digest(text) for text in {law["source"] for law in laws} if text is not None}
+        said: dict[str, Any] = {"source": None, "path": None}
+        if source is not None:
+            said["source"] = _digest(source.text)
+            if source.modules:
+                said["modules"] = {key: _digest(module.text) for key, module in source.modules.items()}
+        for choice in study.gains_of(name).choices:
+            own = {"controller": name, "gains": dict(choice)}
+            laws.append(({**own, "source": source}, {**own, **said}))
     for each in study.maps:
         document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
         short = {"document": _digest(document)}
@@ -107,11 +109,11 @@ def tasks_of(study: Study) -> Iterator[Task]:
             for team in study.teams:
                 for start in study.starts_on(each):
                     for seed in study.seeds:
-                        place = {"map": each.name, "robots": robots, "team": dict(team), "start": start}
-                        for law in laws:
-                            inputs = {**once, **place, "seed": seed, **law, "document": document}
-                            said = {**inputs, **short, "source": sources.get(law["source"]), "path": None}
-                            yield Task(**inputs, digest=_digest(_FORMAT + json.dumps(said, sort_keys=True)))
+                        place = {"map": each.name, "robots": robots, "start": start, "seed": seed}
+                        for law, words in laws:
+                            inputs: dict[str, Any] = {**once, **place, "team": dict(team)}
+                            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
+                            yield Task(**inputs, **law, document=document, digest=digest)
 
 
 def _digest(text: str) -> str:

@@ -7,7 +7,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from robocov.errors import counted
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -27,6 +29,10 @@ class Count:
         Those of this sweep.
     reused : int
         Those that were there already.
+    lost : int
+        Workers that have ended in the midst of a run.
+    waiting : str
+        What everything waits for; empty where somebody is at work.
     began : float, s
         When it began, by the clock of `time.perf_counter`.
     """
@@ -35,6 +41,8 @@ class Count:
     done: int = 0
     failed: int = 0
     reused: int = 0
+    lost: int = 0
+    waiting: str = ""
     began: float = field(default_factory=time.perf_counter)
 
     @property
@@ -49,47 +57,61 @@ class Count:
         rest = self.total - self.done - self.failed - self.reused
         return rest / self.rate if self.rate else None
 
+    @property
+    def ahead(self) -> str:
+        """How long it will take, or what everything waits for."""
+        return self.waiting or (f"{duration(self.left)} left" if self.left else "")
+
     def __str__(self) -> str:
         words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
         words += [f"{self.reused} were there"] * (self.reused > 0)
+        words += [f"{counted(self.lost, 'worker')} lost"] * (self.lost > 0)
         if self.rate > 0:
             words.append(f"{self.rate:.0f} a second" if self.rate >= 10 else f"{self.rate:.2g} a second")
         return ", ".join(words)
 
 
-class _Teller:
-    """Is called whenever the count has changed, or some time has passed."""
+class Teller:
+    """Is called whenever the count has changed, or some time has passed; this one says nothing."""
 
     def __call__(self, count: Count) -> None:
         """Say how far it is."""
 
+    def say(self, line: str) -> None:
+        """Say something else."""
 
-class _Lines(_Teller):
+
+class _Lines(Teller):
     def __init__(self, title: str) -> None:
-        self._title, self._said = title, time.perf_counter()
+        self._title, self._said, self._waiting = title, time.perf_counter(), ""
 
     def __call__(self, count: Count, *, at_once: bool = False) -> None:
         now = time.perf_counter()
-        if at_once or now - self._said >= PERIOD:
-            self._said = now
-            left = "" if not count.left else f", {duration(count.left)} left"
-            sys.stderr.write(f"{self._title}: {count}{left}\n")
-            sys.stderr.flush()
+        due = now - self._said >= PERIOD and not count.waiting  # that is told once
+        if at_once or due or count.waiting != self._waiting:
+            self._said, self._waiting = now, count.waiting
+            self.say(", ".join(filter(None, (str(count), count.ahead))))
+
+    def say(self, line: str) -> None:
+        sys.stderr.write(f"{self._title}: {line}\n")
+        sys.stderr.flush()
 
 
-class _Bar(_Teller):
+class _Bar(Teller):
     def __init__(self, bar: Progress, title: str, total: int) -> None:
         self._bar, self._task = bar, bar.add_task(title, total=total, said="", left="")
 
     def __call__(self, count: Count) -> None:
         done = count.done + count.failed + count.reused
-        left = "" if not count.left else f"{duration(count.left)} left"
-        self._bar.update(self._task, completed=done, said=str(count), left=left)
+        self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
+
+    def say(self, line: str) -> None:
+        self._bar.console.print(line, markup=False, highlight=False)
 
 
 @contextmanager
-def told(title: str, count: Count, *, quiet: bool) -> Iterator[Any]:
+def told(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
     """Give a function to be called with the count when it has changed, and now and then.
 
     Parameters
@@ -100,7 +122,7 @@ def told(title: str, count: Count, *, quiet: bool) -> Iterator[Any]:
         Say nothing.
     """
     if quiet:
-        yield _Teller()
+        yield Teller()
     elif sys.stderr.isatty():
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn

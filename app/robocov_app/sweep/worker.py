@@ -5,6 +5,7 @@ It ends when nobody is there any more who could give it a task, also in the mids
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import os
 import queue
@@ -12,10 +13,13 @@ import signal
 import sys
 import threading
 from contextlib import suppress
-from typing import BinaryIO
+from io import BufferedReader
 
 READY = "ready"
 """What a worker says when it has begun."""
+
+_SET_DEATH_SIGNAL = 1
+"""``PR_SET_PDEATHSIG`` of Linux."""
 
 
 def main() -> None:
@@ -23,19 +27,20 @@ def main() -> None:
     # Ctrl-C is for the parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     faulthandler.enable()
+    _end_with_parent()
     source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     target = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     # a controller of a user's may read and print what it likes
     with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file
         os.dup2(nothing.fileno(), sys.stdin.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    inbox: queue.SimpleQueue[object] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(source, inbox), daemon=True).start()
 
     # what takes long is imported once somebody listens
     from robocov_app.live.messages import send
     from robocov_app.sweep.performing import perform
 
-    inbox: queue.SimpleQueue[object] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(source, inbox), daemon=True).start()
     with suppress(OSError):  # nobody may be there any more
         send(target, READY)
         while True:
@@ -44,11 +49,19 @@ def main() -> None:
             send(target, perform(task))  # type: ignore[arg-type]
 
 
-def _listen(source: BinaryIO, inbox: queue.SimpleQueue[object]) -> None:
-    from robocov_app.live.messages import receive
+def _end_with_parent() -> None:
+    """Have the kernel end this process with its parent, where it can; see `_listen` for the others."""
+    with suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
 
-    while (task := receive(source)) is not None:
-        inbox.put(task)
+
+def _listen(source: BufferedReader, inbox: queue.SimpleQueue[object]) -> None:
+    """Take tasks on; end the process when the parent's end of the pipe is closed, also while modules load."""
+    if source.peek(1):
+        from robocov_app.live.messages import receive
+
+        while (task := receive(source)) is not None:
+            inbox.put(task)
     os._exit(0)
 
 

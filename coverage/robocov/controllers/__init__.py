@@ -12,7 +12,6 @@ results is only looked up in `CONTROLLERS`, and shown by `short_name`.
 from __future__ import annotations
 
 import hashlib
-import importlib.abc
 import importlib.util
 import os
 import sys
@@ -35,6 +34,7 @@ from robocov.controllers.range_limited import RangeLimited
 from robocov.controllers.rapf import Rapf
 from robocov.controllers.rpf import Rpf
 from robocov.controllers.tangentbug import TangentBug
+from robocov.controllers.user_modules import Source, TextLoader, provided
 from robocov.errors import ParameterError, shown, unknown_name
 
 if TYPE_CHECKING:
@@ -139,14 +139,14 @@ def _named(kind: type[Any], name: str) -> type[Any]:
     return kind
 
 
-def controller_kind(name: str, *, source: tuple[str, str] | None = None) -> type[Any]:
+def controller_kind(name: str, *, source: Source | None = None) -> type[Any]:
     """Return the controller class called `name`, or the class of ``file.py:ClassName``; this runs its code.
 
     Parameters
     ----------
     name : str
-    source : (path, text) or None
-        Of the file, which then need not be there; by default it is read.
+    source : Source or None
+        The file and the modules that it imports, which then need not be there; by default they are read.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def controller_kind(name: str, *, source: tuple[str, str] | None = None) -> type
 
 
 def make_controller(
-    name: str, gains: Mapping[str, object] | None = None, *, source: tuple[str, str] | None = None
+    name: str, gains: Mapping[str, object] | None = None, *, source: Source | None = None
 ) -> Controller:
     """Return the controller called `name` with the given gains, all others at their defaults.
 
@@ -185,38 +185,26 @@ def make_controller(
     return controller  # type: ignore[no-any-return]
 
 
-class _Text(importlib.abc.SourceLoader):
-    """Loads a module from the text of its file, which need not be there any more."""
-
-    def __init__(self, path: str, text: str) -> None:
-        self._path, self._text = path, text
-
-    def get_filename(self, fullname: str) -> str:
-        return self._path
-
-    def get_data(self, path: str) -> bytes:
-        return self._text.encode()
-
-
-def _kind_in_file(name: str, source: tuple[str, str] | None) -> type[Any]:
+def _kind_in_file(name: str, source: Source | None) -> type[Any]:
     file, _, class_name = name.rpartition(":")
     if not class_name or not file.endswith(".py"):
         raise ParameterError(
             f"controller {shown(name)}: a file and a class, as in mine.py:MyController, was wanted"
         )
-    path = Path(os.path.realpath(file)) if source is None else Path(source[0])
+    path = Path(os.path.realpath(file)) if source is None else Path(source.path)
     if source is None and not path.is_file():
         raise ParameterError(f"controller {shown(name)}: there is no file {file}")
     # a name of its own for each file, so that two files called mine.py do not replace each other
     module_name = f"{MODULE}{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
-    loader = None if source is None else _Text(*source)
+    loader = None if source is None else TextLoader(source.path, source.text)
     spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
     if spec is None or spec.loader is None:
         raise ParameterError(f"controller {shown(name)}: {file} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     try:
-        spec.loader.exec_module(module)
+        with provided({} if source is None else source.modules):
+            spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise fault_of(f"controller {shown(name)}: {file} cannot be run", error) from error
     kinds = {

@@ -5,11 +5,16 @@ from __future__ import annotations
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robocov.errors import OutputError, shown
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -85,3 +90,35 @@ def _told(target: Path) -> str:
     """Return a path for people: on one line."""
     text = str(target)
     return text if text.isprintable() else shown(text)
+
+
+def on_disk(paths: Iterable[Path]) -> None:
+    """Return when files and folders are on the disk; all at once, which takes as long as one of them.
+
+    Raises
+    ------
+    OSError
+        When a file cannot be written.
+    """
+    list(_threads().map(_on_disk, paths))
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """Return threads that bring files to the disk: most of what it takes is waiting."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    return ThreadPoolExecutor(8, "fsync")
+
+
+def _on_disk(path: Path) -> None:
+    if path.is_dir():
+        with suppress(OSError):  # not every system knows that of folders
+            descriptor = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+    else:
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())

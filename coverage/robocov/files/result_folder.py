@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, shown
-from robocov.files.atomic import written
+from robocov.files.atomic import on_disk, written
 from robocov.files.lock import locked
 
 Kind: TypeAlias = Literal["run", "comparison", "replay"]
@@ -230,7 +230,7 @@ def _carry_out(folder: Path) -> None:
     if journal is None:
         return
     files, removed = journal
-    _synchronise(folder)
+    on_disk([folder])
     for name in removed:
         path = _inside(folder, name)
         if _is_file(path):
@@ -247,16 +247,6 @@ def _carry_out(folder: Path) -> None:
             (folder / parent).rmdir()  # fails, as it should, where there is something in it
     _discard_staging(folder)
     (folder / _JOURNAL).replace(folder / _MANIFEST)
-
-
-def _synchronise(folder: Path) -> None:
-    """Make sure that the names in a folder outlive a power failure, where the system can do that."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import pytest
 from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.mapfile import from_json
-from robocov.mapfile.check import MapReport, check_map
+from robocov.mapfile.check import MapReport, check_map, many_vertices
 
 
 def room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -> Environment:
@@ -46,6 +46,20 @@ def test_measures() -> None:
     assert report.free_fraction == pytest.approx(report.free_area / 60)
     assert report.narrowest_gap is not None
     assert report.narrowest_gap.width == pytest.approx(0.8, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("count", "wanted"), [(5000, "about 3 seconds"), (10_891, "14 seconds"), (50_000, "about 5 minutes")]
+)
+def test_what_many_vertices_cost(count: int, wanted: str) -> None:
+    assert wanted in many_vertices(count)
+
+
+def test_many_vertices_are_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robocov.mapfile.check.MANY_VERTICES", 7)
+    report = check_map(room(block(4, 2, 2, 2)))
+    assert report.vertices == 8
+    assert report.warnings[0].startswith("8 vertices are many: ")
 
 
 def test_a_clean_map_has_no_warnings() -> None:

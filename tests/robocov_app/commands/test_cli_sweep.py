@@ -55,6 +55,8 @@ def test_a_sweep_answers_in_json(
 ) -> None:
     monkeypatch.chdir(study.parent)
     found = answer(capsys, "sweep", "study.toml", "--workers", "1")
+    (versions,) = found.pop("versions")
+    assert versions.startswith("robocov ") and ", numpy " in versions and ", pymunk " in versions
     assert found == {
         "out": "study",
         "runs": 8,
@@ -62,6 +64,9 @@ def test_a_sweep_answers_in_json(
         "failed": 0,
         "reused": 0,
         "interrupted": False,
+        "errors": {},
+        "damaged": [],
+        "table_replaced": True,
     }
     results = read_results("study")
     assert len(results) == 8
@@ -71,17 +76,28 @@ def test_a_sweep_answers_in_json(
     )
 
 
-def test_failures_are_told_and_are_no_error(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    study.write_text(STUDY.replace("robots = 3", "robots = 900"))
-    out = study.parent / "out"
-    assert main(["sweep", str(study), "--out", str(out), "--workers", "1"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[:2] == [
-        "0 runs done, 8 failed",
-        "why they failed is in the column error; --retry-failed does them again",
-    ]
-    assert main(["sweep", str(study), "--out", str(out), "--retry-failed", "--workers", "1"]) == 0
-    assert capsys.readouterr().out.startswith("0 runs done, 8 failed\n")
+def test_failures_are_told_each_time_and_are_an_exit_status(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study.write_text(STUDY.replace("robots = 3", "robots = [3, 900]"))
+    words = ["sweep", str(study), "--out", str(study.parent / "out"), "--workers", "1"]
+    for again, count in (
+        ([], "8 runs done"),
+        ([], "0 runs done, 8 were there already"),
+        (["--retry-failed"], ""),
+    ):
+        assert main([*words, *again]) == 1
+        said = capsys.readouterr().out.splitlines()
+        assert said[0] == count or again
+        assert said[1] == "8 of 16 runs failed:"
+        assert said[2].startswith("  room-rapf-900-corner-0-")
+        assert ": start 'corner': room for about 57 robots" in said[2]
+        assert said[3].startswith("--retry-failed does them again")
+    assert main([*words, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["done"], found["failed"], found["reused"]) == (0, 8, 8)
+    (error,) = found["errors"].values()
+    assert error.startswith("start 'corner'")
 
 
 def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,6 +166,25 @@ def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
     again = study.parent / "again"
     answer(capsys, "sweep", str(study), "--out", str(again), "--workers", "1")
     assert tables(again) == tables(out)
+
+
+@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "runs", "study.json", ".lock"])
+@pytest.mark.parametrize("finished", [True, False])
+def test_something_else_that_has_a_name_of_ours_is_one_line(
+    study: Path, name: str, finished: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = study.parent / "out"
+    words = ("sweep", str(study), "--out", str(out), "--workers", "1")
+    out.mkdir()
+    if finished:
+        (out / "study.json").write_text('{"format": "robocov-study"}')
+    (out / name).unlink(missing_ok=True)
+    if name == "runs":
+        (out / name).touch()
+    else:
+        (out / name / "mine").mkdir(parents=True)
+    assert str(out) in complaint(capsys, *words)
+    assert (out / name).exists() and (name == "runs" or (out / name / "mine").is_dir())
 
 
 def test_a_run_of_a_sweep_can_be_seen_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,7 +43,8 @@ def main(files: list[str]) -> None:
         begin = time.process_time()
         try:
             named = [kind for kind in IMPORTERS.values() if path.suffix in kind.suffixes]
-            chosen = next((kind for kind in named if kind.sniff(path, limits.head(path))), named[0])
+            known = (kind for kind in IMPORTERS.values() if kind.sniff(path, limits.head(path)))
+            chosen = next(known, named[0])
             options = ReadOptions(scale=1.0) if "scale" in chosen.options else ReadOptions()
             chosen.read(path, options)
             said = "taken"

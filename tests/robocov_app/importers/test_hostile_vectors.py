@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import ezdxf
@@ -44,6 +46,17 @@ def _blocks(folder: Path, levels: int) -> bytes:
     document.modelspace().add_blockref(f"b{levels}", (0, 0))
     document.saveas(folder / "made.dxf")
     return (folder / "made.dxf").read_bytes()
+
+
+def _tmx(body: str, size: int = 4) -> bytes:
+    sides = f'width="{size}" height="{size}" tilewidth="8" tileheight="8"'
+    return f'<map {sides}><layer name="walls" width="{size}" height="{size}">{body}</layer></map>'.encode()
+
+
+def _macros(levels: int) -> bytes:
+    """Return a world of Stage in which each macro is ten of the next."""
+    calls = "".join(f"define m{k} model ( {f'm{k + 1} ( ) ' * 10} )\n" for k in range(levels))
+    return f"{calls}m0 ( )".encode()
 
 
 def _files(folder: Path) -> dict[str, bytes]:
@@ -90,6 +103,37 @@ def _files(folder: Path) -> dict[str, bytes]:
         "knot.json": json.dumps([knot]).encode(),
         "plan.json": json.dumps({"verts": knot}).encode(),
         "vertices.json": b'{"verts":[' + b"[0,0]," * MB + b"[0,0]]}",
+        "bomb.tmx": _tmx(
+            '<data encoding="base64" compression="zlib">'
+            + base64.b64encode(zlib.compress(bytes(500 * MB // 2), 9)).decode()
+            + "</data>"
+        ),
+        "wide.tmx": _tmx('<data encoding="csv">1</data>', 10**9),
+        "chunks.tmx": _tmx(
+            '<data encoding="csv">'
+            + "".join(f'<chunk x="{x}" y="{x}" width="1" height="1">1</chunk>' for x in (-(10**7), 10**7))
+            + "</data>"
+        ).replace(b"<map", b'<map infinite="1"'),
+        "numbers.tmx": _tmx(f'<data encoding="csv">{"1," * (20 * MB)}1</data>'),
+        "rough.tmx": _tmx(f'<data encoding="csv">{",".join(("01" * MB)[: 1413**2])}</data>', 1413),
+        "macros.world": _macros(30),
+        "words.world": b"model ( a 1 ) " * (MB // 3),
+        "deep.world": b"model ( " * (MB // 2),
+        "blank.world": b"#\n" * (5 * MB // 2),
+        "include.world": b'include "include.world"\n' * 1000,
+        "points.world": b"model ( block ( "
+        + b" ".join(b"point[%d] [%d 1]" % (k, k) for k in range(100_000))
+        + b" ) )",
+        "placed.argos": b'<argos-configuration><arena size="9,9,1"><distribute><position method="constant" '
+        b'values="0,0,0"/><orientation method="constant" values="0,0,0"/><entity quantity="2000000000">'
+        b'<box size="1,1,1" id="b"/></entity></distribute></arena></argos-configuration>',
+        "far.argos": b'<argos-configuration><arena size="1e300,1,1"/></argos-configuration>',
+        "number.yaml": b"world: {}\nobstacle: [{number: 100000000}]",
+        "deep.yaml": b"world:\n" + b"[" * 200_000,
+        "keys.yaml": b"world: {" + b"{a: 1}, " * 30_000,
+        "knot.yaml": b"world: {}\nobstacle: {shape: {name: polygon, vertices: "
+        + json.dumps(knot).encode()
+        + b"}}",
         "blocks.dxf": _blocks(folder, 9),
         "towers.dxf": _blocks(folder, 31),
         "vertices.dxf": head + b"10\n0\n20\n0\n" * MB,

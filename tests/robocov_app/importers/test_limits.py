@@ -54,7 +54,7 @@ def test_sizes_counts_lengths_and_places() -> None:
     with pytest.raises(MapError, match="1000000000 x 1000000000 cells, but at most 64 million"):
         limits.require_cells(10**9, 10**9, "grid")
     limits.require_vertices(limits.MAX_VERTICES, "grid")
-    with pytest.raises(MapError, match="2000001 vertices"):
+    with pytest.raises(MapError, match="500001 vertices"):
         limits.require_vertices(limits.MAX_VERTICES + 1, "grid")
     limits.require_length(0.05, "resolution")
     limits.require_coordinate(-1e7, "origin")

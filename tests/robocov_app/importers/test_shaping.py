@@ -16,6 +16,7 @@ from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.importers.bounding import bounded, rounded
 from robocov_app.importers.foreign import ForeignMap
+from robocov_app.importers.passing import roomiest
 from robocov_app.importers.shaping import Shaping, shaped
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
@@ -282,3 +283,53 @@ def test_boundary_and_obstacles_leave_what_was_free(
     boundary, solid = bounded(free, None, hull=hull, margin=margin, digits=4)
     left = shapely.difference(boundary, shapely.union_all(solid))
     assert shapely.symmetric_difference(left, free).area < 1e-3 * (1 + free.area)
+
+
+def test_by_how_much_walls_moved() -> None:
+    # a bump of 15 mm goes: a triangle of 30 cm² changes sides
+    bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
+    _, report = shaped(foreign(bumpy), Shaping(), "plan")
+    assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
+    assert report.changed == (
+        "walls moved by at most 0.015 m; 0.003 m² changed sides, 0.0038 % of the free area",
+    )
+    assert (report.to_dict()["moved_m"], report.to_dict()["moved_area_m2"]) == (
+        report.moved,
+        report.moved_area,
+    )
+    _, report = shaped(foreign(bumpy), Shaping(simplify=0.0), "plan")
+    assert (report.changed, report.moved, report.moved_area) == ((), 0.0, 0.0)
+
+
+def test_a_map_of_many_vertices_says_what_that_means() -> None:
+    angle = [k * math.tau / 6000 for k in range(6000)]
+    round_room = Polygon([(20 * math.cos(a), 20 * math.sin(a)) for a in angle])
+    _, report = shaped(foreign(round_room), Shaping(simplify=0.0), "plan")
+    assert report.notes[-1].startswith(
+        "6000 vertices are many: before a run the exact distances among them take"
+    )
+    assert "many" not in lines(shaped(foreign(round_room), Shaping(), "plan")[1])
+
+
+@pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_KEPT", "vertices")])
+def test_a_map_that_takes_too_long_is_refused(
+    monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
+) -> None:
+    monkeypatch.setattr(f"robocov_app.importers.shaping.{most}", 0)
+    with pytest.raises(MapError, match=rf"plan: \d+ {wanted}, but at most 0 were wanted: --specks AREA"):
+        shaped(foreign(ROOM), Shaping(), "plan")
+
+
+_RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(_RECTANGLES, max_size=6))
+def test_the_roomiest_place(blocks: list[tuple[int, int, int, int]]) -> None:
+    solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])
+    room = max(shapely.get_parts(box(-1, -1, 16, 16) - solid), key=lambda part: part.area)
+    (x, y), away = roomiest(room, 0.01)
+    assert room.contains(shapely.Point(x, y))
+    assert away == pytest.approx(room.boundary.distance(shapely.Point(x, y)))
+    assert away >= shapely.maximum_inscribed_circle(room, tolerance=0.001).length - 0.0101
+    assert roomiest(room, 0.01, enough=0.5)[1] >= min(0.5, away - 0.01)

@@ -231,3 +231,25 @@ def test_drawings_are_simplified_too() -> None:
     assert shapely.hausdorff_distance(result.free.boundary, round_room.boundary) <= 0.02
     assert simplified(MultiPolygon([round_room]), 0.0, None, 0.1).free.geoms[0] is not None
     assert vertices(simplified(MultiPolygon([round_room]), 0.0, None, 0.1).free) == 400
+
+
+@pytest.mark.parametrize("sides", [(0.05, 0.08), (0.1, 0.03)])
+def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
+    # two obstacles that touch at a corner: the neck between them becomes that corner, wherever it is
+    free = np.ones((12, 12), dtype=bool)
+    free[4, 4] = free[5, 5] = False
+    cells = affinity.scale(traced(free, "grid"), *sides, origin=(0, 0))
+    turned = affinity.rotate(cells, 20, origin=(0, 0))
+    for shape, turn in ((cells, 0), (turned, 20)):
+        outline = outline_of(shape, max(sides))
+        wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
+        assert outline.neck.sum() == 2
+        assert outline.points[outline.neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))
+    # walls at an angle are straight
+    room = affinity.rotate(shapely.box(0, 0, 6, 4), 20, origin=(0, 0))
+    stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))
+    stairs = affinity.scale(cells_of(stretched, 1.0), *sides, origin=(0, 0))
+    result = simplified(stairs, max(sides), max(sides), 0.1)
+    assert vertices(result.free) <= 8
+    assert result.free.area == pytest.approx(24, rel=0.01)
+    assert shapely.hausdorff_distance(result.free.boundary, room.boundary) < 2 * max(sides)

@@ -14,7 +14,7 @@ from vector_files import read, svg
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov_app.importers import IMPORTERS, ForeignMap, ReadOptions, detect
-from robocov_app.importers.svg_tree import DEEPEST, MOST_ELEMENTS
+from robocov_app.importers.xml_tree import DEEPEST, MOST_ELEMENTS
 
 PAGE = '<rect width="1000" height="600" fill="white"/>'
 BLOCK, WALL = box(1, 4, 3, 5), box(1, 4.9, 3, 5.1)
@@ -279,6 +279,25 @@ def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, wanted:
     assert "\n" not in str(caught.value)
 
 
+PUBLIC = 'PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd"'
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "",
+        ' [<!ENTITY ns_svg "http://www.w3.org/2000/svg"> <!ENTITY ns_ai "http://ns.adobe.com/AdobeIllustrator/10.0/">]',
+        ' [<!ATTLIST svg xmlns:xlink CDATA #FIXED "http://www.w3.org/1999/xlink">]',
+    ],
+    ids=["public", "entities", "attributes"],
+)
+def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str) -> None:
+    name = "&ns_svg;" if "ns_svg" in inside else "http://www.w3.org/2000/svg"
+    text = f'<?xml version="1.0"?>\n<!DOCTYPE svg {PUBLIC}{inside}>\n'
+    text += f'<svg xmlns="{name}" width="1000" height="600">{PAGE}<rect width="200" height="100"/></svg>'
+    assert read(tmp_path, "svg", text, scale=0.01).free.area == pytest.approx(60 - 2)
+
+
 @pytest.mark.parametrize(
     ("content", "wanted"),
     [
@@ -288,10 +307,25 @@ def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, wanted:
         (b"<html><svg/></html>", ": <html>, but <svg> was wanted"),
         (b"<x:y xmlns:x='urn:z'/>", ": other XML, but <svg> was wanted"),
         (b"\x1f\x8b\x08", ": compressed, but plain SVG was wanted"),
-        (b"\n<!DOCTYPE svg><svg/>", ":2: <!DOCTYPE or <!ENTITY, but SVG without"),
+        (
+            b"<!DOCTYPE svg [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><svg>&a;</svg>",
+            ":2: entity 'a' stands for another file ('file:///etc/passwd'), which is not read, but plain SVG",
+        ),
+        (b"<!DOCTYPE svg [<!ENTITY % a SYSTEM 'b'> %a;]><svg/>", "entity 'a' stands for another file"),
+        (b"<!DOCTYPE svg [<!ENTITY % a 'b'>]><svg/>", "entity 'a' stands for other entities"),
+        (b"<!DOCTYPE svg [<!ENTITY a 'b'><!ENTITY c '&a;'>]><svg/>", "entity 'c' stands for other entities"),
+        (
+            b"<!DOCTYPE svg [<!ENTITY a '" + b"b" * 900 + b"'>]><svg a='" + b"&a;" * 2000 + b"'/>",
+            "entity 'a' stands for too much",
+        ),
+        (
+            b"<!DOCTYPE svg [<!ATTLIST g a CDATA '" + b"b" * 9000 + b"'>]><svg>" + b"<g/>" * 900 + b"</svg>",
+            "its entities stand for too much",
+        ),
+        (b"<!DOCTYPE svg [<!ATTLIST g" + b" a CDATA ''" * 1001 + b">]><svg/>", "more than 1000 declarations"),
+        (b"<svg xmlns='" + b"x" * 2000 + b"'/>", "a namespace of 2000 characters"),
         (b"<svg>&lol;</svg>", "not XML: undefined entity"),
-        ("<!DOCTYPE svg [<!ENTITY a 'b'>]><svg/>".encode("utf-16"), "<!DOCTYPE or <!ENTITY"),
-        ("<!DOCTYPE svg><svg/>".encode("utf-16-be"), "<!DOCTYPE or <!ENTITY"),
+        ("<!DOCTYPE svg [<!ENTITY a SYSTEM 'b'>]><svg/>".encode("utf-16"), "stands for another file"),
         (b"<?xml version='1.0' encoding='EBCDIC-CP-BE'?><svg/>", "not XML: "),
         (b"<svg width='0' height='5'/>", "<svg>: 0 x 5 px, but a size was wanted"),
         (b"<svg data-origin='1'/>", "<svg>: data-origin '1', but two numbers"),

@@ -15,7 +15,7 @@ from robocov_app.importers.svg_style import (
     is_hidden,
     is_painted,
 )
-from robocov_app.importers.svg_tree import Element
+from robocov_app.importers.xml_tree import Element
 
 
 def element(tag: str = "rect", **attributes: str) -> Element:

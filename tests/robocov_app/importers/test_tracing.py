@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest import mock
+
 import numpy as np
 import pytest
 import shapely
@@ -38,9 +40,10 @@ def expected(free: np.ndarray) -> shapely.Geometry:
 
 
 @settings(deadline=None, max_examples=200)
-@given(grids)
-def test_it_is_the_union_of_the_cells(free: np.ndarray) -> None:
-    outline = traced(free, "grid")
+@given(grids, st.integers(1, 10))
+def test_it_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
+    with mock.patch("robocov_app.importers.tracing._STRIP", strip):
+        outline = traced(free, "grid")
     assert outline.is_valid
     assert shapely.equals(outline, expected(free)) if free.any() else outline.is_empty
     assert outline.area == free.sum() - len(touching(free)) * NECK**2

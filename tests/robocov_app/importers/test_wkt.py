@@ -60,6 +60,26 @@ def test_several_geometries_in_a_file(tmp_path: Path, separator: str) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    "layout", ["MULTIPOLYGON({})", "GEOMETRYCOLLECTION({})", "{}"], ids=["multi", "collection", "several"]
+)
+def test_accessible_areas_that_overlap_are_one_free_space(tmp_path: Path, layout: str) -> None:
+    # corridors around a hall, most of each in it: none is an obstacle, and nothing between them is closed
+    areas = [box(0, 0, 20, 10), box(-2, 4, 12, 6), box(9, -3, 11, 8), box(5, 2, 22, 3), box(3, 8, 4, 9)]
+    parts = [area.wkt if "MULTI" not in layout else area.wkt.removeprefix("POLYGON ") for area in areas]
+    foreign = read(tmp_path, "wkt", layout.format(",".join(parts)))
+    assert foreign.free.equals(shapely.union_all(areas))
+    environment, report, _ = import_map(tmp_path / "plan.wkt")
+    assert environment.free_area == pytest.approx(shapely.union_all(areas).area)
+    assert (len(environment.obstacles), report.dropped) == (0, ())
+    # one that all others lie in has obstacles: as free space they would say nothing
+    nested = [areas[0], box(3, 8, 4, 9), box(6, 5, 7, 9)]
+    text = ",".join(area.wkt for area in nested)
+    assert read(tmp_path, "wkt", text).free.area == pytest.approx(200 - 5)
+    assert read(tmp_path, "wkt", text, outlines="free").free.area == pytest.approx(200)
+    assert read(tmp_path, "wkt", ",".join(area.wkt for area in areas), outlines="solid").free.area < 200
+
+
 def test_collections_of_everything(tmp_path: Path) -> None:
     text = (
         "GEOMETRYCOLLECTION(POLYGON((0 0,20 0,20 10,0 10,0 0)),MULTIPOLYGON(((1 1,2 1,2 2,1 2,1 1)),"

@@ -30,9 +30,9 @@ pytestmark = pytest.mark.xdist_group("cluster")
 
 
 @contextmanager
-def a_cluster(*, processes: bool) -> Iterator[Any]:
+def a_cluster(*, processes: bool, workers: int = 1) -> Iterator[Any]:
     with distributed.LocalCluster(
-        n_workers=1,
+        n_workers=workers,
         threads_per_worker=2,
         processes=processes,
         dashboard_address=":0",
@@ -69,6 +69,38 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
     lines = (tmp_path / "out" / "results.csv").read_text().splitlines()[1:]
     ends = [line.rpartition(",")[2] for line in lines]
     assert ends == ["", "the process of its worker ended"] * 2
+
+
+def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "_LOOK", 0.05)
+    task = next(tasks_of(small_study()))
+    with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as crew:
+        crew.submit(task)
+        assert crew.next(0.1) is None
+        assert crew.waiting == f"no workers are connected to {cluster.scheduler_address}; waiting"
+        cluster.scale(1)
+        while (back := crew.next(0.1)) is None:
+            pass
+        assert back[1].error is None
+        assert crew.waiting == ""
+
+
+def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "weights_of_mine.py").write_text("PULL = 0.5\n")
+    name = controller(tmp_path, "        from weights_of_mine import PULL\n        self = Mine(PULL)\n")
+    (task, *_) = tasks_of(small_study(controllers=(name,)))
+    here = perform(task)
+    for path in tmp_path.iterdir():
+        path.unlink()
+    with a_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as crew:
+        crew.submit(task)
+        while (back := crew.next(0.1)) is None:
+            pass
+    assert back[1] == here
+    assert here.error is None
 
 
 def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:

@@ -5,15 +5,17 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from swept import run_folders, small_study
 
+from robocov import __version__
 from robocov.errors import InputError, OutputError
 from robocov_app.sweep import ledger as ledger_module
-from robocov_app.sweep.ledger import Entry, is_sweep, opened
-from robocov_app.sweep.performing import Outcome
+from robocov_app.sweep.ledger import Entry, Ledger, Survey, is_sweep, opened
+from robocov_app.sweep.performing import Outcome, perform
 from robocov_app.sweep.task import Task, tasks_of
 
 STUDY = small_study().to_json()
@@ -31,9 +33,9 @@ def task() -> Task:
 def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path / "deep" / "out", STUDY) as ledger:
         assert ledger.entry(task) is None
-        assert ledger.keep(task, DONE) == Entry(DONE.figures, None)
+        assert ledger.keep(task, DONE) == Entry(DONE.figures, None, DONE.versions)
     with opened(tmp_path / "deep" / "out", STUDY) as ledger:
-        assert ledger.entry(task) == Entry(DONE.figures, None)
+        assert ledger.entry(task) == Entry(DONE.figures, None, DONE.versions)
     folder = tmp_path / "deep" / "out" / "runs" / task.name
     assert sorted(path.name for path in folder.iterdir()) == ["cost.csv", "row.json", "run.json"]
 
@@ -41,9 +43,9 @@ def test_a_run_is_kept_and_found_again(tmp_path: Path, task: Task) -> None:
 def test_a_run_takes_the_place_of_an_earlier_one(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path, STUDY) as ledger:
         ledger.keep(task, FAILED)
-        assert ledger.entry(task) == Entry({}, "it broke")
+        assert ledger.entry(task) == Entry({}, "it broke", FAILED.versions)
         ledger.keep(task, DONE)
-        assert ledger.entry(task) == Entry(DONE.figures, None)
+        assert ledger.entry(task) == Entry(DONE.figures, None, DONE.versions)
     assert not (tmp_path / "runs" / task.name / "error.json").exists()
 
 
@@ -67,6 +69,129 @@ def test_what_cannot_be_read_is_not_done(tmp_path: Path, task: Task, content: st
         assert ledger.entry(task) is None
         ledger.keep(task, DONE)
         assert ledger.entry(task) is not None
+
+
+def kept(folder: Path, task: Task, outcome: Outcome | None = None) -> Path:
+    """Keep a run that was done; return its folder."""
+    with opened(folder, STUDY) as ledger:
+        ledger.keep(task, outcome or perform(task))
+    return folder / "runs" / task.name
+
+
+def surveyed(folder: Path, task: Task, **options: bool) -> Survey:
+    return Ledger(folder).survey([task], **options)
+
+
+def of_version_1(run: Path) -> None:
+    """Make the row of a run what it was before there were check sums."""
+    row = json.loads((run / "row.json").read_text())
+    old = {name: row[name] for name in ("format", "version", "digest", "figures", "error")}
+    (run / "row.json").write_text(json.dumps({**old, "version": 1}) + "\n")
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_no_bit_of_a_row_can_flip_unnoticed(tmp_path: Path, task: Task, version: int) -> None:
+    run = kept(tmp_path, task)
+    if version == 1:
+        of_version_1(run)
+    row, ledger = run / "row.json", Ledger(tmp_path)
+    whole, expected = row.read_bytes(), ledger.entry(task)
+    assert expected is not None and expected.checked == (version == 2)
+    for bit in range(8 * len(whole)):
+        flipped = bytearray(whole)
+        flipped[bit // 8] ^= 1 << bit % 8
+        row.write_bytes(flipped)
+        assert ledger.entry(task) in (None, expected), flipped
+
+
+@pytest.mark.parametrize("name", ["run.json", "record.npz", "cost.csv", "row.json"])
+@pytest.mark.parametrize("damage", ["flipped", "cut", "removed", "folder"])
+def test_a_run_of_which_a_file_is_damaged_is_done_again(
+    tmp_path: Path, task: Task, name: str, damage: str
+) -> None:
+    file = kept(tmp_path, task) / name
+    assert surveyed(tmp_path, task) == Survey(bytearray([0]))
+    content = file.read_bytes()
+    file.unlink()
+    if damage == "folder":
+        file.mkdir()
+    elif damage != "removed":
+        whole = bytes([content[-3] ^ 1]) + content[-2:]
+        file.write_bytes(content[:-3] + whole * (damage == "flipped"))
+    survey = surveyed(tmp_path, task)
+    assert survey == Survey(bytearray([1]), [task.name])
+    assert survey.words(keep_versions=False) == [f"1 damaged run will be done again: {task.name}"]
+    kept(tmp_path, task)
+    assert surveyed(tmp_path, task) == Survey(bytearray([0]))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"figures": {"mean_distance_m": "1.0"}},
+        {"figures": [["mean_distance_m", 1.0]]},
+        {"figures": None},
+        {"error": 3},
+        {"version": "2"},
+        {"files": {"run.json": None}},
+        {"check_sum": None},
+    ],
+)
+def test_wrong_types_in_a_row_are_damage(tmp_path: Path, task: Task, change: dict[str, object]) -> None:
+    row = kept(tmp_path, task) / "row.json"
+    row.write_text(json.dumps(json.loads(row.read_text()) | change))
+    assert surveyed(tmp_path, task).damaged == [task.name]
+
+
+def test_runs_of_version_1_can_be_kept_and_it_is_told_that_they_have_no_check_sums(
+    tmp_path: Path, task: Task
+) -> None:
+    of_version_1(kept(tmp_path, task))
+    survey = surveyed(tmp_path, task)
+    assert (survey.todo, survey.damaged, survey.unchecked) == (bytearray([1]), [], 0)
+    assert survey.words(keep_versions=False)[0].startswith(
+        f"1 run made with robocov {__version__} instead of "
+    )
+    survey = surveyed(tmp_path, task, keep_versions=True)
+    assert (survey.todo, survey.unchecked) == (bytearray([0]), 1)
+    told = survey.words(keep_versions=True)[-1]
+    assert told.startswith("1 run of an earlier version of robocov without check sums will be used; damage")
+
+
+def test_runs_of_other_versions_are_done_again_unless_they_are_to_be_kept(tmp_path: Path, task: Task) -> None:
+    kept(tmp_path, task, Outcome(DONE.files, DONE.figures, versions={**DONE.versions, "numpy": "1.9"}))
+    difference = f"numpy 1.9 instead of {DONE.versions['numpy']}"
+    survey = surveyed(tmp_path, task)
+    assert survey == Survey(bytearray([1]), outdated=Counter([difference]))
+    assert survey.words(keep_versions=False) == [
+        f"1 run made with {difference} will be done again",
+        "--keep-versions uses them as they are",
+    ]
+    survey = surveyed(tmp_path, task, keep_versions=True)
+    assert survey == Survey(bytearray([0]), outdated=Counter([difference]))
+    assert survey.words(keep_versions=True) == [f"1 run made with {difference} will be used all the same"]
+
+
+def test_a_run_is_on_the_disk_before_it_counts(
+    tmp_path: Path, task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its files and its folder, before the folder gets its name."""
+    synced: set[int] = set()
+    fsync, rename = os.fsync, Path.rename
+
+    def watched(descriptor: int) -> None:
+        synced.add(os.fstat(descriptor).st_ino)
+        fsync(descriptor)
+
+    def last(path: Path, target: Path) -> Path:
+        assert {each.stat().st_ino for each in (path, *path.iterdir())} <= synced
+        return rename(path, target)
+
+    with opened(tmp_path, STUDY) as ledger:
+        monkeypatch.setattr(os, "fsync", watched)
+        monkeypatch.setattr(Path, "rename", last)
+        ledger.keep(task, DONE)
+    assert run_folders(tmp_path) == [task.name]
 
 
 def test_a_full_disk_leaves_nothing_of_a_run(
@@ -93,13 +218,15 @@ def test_a_full_disk_leaves_nothing_of_a_run(
 def test_what_was_left_half_written_goes(tmp_path: Path, task: Task) -> None:
     with opened(tmp_path, STUDY) as ledger:
         ledger.keep(task, DONE)
-    half = tmp_path / "runs" / ".another.part"
+    (tmp_path / "runs" / ".mine.part").mkdir()
+    (tmp_path / ".x.part.zip").touch()
+    half = tmp_path / "runs" / ".room-rapf-2-corner-0-0123456789.part"
     half.mkdir()
     (half / "run.json").write_text("{")
     (tmp_path / ".results.123.part.parquet").write_text("PAR1")
     with opened(tmp_path, STUDY):
-        assert run_folders(tmp_path) == [task.name]
-        assert not list(tmp_path.glob(".*.part.*"))
+        assert run_folders(tmp_path) == [".mine.part", task.name]
+        assert [path.name for path in tmp_path.glob(".*.part.*")] == [".x.part.zip"], "it is not ours"
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
@@ -174,7 +301,7 @@ def test_a_study_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pyt
     def full(self: Path, *_: object, **__: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(ledger_module.Path, "write_text", full)
+    monkeypatch.setattr(ledger_module.Path, "write_bytes", full)
     with (
         pytest.raises(OutputError, match=r"study.json: cannot be written: No space left"),
         opened(tmp_path, STUDY),

@@ -81,7 +81,7 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
     task = first(small_study(controllers=("mine.py:Mine",), folder=Path(controller(tmp_path, "")).parent))
     content = json.loads(perform(task).files["run.json"])
     assert content["controller"]["name"] == "mine.py:Mine"
-    assert content["controller"]["source"] == task.source
+    assert task.source is not None and content["controller"]["source"] == task.source.text
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,8 @@ def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -
     controller(tmp_path, "")
     task = first(small_study(controllers=("mine.py:Mine",), folder=tmp_path))
     # the file is well when the study is made
-    task = replace(task, source=HEAD + law)
+    assert task.source is not None
+    task = replace(task, source=task.source._replace(text=HEAD + law))
     outcome = perform(task)
     assert outcome.error is not None and outcome.error.startswith(message), outcome.error
     assert not outcome.figures

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import time
 from contextlib import suppress
@@ -104,6 +105,15 @@ def test_a_task_that_is_to_blame_holds_nobody_up(tasks: list[Task]) -> None:
     assert len(outcomes) == len(tasks)
 
 
+def test_workers_that_end_again_and_again_end_the_sweep() -> None:
+    tasks = list(tasks_of(small_study(seeds=range(20))))
+    with Scripted(2, {task.name: [KILLED] * 9 for task in tasks}) as crew:
+        told = pytest.raises(OutputError, match=r"workers have ended one after the other.*signal 9")
+        with told:
+            done_by(crew, tasks)
+    assert crew.lost == 21
+
+
 def test_processes_do_what_this_one_does(tasks: list[Task]) -> None:
     with LocalPool(2) as pool:
         assert done_by(pool, tasks) == {task.name: perform(task) for task in tasks}
@@ -164,6 +174,32 @@ def children() -> set[int]:
         with suppress(OSError):
             found |= {int(pid) for pid in path.read_text().split()}
     return found
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="others notice it when Python has its turn again")
+def test_a_worker_ends_with_its_parent_also_in_the_midst_of_what_is_not_python(tmp_path: Path) -> None:
+    flag = tmp_path / "asleep"
+    law = (
+        f"        Path({str(flag)!r}).write_text(str(os.getpid()) + ' ')\n"
+        f"        __import__('ctypes').PyDLL(None).sleep(60)\n"  # keeps all other threads from running
+    )
+    script = (
+        "import sys\nfrom swept import small_study\nfrom robocov_app.sweep.sweeping import sweep\n"
+        "sweep(small_study(controllers=(sys.argv[1],), seeds=(0,)), sys.argv[2], workers=1)\n"
+    )
+    command = [sys.executable, "-c", script, controller(tmp_path, law), str(tmp_path / "out")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as process:
+        end = time.monotonic() + PATIENCE
+        while not (flag.exists() and flag.read_text().endswith(" ")) and time.monotonic() < end:
+            time.sleep(0.01)
+        worker = Path("/proc") / flag.read_text().strip()
+        assert worker.exists()
+        process.kill()
+    end = time.monotonic() + 10.0
+    while worker.exists() and "State:\tZ" not in (worker / "status").read_text():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def test_where_no_process_can_begin_it_is_said_why(

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -23,7 +24,8 @@ from robocov_app.cli import main
 from robocov_app.interruption import Interruption
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.crew import Crew, Returned
-from robocov_app.sweep.performing import perform
+from robocov_app.sweep.ledger import opened
+from robocov_app.sweep.performing import made_with, perform
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.task import Task, tasks_of
@@ -48,6 +50,7 @@ class Here(Crew):
         self._stack: list[Task] = []
         self.longest = 0
         self.before: Callable[[], None] = lambda: None
+        self.lonesome = 0
 
     def __exit__(self, *exception: object) -> None: ...
 
@@ -55,12 +58,19 @@ class Here(Crew):
     def most(self) -> int:
         return self._most
 
+    @property
+    def waiting(self) -> str:
+        return "nobody is there; waiting" if self.lonesome else ""
+
     def _hand_out(self, task: Task) -> None:
         self._stack.append(task)
         self.longest = max(self.longest, len(self._stack))
 
     def _returned(self, timeout: float) -> Returned | None:
         self.before()
+        if self.lonesome:
+            self.lonesome -= 1
+            return None
         task = self._stack.pop()
         return task, perform(task)
 
@@ -135,17 +145,62 @@ def test_a_study_that_grows_does_what_is_new_and_one_that_shrinks_nothing(
     assert len(run_folders(tmp_path)) == 18, "they may be wanted again"
 
 
-def test_a_run_that_was_damaged_or_removed_is_done_again(
-    study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here
+def test_a_run_that_was_damaged_or_removed_is_done_again_and_that_is_told(
+    study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sweep(study, tmp_path, quiet=True)
     first, second, *_ = (tmp_path / "runs" / task.name for task in tasks_of(study))
-    (first / "row.json").write_text("")
+    (first / "cost.csv").write_bytes((first / "cost.csv").read_bytes().replace(b"1", b"2", 1))
     for path in second.iterdir():
         path.unlink()
     second.rmdir()
-    assert sweep(study, tmp_path, quiet=True) == Totals(2, 0, 16, False)
+    totals = sweep(study, tmp_path)
+    assert (totals, totals.damaged) == (Totals(2, 0, 16, False), [first.name])
+    assert f"sweep: 1 damaged run will be done again: {first.name}\n" in capsys.readouterr().err
     assert tables(tmp_path) == undisturbed
+
+
+def test_a_finished_table_stays_until_all_is_done_again(
+    study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here
+) -> None:
+    sweep(study, tmp_path, quiet=True)
+    for task in tasks_of(study):
+        (tmp_path / "runs" / task.name / "row.json").unlink()
+    stop = Interruption()
+    looks = 0
+
+    def look() -> None:
+        nonlocal looks
+        looks += 1
+        assert tables(tmp_path) == undisturbed
+        stop.requested = looks == 3
+
+    here.before = look
+    totals = sweep(study, tmp_path, quiet=True, stop=stop)
+    assert (totals, totals.table_replaced) == (Totals(3, 0, 0, True), False)
+    assert tables(tmp_path) == undisturbed
+    here.__init__()
+    assert sweep(study, tmp_path, quiet=True).table_replaced
+    assert tables(tmp_path) == undisturbed
+
+
+def test_after_an_upgrade_all_is_done_again_and_a_mixed_table_is_told(
+    tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = small_study()
+    old = {**made_with(), "pymunk": "6.0"}
+    with opened(tmp_path, study.to_json()) as ledger:
+        for task in tasks_of(study):
+            ledger.keep(task, replace(perform(task), versions=old))
+    more = small_study(seeds=range(3))
+    totals = sweep(more, tmp_path, quiet=True, keep_versions=True)
+    assert (totals, sorted(totals.versions.values())) == (Totals(2, 0, 4, False), [2, 4])
+    totals = sweep(more, tmp_path, quiet=True)
+    assert (totals, list(totals.versions.values())) == (Totals(4, 0, 2, False), [6])
+    monkeypatch.setattr(sweeping, "difference_of", lambda versions: "numpy 1.9 instead of 2.3")
+    told = pytest.raises(OutputError, match=r"a worker has numpy 1.9 instead of 2.3; the same versions")
+    with told:
+        sweep(small_study(seeds=(9,)), tmp_path, quiet=True)
 
 
 def test_a_stop_keeps_what_is_done_in_the_table(
@@ -162,7 +217,7 @@ def test_a_stop_keeps_what_is_done_in_the_table(
         stop.requested = calls == 7
 
     here.before = press
-    assert sweep(study, tmp_path, quiet=True, stop=stop) == Totals(7, 0, 0, True)
+    assert sweep(study, tmp_path, quiet=True, stop=stop) == Totals(7, 0, 1, True)
     here.before = lambda: None
     # rapf with k_rep 0.3 is not in the study
     done = [task.name for task in tasks_of(study) if task.name in run_folders(tmp_path)]
@@ -191,7 +246,12 @@ def test_failures_are_recorded_and_done_again_when_that_is_wanted(tmp_path: Path
     assert sorted(path.name for path in failed.iterdir()) == ["error.json", "row.json"]
 
     before = tables(out)
-    assert sweep(study, out, quiet=True) == Totals(0, 0, 8, False)
+    totals = sweep(study, out, quiet=True)
+    assert totals == Totals(0, 6, 2, False)
+    assert [error.partition(":")[0] for error in totals.errors.values()] == [
+        "controller 'Mine'",
+        "start 'corner'",
+    ]
     assert tables(out) == before
     flag.touch()
     assert sweep(study, out, quiet=True, retry_failed=True) == Totals(2, 4, 2, False)
@@ -226,6 +286,14 @@ def test_a_full_disk_stops_the_sweep_and_the_same_call_goes_on(
     monkeypatch.setattr(sweeping, "LocalPool", lambda workers: Here())
     assert sweep(study, tmp_path, quiet=True) == Totals(18 - len(done), 0, len(done), False)
     assert tables(tmp_path) == undisturbed
+
+
+def test_where_nobody_does_runs_that_is_told_once(
+    tmp_path: Path, here: Here, capsys: pytest.CaptureFixture[str]
+) -> None:
+    here.lonesome = 4
+    assert sweep(small_study(seeds=(0,)), tmp_path) == Totals(2, 0, 0, False)
+    assert capsys.readouterr().err.count("sweep: 0 of 2 runs, nobody is there; waiting\n") == 1
 
 
 def test_two_sweeps_do_not_share_a_folder(study: Study, tmp_path: Path, here: Here) -> None:

@@ -119,17 +119,65 @@ def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / "results.parquet").num_rows == 0
 
 
-def test_parquet_appears_at_the_end_and_csv_grows(tmp_path: Path) -> None:
+def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Path) -> None:
     study = small_study()
     tasks = list(tasks_of(study))
-    (tmp_path / "results.parquet").write_text("an earlier one")
-    with Table(tmp_path, columns_of(study)) as table:
-        assert not (tmp_path / "results.parquet").exists()
+    with Table(tmp_path, columns_of(study), b"{}") as table:
         for k, task in enumerate(tasks):
             table.add(row_of(task, FIGURED))
             assert len((tmp_path / "results.csv").read_text().splitlines()) == k + 2
             assert not (tmp_path / "results.parquet").exists()
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(tasks)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        *("results.csv", "results.parquet"),
+        "study.json",
+    ]
+
+
+@pytest.mark.parametrize("parquet", [True, False])
+@pytest.mark.parametrize("complete", [True, False])
+def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_complete(
+    tmp_path: Path, complete: bool, parquet: bool
+) -> None:
+    study = small_study()
+    written(tmp_path, study, [FIGURED] * len(study))
+    if not parquet:  # as a sweep leaves it that was killed
+        (tmp_path / "results.parquet").unlink()
+    names = ("results.csv", *["results.parquet"] * parquet)
+    before = [(tmp_path / name).read_bytes() for name in names]
+    with Table(tmp_path, columns_of(study), b"{}") as table:
+        for task in list(tasks_of(study))[:3]:
+            table.add(row_of(task, FAILED))
+            assert [(tmp_path / name).read_bytes() for name in names] == before
+            assert not (tmp_path / "study.json").exists()
+        table.complete = complete
+    assert table.replaced == complete == (tmp_path / "study.json").exists()
+    assert len((tmp_path / "results.csv").read_text().splitlines()) == (4 if complete else 5)
+    assert (tmp_path / "results.parquet").exists() == (complete or parquet)
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_that_was_killed(
+    tmp_path: Path,
+) -> None:
+    study = small_study()
+    written(tmp_path, study, [FIGURED] * len(study))
+    (tmp_path / "results.parquet").unlink()
+    lengths = []
+    with Table(tmp_path, columns_of(study)) as table:
+        for task in [*tasks_of(study)] * 2:
+            table.add(row_of(task, FAILED))
+            text = (tmp_path / "results.csv").read_text()
+            lengths.append(text.count("\n") - 1 if "no room" in text else None)
+    assert lengths == [None, None, None, 4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("name", ["results.csv", "results.parquet"])
+def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    told = pytest.raises(OutputError, match=f"{name}: is a folder, but a file was wanted")
+    with told, Table(tmp_path, columns_of(small_study())):
+        pass
 
 
 def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
@@ -163,11 +211,11 @@ def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
     with full, Table(tmp_path, columns_of(study)) as table:
         table.add(row)
-        whole = table._csv._file
-        table._csv._file = Full(whole, 40)
+        whole = table._csv
+        table._csv = Full(whole, 40)  # type: ignore[assignment]
         with pytest.raises(OutputError):
             table.add(row)
-        table._csv._file = whole
+        table._csv = whole
         table.add(row)  # one is missing now
     lines = (tmp_path / "results.csv").read_text().splitlines()
     assert len(lines) == 2

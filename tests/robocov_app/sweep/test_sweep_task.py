@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from swept import HALL, ROOM, controller, small_study
@@ -13,7 +14,7 @@ from swept import HALL, ROOM, controller, small_study
 from robocov.mapfile import load_map
 from robocov_app.sweep.performing import simulated
 from robocov_app.sweep.study import StudyMap
-from robocov_app.sweep.task import Task, tasks_of
+from robocov_app.sweep.task import tasks_of
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
@@ -86,7 +87,7 @@ def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
     (tmp_path / "mine.py").unlink()
     task = next(tasks_of(study))
     assert pickle.loads(pickle.dumps(task)) == task
-    assert task.source is not None and "class Mine" in task.source
+    assert task.source is not None and "class Mine" in task.source.text
     assert len(simulated(task, ROOM)) == 11
 
 
@@ -109,7 +110,6 @@ def test_the_same_inputs_have_the_same_digest_and_others_do_not(tmp_path: Path) 
     ):
         others = {task.name for task in tasks_of(small_study(**changes))}
         assert not others & set(tasks), changes
-    assert {"digest", "path"} <= {field.name for field in fields(Task)}
 
 
 def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path) -> None:
@@ -121,6 +121,23 @@ def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path
         names.append([task.name for task in tasks_of(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
+
+
+def test_the_text_of_what_a_controller_imports_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "part_of_mine.py").write_text("import rest_of_mine\n")
+    name = controller(tmp_path, "        import part_of_mine\n")
+    names = []
+    for text in ("PULL = 1.0\n", "PULL = 1.0\n", "PULL = 2.0\n"):
+        (tmp_path / "rest_of_mine.py").write_text(text)
+        study = small_study(controllers=(name,))
+        names.append([task.name for task in tasks_of(study)])
+    assert names[0] == names[1]
+    assert not set(names[0]) & set(names[2])
+    (said,) = study.to_json()["controllers"]
+    assert said["modules"] == {"part_of_mine": "import rest_of_mine\n", "rest_of_mine": "PULL = 2.0\n"}
 
 
 def test_a_default_that_is_stated_is_the_same_run() -> None:

@@ -47,6 +47,21 @@ def test_where_there_is_no_terminal_a_line_comes_now_and_then(
     assert lines[-1] == "sweep: 100 of 1000 runs, 2 a second, 7 min 30 s left"
 
 
+def test_a_wait_is_told_once_in_place_of_an_estimate(
+    clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    count = Count(10, began=clock.now, done=2, waiting="nobody is there; waiting")
+    with told("sweep", count, quiet=False) as tell:
+        for _ in range(100):
+            clock.now += 1.0
+            tell(count)
+        count.waiting, count.lost = "", 3
+    assert capsys.readouterr().err.splitlines() == [
+        "sweep: 2 of 10 runs, 2 a second, nobody is there; waiting",
+        "sweep: 2 of 10 runs, 3 workers lost, 0.02 a second, 6 min 40 s left",
+    ]
+
+
 def test_nobody_is_told_when_nobody_wants_to_know(capsys: pytest.CaptureFixture[str]) -> None:
     with told("sweep", Count(1), quiet=True) as tell:
         tell(Count(1))

@@ -1,0 +1,256 @@
+"""Measure what files that are hard to import cost: each in a process of its own.
+
+    python tests/fuzz/budgets.py [NAME ...]
+
+prints a table of CPU seconds, of MB beside what the process has before, and of what came of each file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+REFUSED = (1.0, 200.0)
+"""What a file that is refused may cost: CPU seconds, MB."""
+
+READ = (10.0, 500.0)
+"""And one that is read."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What an import cost.
+
+    Attributes
+    ----------
+    seconds : float, s
+        Of a processor.
+    megabytes : float, MB
+        By which the peak of the memory grew.
+    said : str
+        Why it was refused, or how many vertices the map has.
+    read : bool
+        Whether the file could be read. (That no robot fits into what it shows is known only then.)
+    """
+
+    seconds: float
+    megabytes: float
+    said: str
+    read: bool
+
+    @property
+    def share(self) -> float:
+        """Return how much of its budget it took, 1 is all of it."""
+        seconds, megabytes = READ if self.read else REFUSED
+        return max(self.seconds / seconds, self.megabytes / megabytes)
+
+
+def star(points: int, x: float = 0.0, y: float = 0.0, radius: float = 20.0) -> list[tuple[float, float]]:
+    """Return a star whose every side crosses almost every other one."""
+    angle = np.arange(points) * (points // 2) * math.tau / points
+    return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)]).round(3).tolist()
+
+
+def path(ring: list[tuple[float, float]]) -> str:
+    """Return a filled path."""
+    return '<path d="M' + " ".join(f"{x:g} {y:g}" for x, y in ring) + 'z"/>'
+
+
+def svg(*bodies: str) -> bytes:
+    """Return a drawing."""
+    return f'<svg xmlns="http://www.w3.org/2000/svg">{"".join(bodies)}</svg>'.encode()
+
+
+def geojson(rings: list[Any]) -> bytes:
+    """Return polygons in metres."""
+    coordinates = [[[*ring, ring[0]]] for ring in rings]
+    return json.dumps({"type": "MultiPolygon", "units": "metres", "coordinates": coordinates}).encode()
+
+
+def wkt(ring: Any) -> bytes:
+    """Return a polygon."""
+    return f"POLYGON(({','.join(f'{x:.4f} {y:.4f}' for x, y in ring)}))".encode()
+
+
+def comb(teeth: int) -> list[tuple[float, float]]:
+    """Return a hall with as many niches."""
+    x = np.arange(teeth) * 0.02
+    tooth = [(0.0, 0.0), (0.0, 5.0), (0.01, 5.0), (0.01, 0.0)]
+    points = np.stack([np.column_stack([x + dx, np.full(teeth, y)]) for dx, y in tooth], axis=1)
+    return [*map(tuple, points.reshape(-1, 2).tolist()), (teeth * 0.02, -3.0), (0.0, -3.0)]
+
+
+def pgm(cells: np.ndarray) -> bytes:
+    """Return a picture, raw."""
+    return b"P5 %d %d 255\n" % cells.shape[::-1] + cells.astype(np.uint8).tobytes()
+
+
+def pillars(size: int) -> np.ndarray:
+    """Return cells with a pillar in every third of every third row."""
+    cells = np.full((size, size), 255)
+    cells[1::3, 1::3] = 0
+    return cells
+
+
+def noise(size: int, share: float) -> np.ndarray:
+    """Return cells of which a share is blocked, by chance."""
+    return np.where(np.random.default_rng(0).random((size, size)) < share, 0, 255)
+
+
+def white_png(size: int) -> bytes:
+    """Return a picture with nothing on it."""
+    import io
+
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.new("L", (size, size), 255).save(file, "PNG", compress_level=1)
+    return file.getvalue()
+
+
+def squares(size: int) -> list[list[tuple[float, float]]]:
+    """Return squares that touch at their corners, as on a chess board."""
+    return [
+        [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
+        for x in range(size)
+        for y in range(size)
+        if (x + y) % 2
+    ]
+
+
+def wavy(count: int) -> np.ndarray:
+    """Return a round room with a wall of as many vertices."""
+    angle = np.arange(count) * math.tau / count
+    radius = 300 + 0.5 * np.sin(angle * count / 40)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def rooms(size: int) -> bytes:
+    """Return cells with walls every 16 and a door in each."""
+    cells = np.full((size, size), 255)
+    cells[::16] = cells[:, ::16] = 0
+    cells[::16, 7::16] = cells[::16, 8::16] = cells[7::16, ::16] = cells[8::16, ::16] = 255
+    cells[0] = cells[:, 0] = 0
+    return pgm(cells)
+
+
+def rectangles(count: int) -> bytes:
+    """Return a drawing of as many desks."""
+    side = math.isqrt(count) + 1
+    desks = (f'<rect x="{2 * (k % side)}" y="{2 * (k // side)}" width="1" height="1"/>' for k in range(count))
+    return svg(f'<rect id="boundary" x="-1" y="-1" width="{2 * side + 2}" height="{2 * side + 2}"/>', *desks)
+
+
+CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "four stars of 201 points": ("stars.svg", lambda: svg(*(path(star(201, 45 * k)) for k in range(4)))),
+    "four of 201 on each other": ("starred.svg", lambda: svg(*(path(star(201, k)) for k in range(4)))),
+    "a star of 241 points": ("star.svg", lambda: svg(path(star(241)))),
+    "a star of 241 points, WKT": ("star.wkt", lambda: wkt(star(241))),
+    "a comb of 40,000 teeth": ("comb.wkt", lambda: wkt(comb(40_000))),
+    "a comb of 12,000 teeth": ("short.wkt", lambda: wkt(comb(12_000))),
+    "111,000 pillars": ("pillars.pgm", lambda: pgm(pillars(1000))),
+    "7,900 pillars": ("some.pgm", lambda: pgm(pillars(267))),
+    "140 x 140 squares that touch at corners": ("squares.geojson", lambda: geojson(squares(140))),
+    "440 x 440 squares that touch at corners": ("board.geojson", lambda: geojson(squares(440))),
+    "a white picture of 8000 x 8000": ("white.png", lambda: white_png(8000)),
+    "noise on 1000 x 1000 cells, 5 %": ("sparse.pgm", lambda: pgm(noise(1000, 0.05))),
+    "noise on 700 x 700 cells, 40 %": ("dense.pgm", lambda: pgm(noise(700, 0.4))),
+    "rooms on 4000 x 4000 cells": ("rooms.pgm", lambda: rooms(4000)),
+    "rooms on 1200 x 1200 cells": ("flats.pgm", lambda: rooms(1200)),
+    "a wall of 490,000 vertices": ("wavy.wkt", lambda: wkt(wavy(490_000))),
+    "7,900 desks": ("desks.svg", lambda: rectangles(7_900)),
+    "90,000 desks": ("many.svg", lambda: rectangles(90_000)),
+}
+"""Name of a case, and its file."""
+
+
+def measured(names: list[str], seconds: float = 300.0) -> Iterator[tuple[str, Cost]]:
+    """Yield what each case costs; one that takes longer than so many seconds of a processor is ended."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name in names:
+            file, content = CASES[name]
+            place = Path(folder) / file
+            place.write_bytes(content())
+            done = subprocess.run(
+                [sys.executable, __file__, "--read", str(place), "--seconds", str(seconds)],
+                capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            place.unlink()
+            if done.returncode:
+                yield (
+                    name,
+                    Cost(math.inf, math.inf, (done.stderr or f"status {done.returncode}")[-300:], True),
+                )
+            else:
+                yield name, Cost(**json.loads(done.stdout))
+
+
+def read(place: Path, seconds: float) -> Cost:
+    """Import a file in this process, and return what it cost."""
+    import resource
+
+    from robocov.errors import RobocovError
+    from robocov_app.importers import ReadOptions, Shaping, detect, import_map, shaped
+
+    # what imports need is the fault of no file
+    for suffix, text in (("wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0))"), ("pgm", "P2 3 1 1 1 1 1")):
+        warm = place.with_name(f"warm.{suffix}")
+        warm.write_text(text)
+        import_map(warm, options=ReadOptions(cell=1.0) if suffix == "pgm" else ReadOptions())
+    kind = detect(place)
+    options = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in kind.options})
+    if kind.name == "picture":
+        options = ReadOptions(cell=0.1)
+    before = peak()
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
+    began = time.process_time()
+    good = False
+    try:
+        foreign = kind.read(place, options)
+        good = True
+        said = f"{shaped(foreign, Shaping(), place.name)[1].vertices_kept} vertices"
+    except RobocovError as error:
+        said = f"refused: {str(error).partition(': ')[2]}"
+    spent = time.process_time() - began
+    return Cost(spent, peak() - before, said, good)
+
+
+def peak() -> float:
+    """Return the most memory that this process has had, in MB; as Linux tells it."""
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) / 1024
+
+
+def main() -> int:
+    """Print the table, and return 1 where something is beyond its budget."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="by default all")
+    parser.add_argument("--seconds", type=float, default=300.0, help="of a processor for each (300)")
+    parser.add_argument("--read", type=Path, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.read is not None:
+        print(json.dumps(vars(read(given.read, given.seconds))))
+        return 0
+    print(f"{'CPU s':>7} {'MB':>6}")
+    worst = 0.0
+    for name, cost in measured(given.names or list(CASES), given.seconds):
+        print(f"{cost.seconds:7.2f} {cost.megabytes:6.0f}  {name}: {cost.said}", flush=True)
+        worst = max(worst, cost.share)
+    return int(worst > 1.0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from robocov.controllers import controller_kind
+from robocov.controllers.user_modules import Module, Source, own_modules, provided
+
+LAW = """
+from dataclasses import dataclass
+import json, numpy, robocov, builtins, nothing_of_that_name
+import tree_a.branch
+from tree_a import leaf, NAME
+from tree_a.inner import *
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        import late_one
+        return own.position * 0
+"""
+
+FILES = {
+    "tree_a/__init__.py": "NAME = 1\n",
+    "tree_a/branch.py": "from . import twig\nfrom .inner.core import deep\n",
+    "tree_a/leaf.py": "from .. import outside\n",
+    "tree_a/twig.py": "",
+    "tree_a/unused.py": "",
+    "tree_a/inner/__init__.py": "from tree_a.inner.core import deep\n",
+    "tree_a/inner/core.py": "import plain_b.part\ndeep = 1\n",
+    "plain_b/part.py": "# no __init__.py\n",
+    "late_one.py": "import unreadable_one\n",
+    "unreadable_one.py": "this is no Python\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    known = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - known:
+        del sys.modules[name]
+
+
+def test_all_modules_of_the_author_are_found_and_nothing_is_executed(folder: Path) -> None:
+    found = own_modules(LAW)
+    assert list(found) == [
+        *("late_one", "plain_b", "plain_b.part"),
+        *("tree_a", "tree_a.branch", "tree_a.inner", "tree_a.inner.core", "tree_a.leaf", "tree_a.twig"),
+        "unreadable_one",
+    ]
+    assert found["tree_a.leaf"] == Module(str(folder / "tree_a" / "leaf.py"), FILES["tree_a/leaf.py"])
+    assert found["plain_b"] == Module("", "")
+    assert "tree_a" not in sys.modules
+    assert pickle.loads(pickle.dumps(Source("mine.py", LAW, found))).modules == found
+
+
+def test_installed_packages_are_not_the_authors(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "site-packages").mkdir()
+    (folder / "site-packages" / "installed_c.py").touch()
+    monkeypatch.syspath_prepend(str(folder / "site-packages"))
+    assert own_modules("import installed_c") == {}
+
+
+def test_modules_are_imported_from_their_texts_and_leave_no_trace(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "tree_a" / "leaf.py").write_text("# -*- coding: latin-1 -*-\nword = 'ü'\n", "latin-1")
+    text = "import late_two\nfrom tree_a import leaf\nimport plain_b.part, tree_a.branch\n" + LAW.replace(
+        "import json, numpy, robocov, builtins, nothing_of_that_name", "word, TWO = leaf.word, late_two.TWO"
+    )
+    (folder / "late_two.py").write_text("TWO = 2\n")
+    source = Source("/nowhere/mine.py", text, own_modules(text))
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path != str(folder)])
+    import types
+
+    monkeypatch.setitem(sys.modules, "late_two", others := types.ModuleType("late_two"))
+    with provided(source.modules):
+        module = sys.modules[controller_kind("mine.py:Mine", source=source).__module__]
+        assert (module.word, module.TWO) == ("ü", 2)
+        import tree_a.leaf
+
+        assert module.leaf is tree_a.leaf, "loaded once"
+    assert sys.modules["late_two"] is others
+    assert not {"tree_a", "tree_a.leaf", "plain_b"} & set(sys.modules)
