@@ -120,8 +120,8 @@ def foreign_map(
         area = _together([o.area for o in shapes.outlines if not boundary or o not in boundary.outlines])
         if area.is_empty and boundary is not None:
             area = boundary.area
-        if area.is_empty:
-            raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
+    if area.is_empty:
+        raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
     _require_size(area.geoms[0].bounds, shapes.where)
     used = boundary or _Enclosure(area, "")
     inner = [outline for outline in shapes.outlines if solid and outline not in used.outlines]
