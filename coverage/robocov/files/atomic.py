@@ -7,14 +7,9 @@ import secrets
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocov.errors import OutputError, shown
-
-if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -100,15 +95,10 @@ def on_disk(paths: Iterable[Path]) -> None:
     OSError
         When a file cannot be written.
     """
-    list(_threads().map(_on_disk, paths))
-
-
-@cache
-def _threads() -> ThreadPoolExecutor:
-    """Return threads that bring files to the disk: most of what it takes is waiting."""
     from concurrent.futures import ThreadPoolExecutor
 
-    return ThreadPoolExecutor(8, "fsync")
+    with ThreadPoolExecutor(8) as threads:  # most of what it takes is waiting
+        list(threads.map(_on_disk, paths))
 
 
 def _on_disk(path: Path) -> None:
