@@ -25,6 +25,7 @@ from robocov_app.demo.scenario import Law
 from robocov_app.saved import load_saved, roster_of
 
 FILES = (
+    ".robocov.json",
     "run.json",
     "record.npz",
     "cost.csv",
@@ -91,7 +92,7 @@ def test_several_panes_are_saved_as_compare_does(
     words = ("--controllers", "rapf", "rpf", "--robots", "3", "--out", str(tmp_path / "compared"))
     assert main(["compare", hall, *SHORT, *words]) == 0
     files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
-    assert len(files) == 6 + 2 * 3
+    assert len(files) == 7 + 2 * 3
     for file in files:
         assert (folder / file).read_bytes() == (tmp_path / "compared" / file).read_bytes(), file
 

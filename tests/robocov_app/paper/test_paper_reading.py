@@ -17,6 +17,7 @@ from robocov_app.paper.maps import with_kinds_of_starts
 from robocov_app.paper.outcomes import Scenario
 from robocov_app.paper.reading import mean_until, read_gain_outcomes, read_outcomes
 from robocov_app.paper.references import Reference
+from robocov_app.sweep.ledger import _check_sum
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -91,6 +92,7 @@ def test_a_run_that_failed_is_nan(study, folder, tmp_path):
     row = next(row for row in rows_of(folder) if row["controller"] == "lloyd")
     entry = broken / "runs" / row["run"] / "row.json"
     content = json.loads(entry.read_text()) | {"figures": {}, "error": "it fell over"}
+    content["check_sum"] = _check_sum({key: value for key, value in content.items() if key != "check_sum"})
     entry.write_text(json.dumps(content))
     sweep(study, broken, workers=1, quiet=True)
     outcomes = read_outcomes(broken, study, CONTENDERS, REFERENCES)
