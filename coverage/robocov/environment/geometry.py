@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import LineString, MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, frozen
 from robocov.density.masses import masses_of_polygons
@@ -22,6 +22,7 @@ from robocov.observation.region import Region
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from robocov.density import Density
@@ -164,7 +165,7 @@ class Environment:
         """
         inside = shapely.set_precision(self.boundary_polygon, GRID)
         if self.obstacles:
-            solid = shapely.union_all([shape.polygon for shape in self.obstacles], grid_size=GRID)
+            solid = _united(np.array([shape.polygon for shape in self.obstacles]))
             inside = shapely.difference(inside, solid, grid_size=GRID)
         return _polygons(inside)
 
@@ -285,6 +286,13 @@ class Environment:
 def _moved(points: Ring, by: Array) -> Ring:
     dx, dy = by.tolist()
     return tuple((x + dx, y + dy) for x, y in points)
+
+
+def _united(shapes: NDArray[np.object_]) -> BaseGeometry:
+    """Return shapes as one, on the grid; only those that meet are united, which takes most of the time."""
+    meets = np.bincount(STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID)[0]) > 1
+    alone = shapely.get_parts(shapely.set_precision(shapes[~meets], GRID))
+    return shapely.multipolygons([*alone, *_polygons(shapely.union_all(shapes[meets], grid_size=GRID)).geoms])
 
 
 def _polygons(geometry: BaseGeometry) -> MultiPolygon:
