@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import InputError
+from robocov.errors import InputError, counted
 from robocov_app.options import in_range
 
 if TYPE_CHECKING:
@@ -137,23 +137,26 @@ def command(options: Arguments) -> int:
             save_page(out, plan, images, runs, first, material, claims, more)
         except Stopped:
             return _stopped(options)
+    failed = (material.failed if material else 0) + (beyond.failed if beyond else 0)
     if options.json:
         answer = {
             "out": str(out),
             "plan": plan.name,
             "interrupted": False,
             "runs": (material.runs if material else len(runs)) + (beyond.runs if beyond else 0),
-            "failed": (material.failed if material else 0) + (beyond.failed if beyond else 0),
+            "failed": failed,
             "page": str(out / "index.html"),
             "claims": [claim.to_json() for claim in (*claims, *more)],
         }
         print(json.dumps(finite(answer)))
-        return 0
+        return int(failed > 0)
     if claims or more:
         print_claims((*claims, *more))
     written = ["index.html", *["beyond.html"] * wanted, *["claims.json"] * bool(claims or more)]
     print(f"saved in {out}/: {', '.join(written)}, figures/, studies/")
-    return 0
+    if failed:
+        print(f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why")
+    return int(failed > 0)
 
 
 def print_claims(claims: Sequence[Claim]) -> None:
