@@ -114,8 +114,8 @@ def _check(path: Path, where: str) -> None:
         entities = sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1))
         if entities > MOST_ENTITIES:
             raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
-        points = islice(_POINT.finditer(content), limits.MAX_DRAWN + 1)
-        limits.require_drawn(sum(1 for _ in points), where)
+        points = islice(_POINT.finditer(content), limits.MAX_VERTICES + 1)
+        limits.require_vertices(sum(1 for _ in points), where)
     lines = content.count(b"\n")
     if lines > MOST_LINES:
         raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")

@@ -77,7 +77,7 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
         free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
         cell = max(width, height)
         shapes.vertices += vertices_of(free)
-        limits.require_drawn(shapes.vertices, where)
+        limits.require_vertices(shapes.vertices, where)
     robots: list[tuple[float, float]] = []
     count = moving = 0
     for kind in ("robot", "obstacle"):

@@ -38,7 +38,7 @@ def read_json(path: Path) -> tuple[Any, bytes, str]:
     where = one_line(path)
     content = limits.content(path, limits.MAX_TEXT_BYTES)
     # each point is a list of two or three: to count takes a moment, to parse minutes
-    limits.require_drawn(max(content.count(b"["), content.count(b",") // 3), where)
+    limits.require_vertices(max(content.count(b"["), content.count(b",") // 3), where)
     return parse(content, where), content, where
 
 

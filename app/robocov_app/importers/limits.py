@@ -25,9 +25,6 @@ MAX_CELLS = 64_000_000
 MAX_VERTICES = 500_000
 """Most vertices of a foreign map."""
 
-MAX_DRAWN = 500_000
-"""Most vertices of a drawing: a file of a vector format, whose rings cost more than those of a raster."""
-
 MAX_SHAPES = 20_000
 """Most shapes of a drawing, of a file: each costs a quarter of a millisecond, whatever its size."""
 
@@ -83,7 +80,7 @@ def require_cells(width: int, height: int, where: str) -> None:
 
 
 def require_vertices(count: int, where: str) -> None:
-    """Check the number of vertices of a map.
+    """Check the number of vertices of a map, or the least that it can be.
 
     Raises
     ------
@@ -91,19 +88,7 @@ def require_vertices(count: int, where: str) -> None:
         When there are more than `MAX_VERTICES`.
     """
     if count > MAX_VERTICES:
-        raise MapError(f"{where}: {count} vertices, but at most {MAX_VERTICES} were wanted")
-
-
-def require_drawn(count: int, where: str) -> None:
-    """Check the number of vertices of a drawing, or the least that it can be.
-
-    Raises
-    ------
-    MapError
-        When there are more than `MAX_DRAWN`.
-    """
-    if count > MAX_DRAWN:
-        raise MapError(f"{where}: some {count} vertices, but at most {MAX_DRAWN} were wanted")
+        raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
 
 
 def require_shapes(count: int, where: str) -> None:

@@ -118,7 +118,7 @@ class _Extract:
     def __init__(self, where: str, content: bytes) -> None:
         self.where = where
         for start in (b"<node", b"<nd", b"<tag"):  # to count takes a moment, to parse seconds
-            limits.require_drawn(content.count(start) // (2 if start == b"<tag" else 1), where)
+            limits.require_vertices(content.count(start) // (2 if start == b"<tag" else 1), where)
         self.bounds: list[list[float]] = []
         self.gates = self.drawn = 0
         self.places: dict[int, int] = {}
@@ -171,7 +171,7 @@ class _Extract:
         """Return the points of each way of something, None where some are missing."""
         ways = [self.things["way"].get(k) for k in thing.members] if thing.kind == "relation" else [thing]
         self.drawn += sum(len(way.members) for way in ways if way)  # a way may be a part of many relations
-        limits.require_drawn(self.drawn, self.where)
+        limits.require_vertices(self.drawn, self.where)
         found = [[self.places.get(k, -1) for k in way.members] if way else [] for way in ways]
         if not found or any(len(places) < 2 or min(places) < 0 for places in found):
             return None

@@ -352,7 +352,7 @@ class Shapes:
     def _checked(self, rings: Sequence[Array], at: str) -> list[Array]:
         """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
         self.vertices += sum(map(len, rings))
-        limits.require_drawn(self.vertices, self.where)
+        limits.require_vertices(self.vertices, self.where)
         for ring in rings:
             good = np.abs(ring) <= FARTHEST  # nan is not good either
             if not good.all():

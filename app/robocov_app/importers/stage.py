@@ -323,7 +323,7 @@ class _World:
             token = _Token("string", entity.text("bitmap"), f"{entity.at}: bitmap")
             free, columns, rows = self._bitmap(self._named(token, "picture"))
             self.shapes.vertices += vertices_of(free)
-            limits.require_drawn(self.shapes.vertices, self.shapes.where)
+            limits.require_vertices(self.shapes.vertices, self.shapes.where)
             cell = float(max(size[0] / columns, size[1] / rows))
             self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
             if rings:

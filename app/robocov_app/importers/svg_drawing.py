@@ -11,7 +11,7 @@ import numpy as np
 from robocov.errors import MapError
 from robocov_app.importers.curves import TOLERANCE, arc
 from robocov_app.importers.fills import Rule
-from robocov_app.importers.limits import MAX_DRAWN, require_shapes
+from robocov_app.importers.limits import MAX_VERTICES, require_shapes
 from robocov_app.importers.shapes import Line, Shapes
 from robocov_app.importers.svg_numbers import (
     affine,
@@ -303,7 +303,7 @@ class SvgDrawing:
             data = element.attributes.get("d", "")
             if data.strip() == "none":
                 return []
-            parts, draws = subpaths(data, tolerance, MAX_DRAWN, self.draws)
+            parts, draws = subpaths(data, tolerance, MAX_VERTICES, self.draws)
             self.draws -= draws
             return parts
         if element.tag in ("polyline", "polygon"):

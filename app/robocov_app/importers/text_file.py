@@ -35,7 +35,7 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     """
     where = one_line(path)
     content = limits.content(path, limits.MAX_TEXT_BYTES)
-    limits.require_drawn(content.count(separator), where)
+    limits.require_vertices(content.count(separator), where)
     marked = (both for both in _MARKS if content.startswith(both[0]))
     mark, encoding = next(marked, (b"", "utf-8"))
     try:

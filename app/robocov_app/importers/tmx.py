@@ -167,7 +167,7 @@ class _Map:
         width, height = (self.pixel * self.tile).tolist()
         world = free_area(~solid, (width, height), (0.0, 0.0), self.where)
         shapes.vertices += vertices_of(world)
-        limits.require_drawn(shapes.vertices, self.where)
+        limits.require_vertices(shapes.vertices, self.where)
         foreign = foreign_map(
             shapes,
             format=IMPORTER.name,

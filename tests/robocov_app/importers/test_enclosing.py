@@ -16,7 +16,7 @@ from vector_files import square
 from robocov.errors import MapError, ParameterError
 from robocov_app.importers import ForeignMap, ReadOptions
 from robocov_app.importers.enclosing import foreign_map
-from robocov_app.importers.limits import MAX_DRAWN
+from robocov_app.importers.limits import MAX_VERTICES
 from robocov_app.importers.shapes import Figure, Line, Shapes
 
 HALL = square(0, 0, 20, 10)
@@ -218,8 +218,8 @@ def test_what_is_larger_than_any_map_is_refused() -> None:
 
 def test_too_many_vertices_are_refused() -> None:
     found = Shapes("plan", ReadOptions())
-    with pytest.raises(MapError, match=rf"plan: some {MAX_DRAWN + 1} vertices, but at most {MAX_DRAWN}"):
-        found.add_line(Line(np.zeros((MAX_DRAWN + 1, 2)), 0.1))
+    with pytest.raises(MapError, match=rf"plan: some {MAX_VERTICES + 1} vertices, but at most"):
+        found.add_line(Line(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
 
 
 def test_a_tangle_of_lines_is_refused() -> None:
