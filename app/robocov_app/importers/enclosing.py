@@ -247,6 +247,8 @@ def _walled(shapes: Shapes) -> _Enclosure | None:
     """Return the outer edge of the walls if they close."""
     solid = _together([*(o.area for o in shapes.outlines), *(line.solid for line in shapes.lines)])
     fills = [Polygon(part.exterior) for part in solid.geoms]
+    if not fills:  # what there is is thinner than the grid
+        return None
     k = int(np.argmax([fill.area for fill in fills]))
     if solid.geoms[k].area > (1.0 - _MOST) * fills[k].area or not _holds(fills[k], list(solid.geoms)):
         return None

@@ -66,7 +66,7 @@ class Shaping:
     ----------
     simplify : float or None, m
         Walls may move by so much, and corners by twice as much, where that saves vertices; 0 keeps
-        all. None: one cell of a raster but no more than a robot's diameter, `DEFAULT_TOLERANCE` of the rest.
+        all. None: one cell of a raster but no more than a robot's diameter, 2 cm elsewhere.
     specks : float or None, m²
         Smaller obstacles, and smaller separate parts of the free space, are dropped; 0 keeps all. None:
         what is noise in maps of that format, as single cells are in those that robots made.

@@ -216,6 +216,11 @@ def test_what_is_larger_than_any_map_is_refused() -> None:
         taken(far)
 
 
+def test_shapes_thinner_than_the_grid_are_no_walls() -> None:
+    slivers = shapes(*([[0, y], [3, y], [6, y + 1e-7]] for y in (0, 5)))
+    assert taken(slivers).free.area == pytest.approx(8 * 7)
+
+
 def test_too_many_vertices_are_refused() -> None:
     found = Shapes("plan", ReadOptions())
     with pytest.raises(MapError, match=rf"plan: some {MAX_VERTICES + 1} vertices, but at most"):
