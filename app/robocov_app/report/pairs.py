@@ -80,7 +80,9 @@ class Comparison:
         counts = Counter(each.verdict for each in self.maps)
         total = len(self.maps)
         if len(counts) == 1:
-            return f"{self.maps[0].verdict} on " + ("the map" if total == 1 else f"all {total} maps")
+            return f"{self.maps[0].verdict} on " + (
+                {1: "the map", 2: "both maps"}.get(total, f"all {total} maps")
+            )
         words: list[str] = []
         for verdict in ("better", "worse", "undecided"):
             if counts[verdict]:
@@ -92,8 +94,14 @@ class Comparison:
         names = f"{self.first.label} against {self.second.label}"
         ratio, total = self.ratio, len(self.maps)
         if total > 1:
-            few = " only" if total < FEW_MAPS else ""
-            return f"{names}: {self.tally()}; ratio {ratio_text(ratio)} over {total} maps{few}."
+            # an interval over a few maps would be narrow where those maps happen to agree
+            few = total < FEW_MAPS
+            told = (
+                f"{ratio.estimate:.3f} over {total} maps only"
+                if few
+                else f"{ratio_text(ratio)} over {total} maps"
+            )
+            return f"{names}: {self.tally()}; ratio {told}."
         if self.pairs == 1:
             return f"{names}: ratio {ratio_text(ratio)} in the only pair."
         return f"{names}: {self.maps[0].verdict}, ratio {ratio_text(ratio)} over {self.pairs} pairs."

@@ -70,7 +70,10 @@ obstacles: st.SearchStrategy[Obstacle] = st.one_of(
         ),
         places, st.tuples(st.floats(0.15, 2), st.floats(0.15, 2)), st.floats(0, 90),
     ),
-    st.builds(lambda a, b, width: WallObstacle((a, b), width), places, places, st.floats(0.1, 0.3)),
+    st.builds(
+        lambda ends, width: WallObstacle(tuple(ends), width),
+        st.lists(places, min_size=2, max_size=2, unique=True), st.floats(0.1, 0.3),
+    ),
 )  # fmt: skip
 
 
