@@ -42,6 +42,8 @@ _FILES: dict[Kind, tuple[str, ...]] = {
 }
 """What a result of each kind consists of, beside ``frames/`` and the folders of a comparison's runs."""
 
+_NAMES = {"metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
+
 _FRAME = re.compile(r"\d{6}\.png")
 
 _HALF = re.compile(r"\.(comparison|cost|metrics|record|replay|report|run|trajectories)\.\d+\.part\.\w+")
@@ -219,6 +221,8 @@ def _listing(path: Path) -> tuple[set[str], set[str]] | None:
         for name in (*content["files"], *content.get("removed", ())):
             if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in name.split("/")):
                 raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
+            if not _has_our_name(name):  # or whoever sends a folder might have any file replaced or removed
+                raise ValueError(f"{shown(name)}, but a file of a result was wanted")
         return set(content["files"]), set(content.get("removed", ()))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
@@ -322,6 +326,13 @@ def _of_earlier_version(folder: Path, kind: Kind) -> set[str]:
     return names
 
 
+def _has_our_name(name: str) -> bool:
+    """Return whether a file in a folder could be one of a result, by its name alone."""
+    *folders, own = name.split("/")
+    is_frame = folders[-1:] == ["frames"] and _FRAME.fullmatch(own) is not None
+    return own in _NAMES or own == _MANIFEST or is_frame or _HALF.fullmatch(own) is not None
+
+
 def _frames(folder: Path) -> list[str]:
     """Return the names of the pictures of a film in a folder's ``frames/``."""
     frames = folder / "frames"
@@ -342,10 +353,11 @@ def _parts(folder: Path) -> list[Path]:
 
 def _is_remainder(folder: Path) -> bool:
     """Return whether a folder holds what an earlier version leaves when it is killed: files of ours alone."""
-    known = {"frames", "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
     names = {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}
     half = {name for name in names if _HALF.fullmatch(name)}
-    return names - half <= known and (bool(half) or any(_is_ours(folder / name) for name in _BEGINNINGS))
+    return names - half <= {"frames", *_NAMES} and (
+        bool(half) or any(_is_ours(folder / name) for name in _BEGINNINGS)
+    )
 
 
 def _is_ours(path: Path, name: str = "") -> bool:

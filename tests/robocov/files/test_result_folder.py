@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -203,6 +204,18 @@ def test_no_list_leads_out_of_the_folder(tmp_path: Path, which: str, name: str) 
         assert "mine.txt" in str(error) or "link" in str(error) or "'..'" in str(error)
     assert mine.read_text() == "mine"
     assert names(tmp_path) == ["mine.txt", "out"]
+
+
+@pytest.mark.parametrize("which", [".robocov.json", ".robocov-commit.json"])
+def test_no_list_of_whoever_sent_a_folder_has_other_files_removed(tmp_path: Path, which: str) -> None:
+    saved(tmp_path, OLD)
+    (tmp_path / "thesis.docx").write_text("mine")
+    listed = {"format": "robocov-folder", "version": 1, "removed": ["thesis.docx"]}
+    (tmp_path / which).write_text(json.dumps(listed | {"files": ["thesis.docx", *OLD]}))
+    for act in (settle, lambda folder: saved(folder, NEW)):
+        with suppress(RobocovError):
+            act(tmp_path)
+        assert (tmp_path / "thesis.docx").read_text() == "mine"
 
 
 FOREIGN_NAMES = (
