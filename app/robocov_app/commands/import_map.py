@@ -80,9 +80,9 @@ class Arguments:
     invert: bool = False
     """In a picture light is an obstacle, not dark."""
     trees: Literal["obstacle", "free"] | None = None
-    """What trees (T) in a MovingAI grid are; obstacles by default."""
+    """Whether trees (T) in a MovingAI grid are obstacles (the default)."""
     water: Literal["obstacle", "free"] | None = None
-    """What water (W) in a MovingAI grid, or of OpenStreetMap, is; obstacles by default."""
+    """Whether water (W) in a MovingAI grid, or of OpenStreetMap, is an obstacle (the default)."""
     anywhere: bool = False
     """Pictures and includes that a file names may be outside of its folder."""
 

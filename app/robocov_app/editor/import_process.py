@@ -15,7 +15,7 @@ from robocov_app.live.latest import Service
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What is to be imported, and how."""
+    """Request: a file and the options to import it with."""
 
     path: Path
     format: str
@@ -25,7 +25,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What came of it."""
+    """Answer: the imported map, with its report and what walls changed sides."""
 
     environment: Environment
     report: ImportReport
@@ -33,7 +33,7 @@ class Imported:
 
 
 class Importing:
-    """Imports; a file is read again only where that gives something else."""
+    """Importer that keeps the file it read last: shaping it anew takes less."""
 
     def __init__(self) -> None:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None

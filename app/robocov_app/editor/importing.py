@@ -111,7 +111,7 @@ def _helps(settings: type) -> dict[str, str]:
 
 
 class Worker(Protocol):
-    """Who imports, as a `robocov_app.live.latest.LatestWorker` does."""
+    """Background worker, as `robocov_app.live.latest.LatestWorker`."""
 
     def put(self, question: object) -> None:
         """Import this; nothing that was wanted before."""
@@ -132,7 +132,7 @@ class Worker(Protocol):
 
 
 class ImportQuestion:
-    """How a foreign file is to be imported; each change shows what would come of it.
+    """Model of the import dialogue: the options of a file's format, and a live preview of the result.
 
     Parameters
     ----------

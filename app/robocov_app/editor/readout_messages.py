@@ -1,4 +1,4 @@
-"""What the process that measures a window's sketch is told."""
+"""Messages to the process that measures a window's sketch."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _MOST_VERTICES = 20_000
 """Of a map whose narrowest passage is looked for: that takes seconds then."""
 
 _SLIVER = 2.0
-"""What is narrower than this, in tolerances, is a wall that moved, and nothing that was lost."""
+"""Width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,7 +40,7 @@ most, and crossings that are enough for one."""
 
 @dataclass
 class Crossings:
-    """How often edges cross each other in a file, all of its shapes together, with `MAX_CROSSINGS` at most.
+    """Count of edge crossings in a file, over all of its shapes, with `MAX_CROSSINGS` at most.
 
     Attributes
     ----------

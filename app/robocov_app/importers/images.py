@@ -44,7 +44,7 @@ _PILLOW = {
     "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
     "PPM": re.compile(rb"P[14][\s#]"),
 }
-"""How formats that Pillow reads begin, by the names that it gives them."""
+"""First bytes (magic numbers) of formats that Pillow reads, by its names for them."""
 
 _ORIENTATION, _BITS, _PHOTOMETRIC = 274, 258, 262
 """Tags of EXIF and TIFF."""

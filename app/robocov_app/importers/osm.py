@@ -113,7 +113,7 @@ def read_osm(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 class _Extract:
-    """What expat tells of a file: nodes as numbers, the ways, the relations that are areas."""
+    """Handlers for expat that collect nodes, ways, and the relations that are areas."""
 
     def __init__(self, where: str, content: bytes) -> None:
         self.where = where

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Primitive: TypeAlias = CircleObstacle | WallObstacle
 
 MOST = 5_000
-"""Where a drawing has more, polygons say it as well, and to compare takes seconds."""
+"""Circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds."""
 
 
 def with_primitives(

@@ -45,7 +45,7 @@ CELL = 1.0
 """Width of a tile in metres where none is given: the format has only pixels."""
 
 _FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
-"""How a tile is turned, and which one it is, in a global tile ID."""
+"""Bits of a global tile ID: the three flips, and the tile."""
 
 _RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 _ROOT = re.compile(rb"<map[\s>]")

@@ -29,8 +29,8 @@ DEEPEST = 100
 
 _SVG = "http://www.w3.org/2000/svg"
 _EXPANDED = 1_000_000
-"""What entities and default attributes add to a file may be so long, in characters: those of drawing programs
-stand for names of namespaces."""
+"""Most characters that entities and default attributes may add to a file: those of drawing programs stand
+for names of namespaces."""
 
 _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 

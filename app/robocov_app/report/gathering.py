@@ -84,7 +84,7 @@ class Damaged(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What one folder holds: its runs, their maps, and how many there were to be (`wanted`).
+    """Results of one folder: its runs, their maps, and how many there were to be (`wanted`).
 
     `facts` are what all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
     ``versions``. `loaded` are runs that were read already, `damaged` those that cannot be read and are no

@@ -67,12 +67,12 @@ class Comparison:
 
     @property
     def label(self) -> str:
-        """What is divided by what."""
+        """Name of the ratio: first / second."""
         return f"{self.first.label} / {self.second.label}"
 
     @property
     def pairs(self) -> int:
-        """How many there are on all maps."""
+        """Number of pairs, on all maps."""
         return sum(len(each.a) for each in self.maps)
 
     def tally(self) -> str:

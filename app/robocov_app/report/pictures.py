@@ -38,7 +38,7 @@ MOST_ROBOTS = 400
 
 
 class Frame:
-    """Where the metres of a map are in a picture of at most `width` by `height` px."""
+    """Transform from metres to the pixels of a picture of at most `width` by `height`."""
 
     def __init__(self, environment: Environment, width: float, height: float) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from robocov_app.sweep.task import Task
 
 _ENDS = 2
-"""How often a worker may end through a task before the task counts as failed."""
+"""Workers that may end through a task before it counts as failed."""
 
 _IN_A_ROW = 20
-"""How many workers may end one after the other, without a run in between that comes to an end."""
+"""Workers that may end one after the other without a finished run in between."""
 
 
 class Lost(NamedTuple):
@@ -81,7 +81,7 @@ class Crew(ABC):
 
     @property
     def waiting(self) -> str:
-        """What all of them wait for, in words; empty where somebody is at work."""
+        """Reason why no worker is at work, in words; empty where one is."""
         return ""
 
     @property

@@ -74,7 +74,7 @@ class Damaged(Exception):  # noqa: N818 - it is handled
 
 @dataclass
 class Survey:
-    """Which runs of a study there are.
+    """Inventory of a study's runs: finished, failed, and still to do.
 
     Attributes
     ----------

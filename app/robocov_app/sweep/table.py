@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 CSV, PARQUET = "results.csv", "results.parquet"
 
 _PART = ".results.part.{}"
-"""What they are called while they are written."""
+"""Temporary name, while a table is written."""
 
 ROW_GROUP = 4096
 """Rows of a row group, and the most that are in memory."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from robocov_app.sweep.study import Study, TeamValue
 
 _FORMAT = "robocov-task 1"
-"""What digests are made of; that the same inputs give other results is told by `made_with`."""
+"""Version of the digest; that the same inputs give other results is told by `made_with`."""
 
 _SHORT = 24
 """Characters of each name in the name of a folder."""

@@ -59,7 +59,7 @@ class Count:
 
     @property
     def ahead(self) -> str:
-        """How long it will take, or what everything waits for."""
+        """Estimated time left, or the reason why everything waits."""
         return self.waiting or (f"{duration(self.left)} left" if self.left else "")
 
     def __str__(self) -> str:

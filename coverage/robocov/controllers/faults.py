@@ -8,7 +8,7 @@ from pathlib import Path
 from robocov.errors import ParameterError
 
 MODULE = "robocov_user_"
-"""What the names of modules begin with that were loaded from files of users."""
+"""Prefix of the names of modules loaded from files of users."""
 
 _OURS = str(Path(__file__).parents[1])
 

@@ -40,11 +40,11 @@ _BROKEN = (
     *(ValueError, EOFError, OSError, MemoryError, NotImplementedError, RuntimeError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
 )
-"""What zipfile, zlib and numpy raise on a file that is none of theirs."""
+"""Errors that zipfile, zlib and numpy raise on a damaged file."""
 
 
 class Header(NamedTuple):
-    """What an array is, before it is read."""
+    """Shape and type of an array, read before its data."""
 
     shape: tuple[int, ...]
     dtype: np.dtype[Any]

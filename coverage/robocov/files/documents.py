@@ -33,7 +33,7 @@ _WANTED = {
     "dict_type": "an object",
     "model_type": "an object",
 }
-"""What was wanted where pydantic finds something else, by the kind of its error."""
+"""Words for what was wanted, by the type of pydantic's error."""
 
 
 def wanted(words: str) -> WrapValidator:

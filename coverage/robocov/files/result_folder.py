@@ -40,7 +40,7 @@ _FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_PICTURES),
     "replay": ("replay.json", "run.mp4", "comparison.mp4"),
 }
-"""What a result of each kind consists of, beside ``frames/`` and the folders of a comparison's runs."""
+"""Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
 
 _NAMES = {"metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
 
