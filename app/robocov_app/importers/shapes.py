@@ -228,7 +228,8 @@ class Shapes:
             As `add_outline`.
         """
         (points,) = self._checked([line.points], at)
-        width = line.width
+        width = max(line.width, 0.0)
+        limits.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
         if width < SMALLEST:
             self.mended["line", f"thinner than {1000 * SMALLEST:g} mm, made as wide"] += 1
             width = SMALLEST

@@ -346,6 +346,10 @@ def many(document: Any, space: Any) -> None:
         (deep, "blocks nested deeper than 32"),
         (lambda d, m: m.add_line((0, 0), (1e300, 0)), "a point at [1e+300, 0] m, but coordinates"),
         (lambda d, m: m.add_line((0, 0), (math.nan, 0)), "a point at [nan, 0] m, but coordinates"),
+        (
+            lambda d, m: m.add_lwpolyline([(0, 0), (5, 2)], dxfattribs={"const_width": 1e308}),
+            "width: 1e+308, but",
+        ),
         (lambda d, m: m.add_arc((0, 0), 1e300, 0, 10), "a curve beyond 10000000 m"),
         (lambda d, m: m.add_circle((0, 0), 1e30), "a curve beyond 10000000 m"),
         (lambda d, m: m.add_ellipse((0, 0), (1e30, 0), 0.5), "a curve beyond 10000000 m"),
