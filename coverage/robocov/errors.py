@@ -14,7 +14,8 @@ the value found there and what was wanted.
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -83,6 +84,27 @@ def shown(value: object, limit: int = 60) -> str:
     """
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
+    """Return whether `value` is a number of some kind, also one of numpy's; a bool is none."""
+    return isinstance(value, kind) and not isinstance(value, bool)
+
+
+def checked(
+    name: str, value: Any, least: float, most: float, unit: str = "", *, whole: bool = False
+) -> float:
+    """Return a number in its range.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, or out of it.
+    """
+    if not is_number(value, Integral if whole else Real) or not least <= value <= most:
+        wanted = f"a {'whole ' if whole else ''}number from {least:g} to {most:g} {unit}".rstrip()
+        raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
+    return float(value)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -10,13 +10,14 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from numbers import Integral
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions.draws import Draws
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, checked, is_number, shown
 
 LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
 """The streams of chance of a run: none has to do with another."""
@@ -138,8 +139,7 @@ class Conditions:
             object.__setattr__(self, name, _quantity(name, getattr(self, name)))
         object.__setattr__(self, "failures", _entries("failures", Failure, self.failures))
         object.__setattr__(self, "joins", _entries("joins", Join, self.joins))
-        whole = isinstance(self.seed, (int, np.integer)) and not isinstance(self.seed, bool)
-        if not whole or self.seed < 0:
+        if not is_number(self.seed, Integral) or self.seed < 0:
             raise ParameterError(f"conditions.seed: {shown(self.seed)}, but a whole number from 0 was wanted")
         if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
             raise ParameterError(
@@ -316,12 +316,9 @@ def _quantity(name: str, value: object) -> float | None:
     low, high, unit, _ = LIMITS[name]
     if value is None and name == "message_rate":
         return None
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not number or not low <= value <= high:  # type: ignore[operator]
-        also = " or null" if name == "message_rate" else ""
-        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip() + also
-        raise ParameterError(f"conditions.{name}: {shown(value)}, but {wanted} was wanted")
-    return float(value)  # type: ignore[arg-type]
+    return checked(
+        f"conditions.{name}", value, low, high, unit + (" or null" if name == "message_rate" else "")
+    )
 
 
 Entry = TypeVar("Entry", Failure, Join)
@@ -337,11 +334,11 @@ def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry,
             entry = kind(robot, time, *place)
         except (TypeError, ValueError):
             raise ParameterError(f"{at}: {shown(each)}, but a robot and a time were wanted") from None
-        if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or robot < 1:
+        if not is_number(robot, Integral) or robot < 1:
             raise ParameterError(f"{at}: robot {shown(robot)}, but a whole number from 1 was wanted")
         if robot in found:
             raise ParameterError(f"{at}: robot {robot} is given twice")
-        if not _finite(time) or not 0.0 <= time <= _LONGEST:
+        if not is_number(time) or not 0.0 <= time <= _LONGEST:
             wanted = f"a number from 0 to {_LONGEST:g} s"
             raise ParameterError(f"{at}: time {shown(time)}, but {wanted} was wanted")
         entry = entry._replace(robot=int(robot), time=float(time))
@@ -356,11 +353,6 @@ def _place(at: str, given: Any) -> tuple[float, float]:
         x, y = given
     except (TypeError, ValueError):
         x = y = None
-    if not (_finite(x) and _finite(y)):
+    if not all(is_number(value) and math.isfinite(value) for value in (x, y)):
         raise ParameterError(f"{at}: place {shown(given)}, but [x, y] in metres was wanted")
     return float(x), float(y)
-
-
-def _finite(value: object) -> bool:
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    return number and math.isfinite(value)  # type: ignore[arg-type]

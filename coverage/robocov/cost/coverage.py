@@ -19,7 +19,7 @@ from robocov.cost.lattice import Lattice, Number, Sites
 from robocov.cost.robot_views import RobotViews
 from robocov.density.masses import means_over_squares
 from robocov.drawing import drawing_backend
-from robocov.errors import InputError, ParameterError, counted, shown
+from robocov.errors import InputError, checked, counted
 from robocov.geodesic import Geodesics
 
 if TYPE_CHECKING:
@@ -232,12 +232,7 @@ class CoverageCost:
         cache: ArrayCache | None = None,
         geodesics: Geodesics | None = None,
     ) -> None:
-        whole = isinstance(lattice, (int, np.integer)) and not isinstance(lattice, bool)
-        if not whole or not 1 <= lattice <= MAX_LATTICE:
-            raise ParameterError(
-                f"lattice: {shown(lattice)}, but a whole number from 1 to {MAX_LATTICE} was wanted"
-            )
-        self.lattice = int(lattice)
+        self.lattice = int(checked("lattice", lattice, 1, MAX_LATTICE, whole=True))
         self.environment = environment
         beat = None if progress is None else partial(progress, 0.0)
         self.geodesics = Geodesics(environment, beat) if geodesics is None else geodesics

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from shapely import Polygon
 
-    from robocov.density.kinds import Density
+    from robocov.density.base import Density
 
 _AT_ONCE = 1 << 16
 """Squares that are looked at at once, which bounds the memory."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -15,7 +16,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from robocov.arrays import Array
-from robocov.errors import StartError
+from robocov.errors import StartError, is_number
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
@@ -85,11 +86,7 @@ class Start:
             When the robots do not fit.
         """
         for name, value in (("robots", n), ("seed", seed)):
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, int | np.integer)
-                or value < (name == "robots")
-            ):
+            if not is_number(value, Integral) or value < (name == "robots"):
                 raise StartError(f"start {self.name!r}: {name}: {value!r}, but a whole number was wanted")
         if not 0.0 < radius < math.inf:
             raise StartError(f"start {self.name!r}: radius: {radius!r} m, but a number above 0 was wanted")

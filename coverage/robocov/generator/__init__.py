@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -11,13 +12,13 @@ import shapely
 from robocov.environment import Environment
 from robocov.environment.passages import narrowest_gap
 from robocov.environment.starts import DiscStart, StartSpec, UniformStart
-from robocov.errors import MapError, ParameterError, shown, unknown_name
+from robocov.errors import MapError, ParameterError, checked, is_number, shown, unknown_name
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave
 from robocov.generator.mazes import maze
 from robocov.generator.polygons import scattered
 from robocov.generator.request import AREA_TOLERANCE as AREA_TOLERANCE
-from robocov.generator.request import SIDES, Request, checked
+from robocov.generator.request import SIDES, Request
 from robocov.generator.rooms import building
 from robocov.mapfile.rules import check_rules
 
@@ -137,7 +138,7 @@ def generated_map(
     >>> environment.name, len(environment.obstacles), len(environment.free.geoms)
     ('polygons 7', 4, 1)
     """
-    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
+    if not is_number(seed, Integral) or seed < 0:
         raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")
     if not isinstance(kind, str) or kind not in GENERATORS:
         raise ParameterError(unknown_name("kind of map", str(kind), GENERATORS))

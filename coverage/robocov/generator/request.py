@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.environment.starts import GAP
-from robocov.errors import ParameterError, shown
+from robocov.errors import checked
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
@@ -31,20 +31,6 @@ SIDES = 1.0, 1000.0
 
 _WIDE = 0.5
 """From gaps of so many metres on a centimetre is fine enough, below a millimetre."""
-
-
-def checked(name: str, value: object, least: float, most: float) -> float:
-    """Return a number in its range.
-
-    Raises
-    ------
-    ParameterError
-        When it is none, or out of it.
-    """
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not (number and least <= value <= most):  # type: ignore[operator]
-        raise ParameterError(f"{name}: {shown(value)}, but a number from {least:g} to {most:g} was wanted")
-    return float(value)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -75,15 +61,7 @@ class Request:
     height: float
 
     def __post_init__(self) -> None:
-        count = self.obstacles
-        if (
-            not isinstance(count, (int, np.integer))
-            or isinstance(count, bool)
-            or not 1 <= count <= MOST_OBSTACLES
-        ):
-            raise ParameterError(
-                f"obstacles: {shown(count)}, but a whole number from 1 to {MOST_OBSTACLES} was wanted"
-            )
+        checked("obstacles", self.obstacles, 1, MOST_OBSTACLES, whole=True)
         checked("area", self.area, 0.01, 0.9)
         checked("width", self.width, *SIDES)
         checked("height", self.height, *SIDES)

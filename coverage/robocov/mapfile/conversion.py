@@ -8,24 +8,17 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath
-from robocov.environment.starts import DiscStart, PointsStart, StartSpec, UniformStart
+from robocov.environment import Environment, Ring
 from robocov.errors import MapError, unknown_name
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, one_line, parse, read_bytes, require_json
 from robocov.mapfile.density import density_document, density_from
-from robocov.mapfile.fields import TINY as _TINY
 from robocov.mapfile.models import (
     FORMAT,
     VERSION,
-    CircleModel,
-    DiscModel,
-    ObstacleModel,
-    PointsModel,
-    PolygonModel,
-    StartModel,
+    DensityModel,
     map_schema,
+    plain,
     validate,
     validate_density,
 )
@@ -33,7 +26,6 @@ from robocov.mapfile.rules import check_rules
 
 if TYPE_CHECKING:
     from robocov.density import Density
-    from robocov.mapfile.density_models import DensityModel
 
 __all__ = [
     "bundled_maps",
@@ -142,9 +134,9 @@ def to_json(environment: Environment) -> dict[str, Any]:
     document |= {"format": FORMAT, "version": VERSION, "name": environment.name}
     if environment.description:
         document["description"] = environment.description
-    document["boundary"] = _points(environment.boundary)
-    document["obstacles"] = [_obstacle_document(obstacle) for obstacle in environment.obstacles]
-    document["starts"] = {name: _start_document(spec) for name, spec in environment.starts.items()}
+    document["boundary"] = plain(environment.boundary)
+    document["obstacles"] = plain(environment.obstacles)
+    document["starts"] = {name: plain(spec) for name, spec in environment.starts.items()}
     if environment.density is not None:
         document["density"] = density_document(environment.density)
     if environment.extra:
@@ -173,7 +165,7 @@ def _short(value: Any) -> Any:
     if isinstance(value, float):
         decimal = round(value, _DIGITS)
         noise = _NOISE * math.ulp(max(abs(value), 1.0))
-        return _number(decimal if abs(decimal - value) <= noise else value)
+        return plain(decimal if abs(decimal - value) <= noise else value)
     if isinstance(value, list):
         return [_short(item) for item in value]
     if isinstance(value, dict):
@@ -241,25 +233,20 @@ def _is_name(source: str) -> bool:
 
 def _environment(document: object, where: str, folder: Path | None = None) -> Environment:
     model = validate(document, where)
-    boundary = _ring(model.boundary)
+    boundary: Any = model.boundary
+    density = None if model.density is None else _density(model.density, boundary, folder, where)
     environment = Environment(
         name=model.name,
         boundary=boundary,
-        obstacles=tuple(_obstacle(item) for item in model.obstacles),
-        starts={name: _start(item) for name, item in model.starts.items()},
+        obstacles=tuple(obstacle.built() for obstacle in model.obstacles),
+        starts={name: start.built() for name, start in model.starts.items()},
         description=model.description,
-        extra=_plain(model.extra),
+        extra=_copied(model.extra),
         schema=model.schema_,
-        density=None if model.density is None else _density(model.density, boundary, folder, where),
+        density=density,
     )
     check_rules(environment, where)
     return environment
-
-
-def _ring(vertices: list[list[float]]) -> Ring:
-    if any(value and -_TINY < value < _TINY for point in vertices for value in point):
-        vertices = [[value if abs(value) >= _TINY else 0.0 for value in point] for point in vertices]
-    return tuple((x, y) for x, y in vertices)
 
 
 def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
@@ -288,74 +275,13 @@ def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: st
     return density_from(model, (min(x), min(y), max(x), max(y)), folder, where)
 
 
-def _obstacle(model: ObstacleModel) -> Obstacle:
-    path = None
-    if model.path is not None:
-        path = ObstaclePath(_ring(model.path.points), model.path.speed, model.path.repeat)
-    if isinstance(model, PolygonModel):
-        holes = tuple(_ring(hole) for hole in model.holes)
-        return PolygonObstacle(_ring(model.vertices), holes, model.name, path)
-    if isinstance(model, CircleModel):
-        return CircleObstacle(_ring([model.center])[0], model.radius, model.name, path)
-    return WallObstacle(_ring(model.points), model.width, model.name, path)
-
-
-def _start(model: StartModel) -> StartSpec:
-    if isinstance(model, DiscModel):
-        return DiscStart(_ring([model.center])[0], model.radius)
-    if isinstance(model, PointsModel):
-        return PointsStart(_ring(model.positions))
-    return UniformStart()
-
-
-def _plain(value: Any) -> Any:
+def _copied(value: Any) -> Any:
     """Return a copy of a JSON value made of plain dict and list."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _copied(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [_copied(item) for item in value]
     return value
-
-
-def _number(value: float) -> int | float:
-    # beyond that, floats are whole without being meant so, and JSON gets long
-    return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
-
-
-def _points(points: Ring) -> list[list[int | float]]:
-    return [[_number(x), _number(y)] for x, y in points]
-
-
-def _obstacle_document(obstacle: Obstacle) -> dict[str, Any]:
-    document: dict[str, Any]
-    if isinstance(obstacle, PolygonObstacle):
-        document = {"kind": "polygon", "vertices": _points(obstacle.vertices)}
-        if obstacle.holes:
-            document["holes"] = [_points(hole) for hole in obstacle.holes]
-    elif isinstance(obstacle, CircleObstacle):
-        (center,) = _points((obstacle.center,))
-        document = {"kind": "circle", "center": center, "radius": _number(obstacle.radius)}
-    else:
-        document = {"kind": "wall", "points": _points(obstacle.points), "width": _number(obstacle.width)}
-    if obstacle.name is not None:
-        document = {"kind": document.pop("kind"), "name": obstacle.name, **document}
-    path = obstacle.path
-    if path is not None:
-        document["path"] = {
-            "points": _points(path.points),
-            "speed": _number(path.speed),
-            "repeat": path.repeat,
-        }
-    return document
-
-
-def _start_document(spec: StartSpec) -> dict[str, Any]:
-    if isinstance(spec, DiscStart):
-        (center,) = _points((spec.center,))
-        return {"kind": "disc", "center": center, "radius": _number(spec.radius)}
-    if isinstance(spec, PointsStart):
-        return {"kind": "points", "positions": _points(spec.positions)}
-    return {"kind": "uniform"}
 
 
 def _compact(value: object) -> str:

@@ -9,30 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.density import (
-    FINEST,
-    Density,
-    Gaussian,
-    Gaussians,
-    Raster,
-    Uniform,
-    WeightedArea,
-    WeightedPolygons,
-)
+from robocov.density import FINEST, Density, Raster
 from robocov.errors import MapError
 from robocov.files.mistakes import MOST_LISTED, Mistake, refusal
 from robocov.files.strictjson import one_line, shown_json
-from robocov.mapfile.density_models import (
+from robocov.mapfile.models import (
+    LARGEST,
     LEAST_VARIANCE,
     LIGHTEST,
+    SMALLEST,
     DensityModel,
     GaussianDensityModel,
     PeakModel,
     PolygonDensityModel,
     RasterDensityModel,
     UniformDensityModel,
+    plain,
 )
-from robocov.mapfile.fields import LARGEST, SMALLEST, TINY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,16 +62,9 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
     found = list(_mistakes(model))
     if found:
         raise refusal(where, found[:MOST_LISTED], len(found[MOST_LISTED:]))
-    if isinstance(model, UniformDensityModel):
-        return Uniform(model.weight)
-    if isinstance(model, GaussianDensityModel):
-        return Gaussians(tuple(_peak(peak) for peak in model.peaks), model.floor)
-    if isinstance(model, PolygonDensityModel):
-        areas = (
-            WeightedArea(_ring(area.vertices), area.weight, tuple(map(_ring, area.holes)), area.name)
-            for area in model.areas
-        )
-        return WeightedPolygons(tuple(areas), model.background)
+    if not isinstance(model, RasterDensityModel):
+        density: Density = model.built()
+        return density
     extent = bounds if model.extent is None else tuple(model.extent)
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
@@ -93,20 +79,14 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
 
 def density_document(density: Density) -> dict[str, Any]:
     """Return a density as a JSON document that `density_from` makes an equal one of; it names no picture."""
-    if isinstance(density, Uniform):
-        return {"kind": "uniform", "weight": _number(density.weight)}
-    if isinstance(density, Gaussians):
-        peaks = [_peak_document(peak) for peak in density.peaks]
-        return {"kind": "gaussians", "floor": _number(density.floor), "peaks": peaks}
-    if isinstance(density, WeightedPolygons):
-        areas = [_area_document(area) for area in density.areas]
-        return {"kind": "polygons", "background": _number(density.background), "areas": areas}
-    assert isinstance(density, Raster), f"no document for {type(density).__name__}"
+    if not isinstance(density, Raster):
+        document: dict[str, Any] = plain(density)
+        return document
     return {
         "kind": "raster",
-        "extent": [_number(value) for value in density.extent],
+        "extent": plain(density.extent),
         "interpolation": density.interpolation,
-        "rows": [[_number(value) for value in row] for row in density.values[::-1].tolist()],
+        "rows": plain(density.values[::-1].tolist()),
     }
 
 
@@ -227,44 +207,3 @@ def _decoded(content: bytes, refused: Any) -> Array:
     except Exception as error:  # whatever a damaged picture makes of a decoder
         reason = one_line(str(error)) or type(error).__name__
         raise refused(f"cannot be read as PNG or PGM: {reason}") from None
-
-
-def _ring(vertices: list[list[float]]) -> tuple[tuple[float, float], ...]:
-    return tuple((_place(x), _place(y)) for x, y in vertices)
-
-
-def _place(coordinate: float) -> float:
-    return coordinate if abs(coordinate) >= TINY else 0.0
-
-
-def _peak(model: PeakModel) -> Gaussian:
-    covariance = None
-    if model.covariance is not None:
-        (a, b), (c, d) = model.covariance
-        covariance = (a, b), (c, d)
-    return Gaussian((_place(model.center[0]), _place(model.center[1])), model.weight, model.sigma, covariance)
-
-
-def _number(value: float) -> int | float:
-    return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
-
-
-def _points(points: tuple[tuple[float, float], ...]) -> list[list[int | float]]:
-    return [[_number(x), _number(y)] for x, y in points]
-
-
-def _peak_document(peak: Gaussian) -> dict[str, Any]:
-    document: dict[str, Any] = {"center": _points((peak.center,))[0]}
-    if peak.sigma is not None:
-        document["sigma"] = _number(peak.sigma)
-    else:
-        document["covariance"] = _points(peak.matrix)
-    return document | {"weight": _number(peak.weight)}
-
-
-def _area_document(area: WeightedArea) -> dict[str, Any]:
-    document: dict[str, Any] = {} if area.name is None else {"name": area.name}
-    document["vertices"] = _points(area.vertices)
-    if area.holes:
-        document["holes"] = [_points(hole) for hole in area.holes]
-    return document | {"weight": _number(area.weight)}

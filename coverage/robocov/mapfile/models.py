@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
-from pydantic import Field, ValidationError
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from robocov.density import (
+    FINEST,
+    HEAVIEST,
+    Gaussian,
+    Gaussians,
+    Interpolation,
+    Uniform,
+    WeightedArea,
+    WeightedPolygons,
+)
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import ObstaclePath, Repeat
+from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import unknown_name
 from robocov.files.documents import check_header
 from robocov.files.mistakes import MOST_LISTED, Mistake, place, refusal
 from robocov.files.strictjson import shown_json
-from robocov.mapfile import density_models
-from robocov.mapfile.density_models import DensityModel
-from robocov.mapfile.fields import COORDINATE as _COORDINATE
-from robocov.mapfile.fields import FARTHEST as FARTHEST
-from robocov.mapfile.fields import LABEL as _LABEL
-from robocov.mapfile.fields import LARGEST as LARGEST
-from robocov.mapfile.fields import (
-    LONGEST_LABEL,
-    Label,
-    Model,
-    Size,
-    Vertex,
-    VertexRing,
-    kind_field,
-)
-from robocov.mapfile.fields import POINT as _POINT
-from robocov.mapfile.fields import RING as _RING
-from robocov.mapfile.fields import SIZE as _SIZE
-from robocov.mapfile.fields import SMALLEST as SMALLEST
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -42,11 +37,76 @@ SLOWEST = 1e-3
 """Smallest speed of an obstacle in m/s."""
 FASTEST = 10.0
 """Largest speed of an obstacle in m/s."""
+SMALLEST = 1e-3
+"""Smallest size of anything in metres."""
+LARGEST = 1e4
+"""Largest size of anything in metres."""
+FARTHEST = 1e7
+"""Largest coordinate in metres: national grids fit, and a micrometre still counts."""
+
+TINY = 1e-100
+"""Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
+
+LONGEST_LABEL = 100
+"""Most characters of a label."""
+
+_NAME = r"^[^\x00-\x1f\x7f]+$"
+
+Coordinate: TypeAlias = Annotated[
+    float,
+    Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST, description="metres"),
+    AfterValidator(lambda value: 0.0 if -TINY < value < TINY else value),
+]
+Size: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+Vertex: TypeAlias = Annotated[
+    list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]]), AfterValidator(tuple)
+]
+VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3), AfterValidator(tuple)]
+Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LONGEST_LABEL, pattern=_NAME)]
+
+LIGHTEST = 1e-9
+"""Weights that are smaller are read as 0: they would be when the map is written."""
+
+Entry: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=HEAVIEST)]
+Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
+Variance: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e8, le=1e8)]
+
+LEAST_VARIANCE = SMALLEST**2
+"""Smallest variance of a peak each way, in square metres."""
+
+_LONGEST_PATH = 500
+_MOST = 10_000
+
+
+class Model(BaseModel):
+    """An object of a map JSON: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=False)
+
+    stands_for: ClassVar[Any]
+    """The class of what it describes; fields of the same name hold the same."""
+
+    def built(self) -> Any:
+        """Return what it describes."""
+        fields = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
+        return self.stands_for(**{key: _built(value) for key, value in fields.items()})
+
+
+def _built(value: Any) -> Any:
+    if isinstance(value, Model):
+        return value.built()
+    return tuple(map(_built, value)) if isinstance(value, list) else value
+
+
+def _kind(name: str) -> Any:
+    """Return the field that says which kind of obstacle, start or density an object is."""
+    return Field(description="Which kind it is; the other keys follow from it", examples=[name])
 
 
 class PathModel(Model, title="path"):
     """The path of an obstacle that moves: it is shifted as its point goes along the line, and never turns."""
 
+    stands_for = ObstaclePath
     points: list[Vertex] = Field(
         min_length=2,
         description="The line; at time zero its point is at the first, and the obstacle where it is drawn",
@@ -55,7 +115,7 @@ class PathModel(Model, title="path"):
     speed: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SLOWEST, le=FASTEST)] = Field(
         description="Metres a second", examples=[0.5]
     )
-    repeat: Literal["loop", "back-and-forth"] = Field(
+    repeat: Repeat = Field(
         "loop",
         description="From the last point straight to the first, or back the way it came",
         examples=["back-and-forth"],
@@ -74,7 +134,8 @@ PathField: TypeAlias = Annotated[
 class PolygonModel(Model, title="polygon"):
     """A solid polygon, with holes where given."""
 
-    kind: Literal["polygon"] = kind_field("polygon")
+    stands_for = PolygonObstacle
+    kind: Literal["polygon"] = _kind("polygon")
     name: Label | None = Field(None, description="What it is, for people", examples=["desk"])
     vertices: VertexRing = Field(
         description="Corners in order, either way round, the first not repeated",
@@ -91,7 +152,8 @@ class PolygonModel(Model, title="polygon"):
 class CircleModel(Model, title="circle"):
     """A round pillar."""
 
-    kind: Literal["circle"] = kind_field("circle")
+    stands_for = CircleObstacle
+    kind: Literal["circle"] = _kind("circle")
     name: Label | None = Field(None, description="What it is, for people", examples=["pillar"])
     center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
     radius: Size = Field(description="Its radius in metres", examples=[0.5])
@@ -101,7 +163,8 @@ class CircleModel(Model, title="circle"):
 class WallModel(Model, title="wall"):
     """A poly-line of some width, with flat ends."""
 
-    kind: Literal["wall"] = kind_field("wall")
+    stands_for = WallObstacle
+    kind: Literal["wall"] = _kind("wall")
     name: Label | None = Field(None, description="What it is, for people", examples=["west wall"])
     points: list[Vertex] = Field(
         min_length=2, description="The middle line, from end to end", examples=[[[5, 0], [5, 2.4]]]
@@ -113,7 +176,8 @@ class WallModel(Model, title="wall"):
 class DiscModel(Model, title="disc start"):
     """The robots start somewhere in a disc."""
 
-    kind: Literal["disc"] = kind_field("disc")
+    stands_for = DiscStart
+    kind: Literal["disc"] = _kind("disc")
     center: Vertex = Field(description="The disc's centre [x, y] in metres", examples=[[1, 1]])
     radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
 
@@ -121,13 +185,15 @@ class DiscModel(Model, title="disc start"):
 class UniformModel(Model, title="uniform start"):
     """The robots start anywhere in the free space."""
 
-    kind: Literal["uniform"] = kind_field("uniform")
+    stands_for = UniformStart
+    kind: Literal["uniform"] = _kind("uniform")
 
 
 class PointsModel(Model, title="points start"):
     """The robots start at given positions."""
 
-    kind: Literal["points"] = kind_field("points")
+    stands_for = PointsStart
+    kind: Literal["points"] = _kind("points")
     positions: list[Vertex] = Field(
         min_length=1, description="One [x, y] a robot, in metres", examples=[[[1, 1], [1.5, 1]]]
     )
@@ -138,6 +204,115 @@ ObstacleModel: TypeAlias = Annotated[
 ]
 StartModel: TypeAlias = Annotated[
     DiscModel | UniformModel | PointsModel, Field(discriminator="kind", description="Where a team may start")
+]
+
+
+class UniformDensityModel(Model, title="uniform density"):
+    """Every place counts the same."""
+
+    stands_for = Uniform
+    kind: Literal["uniform"] = _kind("uniform")
+    weight: Weight = Field(1.0, description="What every place counts, above 0", examples=[1])
+
+
+class PeakModel(Model, title="peak"):
+    """A Gaussian hot spot."""
+
+    stands_for = Gaussian
+    center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
+    sigma: Size | None = Field(
+        None, description="Its standard deviation in metres, where it is round", examples=[1.5]
+    )
+    covariance: (
+        Annotated[
+            list[Annotated[list[Variance], Field(min_length=2, max_length=2)]],
+            Field(min_length=2, max_length=2),
+        ]
+        | None
+    ) = Field(
+        None,
+        description="Its covariance in square metres where it is not: symmetric, positive definite",
+        examples=[[[2, 0.5], [0.5, 1]]],
+    )
+    weight: Weight = Field(description="What it adds at its centre", examples=[4])
+
+
+class GaussianDensityModel(Model, title="Gaussian density"):
+    """Gaussian hot spots over a floor."""
+
+    stands_for = Gaussians
+    kind: Literal["gaussians"] = _kind("gaussians")
+    floor: Weight = Field(0.0, description="What every place counts without them", examples=[0.2])
+    peaks: list[PeakModel] = Field(
+        max_length=_MOST,
+        description="The hot spots, which add up",
+        examples=[[{"center": [7.5, 3], "sigma": 1.5, "weight": 4}]],
+    )
+
+
+class AreaModel(Model, title="weighted area"):
+    """A polygon in which every place counts the same."""
+
+    stands_for = WeightedArea
+    name: Label | None = Field(None, description="What it is, for people", examples=["treasury"])
+    vertices: VertexRing = Field(
+        description="Corners in order, either way round, the first not repeated",
+        examples=[[[1, 1], [2, 1], [2, 3]]],
+    )
+    holes: list[VertexRing] = Field(
+        [],
+        description="Rings inside that are not part of it",
+        examples=[[[[1.5, 1.2], [1.8, 1.2], [1.8, 1.8]]]],
+    )
+    weight: Weight = Field(description="What a place in it counts", examples=[5])
+
+
+class PolygonDensityModel(Model, title="polygon density"):
+    """Polygons of constant density; where they overlap, the last one counts."""
+
+    stands_for = WeightedPolygons
+    kind: Literal["polygons"] = _kind("polygons")
+    background: Weight = Field(1.0, description="What a place outside them all counts", examples=[1])
+    areas: list[AreaModel] = Field(
+        max_length=_MOST,
+        description="The polygons, the later ones on top",
+        examples=[[{"name": "treasury", "vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}]],
+    )
+
+
+class RasterDensityModel(Model, title="raster density"):
+    """A picture of the density, in rows of numbers or in a file."""
+
+    kind: Literal["raster"] = _kind("raster")
+    extent: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = Field(
+        None,
+        description="What it covers, [x_min, y_min, x_max, y_max] in metres; the boundary's box by default",
+        examples=[[0, 0, 10, 6]],
+    )
+    interpolation: Interpolation = Field(
+        "bilinear",
+        description="bilinear between the cells' middles, or constant in each of the cells",
+        examples=["bilinear"],
+    )
+    rows: list[Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=FINEST,
+        description="Rows of numbers, the top one first",
+        examples=[[[1, 1, 2], [1, 4, 2]]],
+    )
+    picture: Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_PATH)] | None = Field(
+        None,
+        description="In place of rows, a grey PNG or PGM, relative to the map and in its folder",
+        examples=["density.png"],
+    )
+    black: Weight | None = Field(None, description="What black counts; 0 by default", examples=[0.1])
+    white: Weight | None = Field(None, description="What white counts; 1 by default", examples=[5])
+
+
+DensityModel: TypeAlias = Annotated[
+    UniformDensityModel | GaussianDensityModel | PolygonDensityModel | RasterDensityModel,
+    Field(discriminator="kind", description="How much each place counts"),
 ]
 
 
@@ -177,6 +352,29 @@ class MapModel(Model, title="robocov map"):
     extra: dict[str, Any] = Field(
         {}, description="Free keys of yours; kept untouched", examples=[{"author": "Ada"}]
     )
+
+
+_MODELS: dict[type, type[Model]] = {
+    model.stands_for: model for model in Model.__subclasses__() if hasattr(model, "stands_for")
+}
+
+
+def plain(value: Any) -> Any:
+    """Return the JSON of what a model describes, or of coordinates; whole numbers are int."""
+    if isinstance(value, (float, int, np.integer, np.floating)):
+        number = float(value)
+        # beyond that, floats are whole without being meant so, and JSON gets long
+        return int(number) if number.is_integer() and abs(number) < 1e15 else number
+    if isinstance(value, str):
+        return value
+    if hasattr(value, "__iter__"):
+        return [plain(item) for item in value]
+    document = {}
+    for key, field in _MODELS[type(value)].model_fields.items():
+        found = get_args(field.annotation)[0] if key == "kind" else getattr(value, key)
+        if found not in (None, (), []) or field.is_required():
+            document[key] = plain(found)
+    return document
 
 
 def map_schema() -> dict[str, Any]:
@@ -237,10 +435,27 @@ def _refusal(error: ValidationError, where: str) -> MapError:
     return refusal(where, listed, len(details) - len(listed))
 
 
+def _kinds(union: Any) -> dict[str, type[Model]]:
+    models = get_args(get_args(union)[0])
+    return {get_args(model.model_fields["kind"].annotation)[0]: model for model in models}
+
+
 _CHOICES: dict[str, dict[str, type[Model]]] = {
-    "obstacles": {"polygon": PolygonModel, "circle": CircleModel, "wall": WallModel},
-    "starts": {"disc": DiscModel, "uniform": UniformModel, "points": PointsModel},
+    "obstacles": _kinds(ObstacleModel),
+    "starts": _kinds(StartModel),
+    "density": _kinds(DensityModel),
 }
+
+_PARTS: dict[str, type[Model]] = {"path": PathModel, "peaks": PeakModel, "areas": AreaModel}
+"""What is at these keys, or in their lists."""
+
+_POINT = "a point [x, y] in metres"
+_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
+_SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
+_RING = "a list of at least 3 points [x, y]"
+_LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
+_WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
+
 
 _WANTED: dict[str, tuple[str, ...]] = {
     # what is wanted at a key, in its items, in their items, ...
@@ -261,39 +476,45 @@ _WANTED: dict[str, tuple[str, ...]] = {
     "speed": (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",),
     "repeat": ('"loop" or "back-and-forth"',),
     "starts": ("an object of named starts",),
+    "weight": (_WEIGHT,),
+    "floor": (_WEIGHT,),
+    "background": (_WEIGHT,),
+    "black": (_WEIGHT,),
+    "white": (_WEIGHT,),
+    "peaks": (f"a list of at most {_MOST} peaks", "an object"),
+    "areas": (f"a list of at most {_MOST} areas", "an object"),
+    "sigma": (_SIZE,),
+    "covariance": ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
+    "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
+    "interpolation": ("bilinear or cells",),
+    "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
+    "picture": ("the name of a file",),
 }
 
 
 def _mistake(detail: ErrorDetails) -> Mistake:
     """Return one structural error in the project's words: place, value, what was wanted."""
     loc, value = list(detail["loc"]), detail["input"]
-    group = _CHOICES.get(str(loc[0]))
+    if loc[0] == "starts" and loc[2:] == ["[key]"]:
+        text = f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
+        return Mistake(tuple(loc[:-1]), text, at_key=True)
+    kinds = _CHOICES.get(str(loc[0]), {})
     model: type[Model] = MapModel
-    if loc[0] == "density":
-        if len(loc) == 1:
-            return _kind_mistake(tuple(loc), value, list(density_models.KINDS))
-        model = density_models.KINDS[str(loc.pop(1))]
-        if len(loc) > 3:
-            model = density_models.PARTS.get(str(loc[1]), model)
-    elif group is not None and len(loc) > 2:
-        if loc[-1] == "[key]":
-            text = f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
-            return Mistake(tuple(loc[:-1]), text, at_key=True)
+    inside = 0 if not kinds else 1 if loc[0] == "density" else 2
+    if inside and len(loc) == inside:
+        return _kind_mistake(tuple(loc), value, list(kinds))
+    if inside and len(loc) > inside:
         # pydantic names the chosen kind as a step of the path
-        model = group[str(loc.pop(2))]
-        if len(loc) > 3 and loc[2] == "path":
-            model = PathModel
-    elif group is not None and len(loc) == 2:
-        return _kind_mistake(tuple(loc), value, list(group))
+        model = kinds[str(loc.pop(inside))]
     if detail["type"] == "extra_forbidden":
         *parent, key = loc
+        model = _PARTS.get(str(parent[inside]), model) if len(parent) > inside else model
         known = [field.alias or name for name, field in model.model_fields.items()]
         at = f"{place(parent)}: " if parent else ""
         return Mistake(tuple(loc), f"{at}{unknown_name('key', str(key), known)}", at_key=True)
     found = "missing" if detail["type"] == "missing" else shown_json(value)
     steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
-    words = density_models.WANTED if loc[0] == "density" else _WANTED
-    wanted = words[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
+    wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
     return Mistake.at(tuple(loc), f"{found}, but {wanted} was wanted")
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.errors import ParameterError, shown
+from robocov.errors import checked
 
 MOST_RAYS = 3600
 """A ray for each tenth of a degree."""
@@ -34,16 +34,8 @@ class Scanning:
     period: float = 0.5
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.rays, (int, np.integer)) and not isinstance(self.rays, bool)
-        if not whole or not 1 <= self.rays <= MOST_RAYS:
-            raise ParameterError(
-                f"scanning.rays: {shown(self.rays)}, but a whole number from 1 to {MOST_RAYS} was wanted"
-            )
-        number = isinstance(self.period, (int, float, np.floating)) and not isinstance(self.period, bool)
-        if not number or not 0.0 <= self.period <= 1e6:
-            raise ParameterError(
-                f"scanning.period: {shown(self.period)}, but a number from 0 to 1e+06 s was wanted"
-            )
+        checked("scanning.rays", self.rays, 1, MOST_RAYS, whole=True)
+        checked("scanning.period", self.period, 0.0, 1e6, "s")
 
     def every(self, dt: float) -> int:
         """Return after how many control periods of `dt` seconds each scan follows the one before.

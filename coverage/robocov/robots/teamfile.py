@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import InputError, ParameterError, shown, unknown_name
+from robocov.errors import InputError, ParameterError, is_number, shown, unknown_name
 from robocov.files.strictjson import one_line, parse, place, read_bytes
 from robocov.robots.team import Team
 
@@ -119,7 +119,7 @@ def _group(group: object, path: tuple[str | int, ...], values: dict[str, float |
         if key not in ("count", *PARAMETERS):
             raise InputError(f"{place(path)}: {unknown_name('key', str(key), ['count', *PARAMETERS])}")
     count = group.get("count")
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_ROBOTS:
+    if not is_number(count, int) or not 1 <= count <= MOST_ROBOTS:
         found = "missing" if count is None else shown(count)
         wanted = f"a whole number from 1 to {MOST_ROBOTS}"
         raise InputError(f"{place((*path, 'count'))}: {found}, but {wanted} was wanted")
@@ -133,7 +133,7 @@ def _group(group: object, path: tuple[str | int, ...], values: dict[str, float |
 def _value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
     if name in _RANGES and value in (None, NO_LIMIT):
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not is_number(value):
         raise InputError(f"{place(path)}: {shown(value)}, but a number was wanted")
     try:
         Team.homogeneous(1, **{name: float(value)})

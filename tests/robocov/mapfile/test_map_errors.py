@@ -52,6 +52,7 @@ STRUCTURAL = [
     (changed("obstacles", 0, "holes", 0, 2, []), "obstacles[0].holes[0][2]: [], but a point"),
     (changed("obstacles", 0, "holes", 0, []), "obstacles[0].holes[0]: [], but a list of at least 3"),
     (changed("obstacles", 0, "verts", []), "obstacles[0]: unknown key 'verts': did you mean 'vertices'?"),
+    (changed("obstacles", 0, "[key]", []), "obstacles[0]: unknown key '[key]'"),
     (changed("obstacles", 1, "radius", -1), "obstacles[1].radius: -1, but a number from 0.001 to 10000 (m)"),
     (changed("obstacles", 1, "radius", 0.0009), "obstacles[1].radius: 0.0009, but"),
     (changed("obstacles", 1, "radius", 10001), "obstacles[1].radius: 10001, but"),
