@@ -370,7 +370,8 @@ def plain(value: Any) -> Any:
     if hasattr(value, "__iter__"):
         return [plain(item) for item in value]
     document = {}
-    for key, field in _MODELS[type(value)].model_fields.items():
+    model = next(_MODELS[base] for base in type(value).__mro__ if base in _MODELS)
+    for key, field in model.model_fields.items():
         found = get_args(field.annotation)[0] if key == "kind" else getattr(value, key)
         if found not in (None, (), []) or field.is_required():
             document[key] = plain(found)
