@@ -94,10 +94,15 @@ class World:
             wreck = pymunk.Circle(self._space.static_body, radius, (x, y))
             wreck.friction = wreck.elasticity = 0.0
             self._space.add(wreck)
+        self._positions = np.array(positions, dtype=float)
         self._bodies: list[pymunk.Body] = []
         self._discs: list[pymunk.Circle] = []
-        for mass, radius in zip(team.mass.tolist(), team.radius.tolist(), strict=True):
+        for (x, y), mass, radius in zip(
+            self._positions.tolist(), team.mass.tolist(), team.radius.tolist(), strict=True
+        ):
             body = pymunk.Body(mass, math.inf)
+            # before it enters the space, which keeps a pair for any two discs that enter in one place
+            body.position = x, y
             disc = pymunk.Circle(body, radius)
             disc.friction = disc.elasticity = 0.0
             self._space.add(body, disc)
@@ -116,7 +121,6 @@ class World:
         self._state_buffer = batch.Buffer()
         self._state_buffer.set_float_buf(self._state)
         self._read_buffer = batch.Buffer()
-        self._positions = np.array(positions, dtype=float)
         self._velocities = np.zeros_like(self._positions)
         if velocities is not None:
             self._velocities[:] = velocities
