@@ -5,10 +5,10 @@ for all robots at once, into the net force that pymunk integrates; contacts are 
 
 A step depends on positions and velocities alone. pymunk keeps more than that between steps (cached
 contact impulses, a pending push out of an overlap, the shape of its search tree), all of which
-matters only in contact. So a step is first made as if nothing touched; if pymunk reports a contact
-it is made again from the same state with the contact memory emptied, in substeps fine enough that
-no robot sinks into anything by more than `MAX_PENETRATION`. That is what makes a copy of a running
-world go on identically, bit for bit.
+matters only in contact. So a step is first made as if nothing touched; those whom pymunk reports in
+contact, and whoever they are moved against, are moved again from the same state by `ContactSolver`, in
+substeps fine enough that no robot sinks into anything by more than `MAX_PENETRATION`. That is what makes
+a copy of a running world go on identically, bit for bit, and what keeps a contact a matter of those in it.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pymunk
 from pymunk import batch
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError
+from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
-from robocov.world.moving_bodies import MovingBodies
+from robocov.world.contacts import ContactSolver, obstacle_space, robot_body
+from robocov.world.moving_bodies import motion
 
 if TYPE_CHECKING:
     from robocov.world.solid import Mover
@@ -31,14 +32,11 @@ if TYPE_CHECKING:
 LONGEST_SUBSTEP = 0.02
 """Longest substep in seconds."""
 
-MAX_PENETRATION = 1e-3
-"""Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
-
 MAX_MASS_RATIO = 1000.0
 """Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
 
-_MOST_SUBSTEPS = 64
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
+_BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 
 
 class World:
@@ -73,41 +71,32 @@ class World:
         wrecks: Array | None = None,
     ) -> None:
         self.team = team
-        self._pieces, self._wrecks = pieces, wrecks
-        self._space = pymunk.Space()
+        self._pieces, self._movers, self._wrecks = pieces, movers, wrecks
         light, heavy = float(team.mass.min()), float(team.mass.max())
         if heavy > MAX_MASS_RATIO * light:
             most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
             raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
-        # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
-        self._space.iterations = 20 + math.ceil(2.0 * heavy / light)
-        self._space.collision_slop = 1e-4
-        # the part of an overlap that is left after a second: none after a substep; only what a moving
-        # obstacle has run over is deep, and comes out of it gradually
-        self._space.collision_bias = 1e-9 if movers else 0.0
-        self._touched = False
-        for ring in pieces:
-            wall = pymunk.Poly(self._space.static_body, ring.tolist())
-            wall.friction = wall.elasticity = 0.0
-            self._space.add(wall)
-        for x, y, radius in [] if wrecks is None else wrecks.tolist():
-            wreck = pymunk.Circle(self._space.static_body, radius, (x, y))
-            wreck.friction = wreck.elasticity = 0.0
-            self._space.add(wreck)
-        self._bodies: list[pymunk.Body] = []
-        self._discs: list[pymunk.Circle] = []
-        for mass, radius in zip(team.mass.tolist(), team.radius.tolist(), strict=True):
-            body = pymunk.Body(mass, math.inf)
-            disc = pymunk.Circle(body, radius)
-            disc.friction = disc.elasticity = 0.0
+        # this space only tells who touches: nothing is pushed out of an overlap, nothing is remembered
+        self._space = obstacle_space(pieces, movers, wrecks)
+        self._space.iterations = self._space.collision_persistence = 1
+        self._space.collision_bias = 1.0
+        self._contacts: ContactSolver | None = None
+        self._positions = np.array(positions, dtype=float)
+        self._row: dict[int, int] = {}
+        for (x, y), mass, radius in zip(
+            self._positions.tolist(), team.mass.tolist(), team.radius.tolist(), strict=True
+        ):
+            body, disc = robot_body(mass, radius)
+            # before it enters the space, which keeps a pair for any two discs that enter in one place
+            body.position = x, y
             self._space.add(body, disc)
-            self._bodies.append(body)
-            self._discs.append(disc)
-        self._space.on_collision(pre_solve=self._note_contact)
-        self._moving = MovingBodies(self._space, movers, self._discs) if movers else None
+            self._row[body.id] = len(self._row)
+        self._moving = motion(movers, 0.0, 1.0)
+        self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
 
-        # pymunk.batch goes through the robots in the order in which they were added, then come the
-        # obstacles that move and the static body: hence some rows more
+        # pymunk.batch goes through the obstacles that move, the robots, both in the order in which they
+        # were added, and the static body: hence some rows more
+        self._rows = slice(len(movers), len(movers) + len(team))
         rows = len(team) + len(movers) + 1
         self._force = np.zeros((rows, 2))
         self._force_buffer = batch.Buffer()
@@ -115,8 +104,7 @@ class World:
         self._state = np.zeros((rows, 4))
         self._state_buffer = batch.Buffer()
         self._state_buffer.set_float_buf(self._state)
-        self._read_buffer = batch.Buffer()
-        self._positions = np.array(positions, dtype=float)
+        self._read_buffer, self._arbiters = batch.Buffer(), batch.Buffer()
         self._velocities = np.zeros_like(self._positions)
         if velocities is not None:
             self._velocities[:] = velocities
@@ -124,10 +112,9 @@ class World:
         self._write_state()
 
         self._thrown = bool((np.hypot(*self._velocities.T) > team.max_speed).any())
-        self._mass = team.mass[:, None]
-        self._response: dict[float, tuple[Array, Array]] = {}
+        self._response: dict[float, tuple[Array, Array, Array, Array]] = {}
         self._fastest = float(team.max_speed.max())
-        self._smallest = float(team.radius.min())
+        self._smallest, self._largest = float(team.radius.min()), float(team.radius.max())
 
     @property
     def positions(self) -> Array:
@@ -146,7 +133,7 @@ class World:
             self.team,
             self._positions,
             self._velocities,
-            movers=() if self._moving is None else self._moving.movers,
+            movers=self._movers,
             wrecks=self._wrecks,
         )
 
@@ -168,31 +155,31 @@ class World:
             speed = np.hypot(*self._velocities.T)
             gain = 0.0 if pushes is None else np.hypot(*pushes.T) / self.team.mass * dt
             fastest = max(fastest, float((speed + gain).max()))
-        if self._moving is not None:
-            fastest += self._moving.fastest
+        fastest += self._fastest_mover
         # a robot must not cross a thin wall within one substep
         parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(fastest * dt / self._smallest))
         for part in range(parts):
-            if self._moving is not None:
-                self._moving.place(time + part * (dt / parts), dt / parts)
+            if self._movers:
+                self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
+                self._write_state()
             self._substep(forces, dt / parts, pushes)
 
     def _substep(self, forces: Array, dt: float, pushes: Array | None) -> None:
         limit = self._speed_limit(dt)
-        robots = self._force[: len(self.team)]
-        robots[:] = self._net_force(forces, dt, limit)
+        net = self._net_force(forces, dt, limit)
         if pushes is not None:
-            robots += pushes
+            net = net + pushes
             limit = np.maximum(
                 limit, np.hypot(*self._velocities.T) + np.hypot(*pushes.T) / self.team.mass * dt
             )
-        self._touched = False
+        before = self._positions, self._velocities
+        self._force[self._rows] = net
         batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
         self._space.step(dt)
-        if self._touched:
-            self._substep_in_contact(dt, limit)
-        else:
-            self._read_state()
+        self._read_state()
+        touching = self._touching()
+        if touching:
+            self._resolve_contacts(np.array(touching), np.hstack(before), net, dt, limit)
         if pushes is not None or self._thrown:
             self._thrown = bool((np.hypot(*self._velocities.T) > self.team.max_speed).any())
 
@@ -215,64 +202,47 @@ class World:
             rate = self.team.viscosity / self.team.mass
             decay = -np.expm1(-rate * dt)
             drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / self.team.mass
-            self._response = {dt: (decay[:, None], drive[:, None])}
-        decay, drive = self._response[dt]
+            inertia, most = self.team.mass / dt, self.team.max_acceleration * dt
+            self._response = {dt: (decay[:, None], drive[:, None], inertia[:, None], most)}
+        decay, drive, inertia, most = self._response[dt]
         velocities = self._velocities
-        change = _limited(drive * forces - decay * velocities, self.team.max_acceleration * dt)
+        change = _limited(drive * forces - decay * velocities, most)
         reached = _limited(velocities + change, limit)
-        return np.asarray((reached - velocities) * (self._mass / dt))
+        return np.asarray((reached - velocities) * inertia)
 
-    def _substep_in_contact(self, dt: float, limit: Array) -> None:
-        self._write_state()
-        self._forget_contacts()
-        travel = min(MAX_PENETRATION, 0.1 * self._smallest)
-        fastest = max(self._fastest, float(limit.max()))
-        if self._moving is not None:
-            self._moving.back()
-            fastest += self._moving.fastest
-        parts = min(_MOST_SUBSTEPS, max(2, math.ceil(fastest * dt / travel)))
-        for _ in range(parts):
-            batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
-            if self._moving is None:
-                self._space.step(dt / parts)
-            else:
-                self._moving.before_walls(lambda: self._space.step(dt / parts))
-        if self._moving is None:
-            self._settle_overlap(dt / parts)
-        else:
-            self._moving.before_walls(lambda: self._settle_overlap(dt / parts))
-        self._read_state()
+    def _touching(self) -> list[int]:
+        """Return the robots that touched something after the last free substep."""
+        self._arbiters.clear()
+        batch.get_space_arbiters(self._space, _BODIES, self._arbiters)
+        found = np.frombuffer(self._arbiters.int_buf(), dtype=np.uintp).tolist()
+        return sorted({self._row[body] for body in found if body in self._row})
+
+    def _resolve_contacts(self, rows: IntArray, before: Array, net: Array, dt: float, limit: Array) -> None:
+        """Move robots again that touch something, and with them whoever they are moved against."""
+        if self._contacts is None:
+            self._contacts = ContactSolver(self._pieces, self.team, self._movers, self._wrecks)
+        radius, free = self.team.radius, np.hstack([self._positions, self._velocities])
+        while True:
+            state = free.copy()
+            state[rows] = self._contacts.moved(rows, before[rows], net[rows], self._moving, dt)
+            resolved = np.zeros(len(state), dtype=bool)
+            resolved[rows] = True
+            first, second, distance = close_pairs(state[:, :2], 2.0 * self._largest)
+            reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
+            if not reached.any():
+                break
+            resolved[second[reached]] = True
+            rows = np.flatnonzero(resolved)
         # impulses of a contact may exceed what a robot can do by itself
-        speed_limited = _limited(self._velocities, limit)
-        if speed_limited is not self._velocities:
-            self._velocities = speed_limited
-            self._protect()
+        state[rows, 2:] = _limited(state[rows, 2:], limit[rows])
+        self._positions, self._velocities = state[:, :2].copy(), state[:, 2:].copy()
+        self._protect()
         self._write_state()
-
-    def _forget_contacts(self) -> None:
-        """Empty what pymunk remembers of contacts, and lay the robots' search tree anew."""
-        self._space.remove(*self._discs)
-        self._space.add(*self._discs)
-
-    def _settle_overlap(self, dt: float) -> None:
-        """Carry out the push out of an overlap that pymunk has decided but not yet applied."""
-        for body in self._bodies:
-            velocity = body.velocity
-            body.velocity = (0.0, 0.0)
-            pymunk.Body.update_position(body, dt)
-            body.velocity = velocity
-
-    def _note_contact(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
-        self._touched = True
-        if self._moving is not None:
-            self._moving.touched(arbiter)
 
     def _write_state(self) -> None:
-        count = len(self.team)
-        self._state[:count, :2] = self._positions
-        self._state[:count, 2:] = self._velocities
-        if self._moving is not None:
-            self._state[count:-1] = self._moving.state
+        self._state[: len(self._moving)] = self._moving
+        self._state[self._rows, :2] = self._positions
+        self._state[self._rows, 2:] = self._velocities
         batch.set_space_bodies(self._space, _STATE, self._state_buffer)
 
     def _protect(self) -> None:
@@ -284,9 +254,8 @@ class World:
         self._read_buffer.clear()
         batch.get_space_bodies(self._space, _STATE, self._read_buffer)
         state = np.frombuffer(self._read_buffer.float_buf(), dtype=np.float64).reshape(-1, 4)
-        count = len(self.team)
-        self._positions = state[:count, :2].copy()
-        self._velocities = state[:count, 2:].copy()
+        self._positions = state[self._rows, :2].copy()
+        self._velocities = state[self._rows, 2:].copy()
         self._protect()
 
 
