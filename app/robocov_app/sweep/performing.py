@@ -55,7 +55,7 @@ TIMED = "mean_time_s"
 
 
 _RESULTS = 3
-"""Counted up whenever the same inputs give other results: 3 since only robots in contact are solved by substeps."""
+"""Counted up whenever the same inputs give other results: 3 since only robots in contact are substepped."""
 
 
 @cache
