@@ -36,7 +36,9 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
 
     plain = shapely.transform(geometry, decimal)
     if not plain.is_valid:
-        plain = shapely.transform(shapely.set_precision(geometry, 10.0**-digits), decimal)
+        # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
+        valid = shapely.make_valid(geometry, method="structure", keep_collapsed=False)
+        plain = shapely.transform(shapely.set_precision(valid, 10.0**-digits), decimal)
     return MultiPolygon(polygons(plain))
 
 

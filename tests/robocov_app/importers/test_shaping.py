@@ -242,6 +242,11 @@ def test_rounding_keeps_polygons_valid() -> None:
     assert "-0" not in rounded(box(-1e-9, 0, 1, 1), 4).wkt
 
 
+def test_a_hole_that_leaves_its_outline_is_rounded_too() -> None:
+    crossed = Polygon(box(0, 0, 9, 9).exterior, [[(-1, 4), (5, 4.00001), (5, 5), (-1, 5)]])
+    assert shapely.equals(rounded(crossed, 4), box(0, 0, 9, 9) - box(0, 4, 5, 5))
+
+
 points = st.tuples(st.integers(0, 40), st.integers(0, 40))
 
 
