@@ -19,8 +19,8 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.k_median import improved, moved
 from robocov.planning.discovered import FREE, UNKNOWN
-from robocov.planning.medians import improved, moved
 from robocov.planning.openness import BLOCKS, openness
 
 if TYPE_CHECKING:
