@@ -118,7 +118,7 @@ class Simulation:
         walls, moving = solid_pieces(environment), movers(environment)
         self._sensor = RangeSensor(walls, moving)
         self._world: World | ChangingWorld
-        if conditions is not None and conditions.comes_and_goes:
+        if conditions is not None and conditions.team_changes:
             self._world = ChangingWorld(
                 conditions, environment, walls, moving, self.team, positions, velocities, time=time
             )

@@ -211,7 +211,7 @@ class Touches(Timeline):
     def _come_and_go(self) -> None:
         """Let robots fail and join whose time has come; the last one that works goes on."""
         conditions = self.scenario.conditions
-        if conditions is None or not conditions.comes_and_goes:
+        if conditions is None or not conditions.team_changes:
             return
         begins, ends = conditions.lives(self.scenario.robots)
         now, before = self.end + SOON, self.end - self.scenario.dt + SOON

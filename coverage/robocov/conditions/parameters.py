@@ -157,7 +157,7 @@ class Conditions:
     @property
     def ideal(self) -> bool:
         """Whether this is as good as no conditions."""
-        return not (self.talks or self.sensing_noise or self.comes_and_goes)
+        return not (self.talks or self.sensing_noise or self.team_changes)
 
     @property
     def talks(self) -> bool:
@@ -170,7 +170,7 @@ class Conditions:
         return bool(self.position_noise or self.sensing_noise)
 
     @property
-    def comes_and_goes(self) -> bool:
+    def team_changes(self) -> bool:
         """Whether robots may fail or join."""
         return bool(self.failure_rate or self.failures or self.joins)
 

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.controllers.atlas_memory import AtlasMemory, Mind, Watch
+from robocov.controllers.atlas_memory import AtlasMemory, PlannerState, RestTracker
 from robocov.controllers.base import Information
 from robocov.controllers.driving import drive
 from robocov.controllers.gains import gain, validate_gains
@@ -18,7 +18,7 @@ from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings
 from robocov.planning import steering
 from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.placement import Stock, Table, own_place, team_places
+from robocov.planning.placement import CoverageDemand, Table, own_place, team_places
 from robocov.planning.wayfinding import Ways, Window
 from robocov.robots import Team
 
@@ -30,12 +30,12 @@ MOST_CELLS = 250_000
 TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350
 """Nodes of the lattices on which a robot plans: for its whole team, for itself, and for itself in a crowd."""
 
-CREW = 8
+MAX_PLANNING_GROUP = 8
 """A robot plans for itself and up to so many less one that it hears. Where it hears more it only considers
 the nearest of them, as they are, and looks for its own place."""
 
 STILL_FOR = 3.0
-"""Who has not got away (see `atlas_memory.Watch`) for so many seconds rests."""
+"""Who has not got away (see `atlas_memory.RestTracker`) for so many seconds rests."""
 
 _HARDLY = 0.1
 """Part of the spacing of the nodes that others may move before a plan is made anew."""
@@ -96,8 +96,8 @@ class Atlas:
 
     What a relocation or a goal must save doubles every `settling` seconds until the team changes. Private
     maps agree ever more where it matters, and so do the plans; by 1 and by what doubles the team comes to
-    rest also where they do not. Where `CREW` robots or more are heard, 1 is left out: each only considers
-    its nearest ones, as they are, and looks for its own place.
+    rest also where they do not. Where `MAX_PLANNING_GROUP` robots or more are heard, 1 is left out: each
+    only considers its nearest ones, as they are, and looks for its own place.
     """
 
     name: ClassVar[str] = "atlas"
@@ -129,12 +129,14 @@ class Atlas:
         low_x, low_y, high_x, high_y = region.bounds
         cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
         empty = DiscoveredMap.nothing(Raster(region, cell))
-        nobody = Watch(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
+        nobody = RestTracker(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
         n = len(team)
         return AtlasMemory(
             team,
             # the robots do not all plan at the same moment
-            tuple(Mind(empty, self.period * _STAGGERED * (i * _GOLDEN % 1.0), nobody) for i in range(n)),
+            tuple(
+                PlannerState(empty, self.period * _STAGGERED * (i * _GOLDEN % 1.0), nobody) for i in range(n)
+            ),
             (np.full((1, 2), np.nan),) * n,
             np.zeros(n, dtype=np.intp),
             np.full((n, self.scanning.rays, 2), np.nan),
@@ -142,70 +144,79 @@ class Atlas:
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces that lead each robot on its way."""
-        minds, walls = list(memory.minds), memory.walls
+        states, walls = list(memory.states), memory.walls
         if seen.scans is not None:
             walls = seen.positions[:, None] + seen.scans.distances[..., None] * headings(seen.scans.rays)
             walls[~seen.scans.hit] = np.nan
             maps = [
-                mind.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
-                for i, mind in enumerate(minds)
+                state.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
+                for i, state in enumerate(states)
             ]
             maps = self._told(maps, seen)
-            minds = [
-                mind if known is mind.known else replace(mind, known=known)
-                for mind, known in zip(minds, maps, strict=True)
+            states = [
+                state if known is state.known else replace(state, known=known)
+                for state, known in zip(states, maps, strict=True)
             ]
         routes, legs = list(memory.routes), memory.legs.copy()
-        for i, mind in enumerate(minds):
-            if seen.time >= mind.due - 1e-9:
-                minds[i], goal = self._planned(seen, memory.team, mind, i)
-                ways = minds[i].ways
+        for i, state in enumerate(states):
+            if seen.time >= state.due - 1e-9:
+                states[i], goal = self._planned(seen, memory.team, state, i)
+                ways = states[i].ways
                 if goal is not None and ways is not None:
                     routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
-            elif mind.planned is None:
+            elif state.planned is None:
                 routes[i] = seen.positions[i : i + 1]
-        return self._driven(seen, AtlasMemory(memory.team, tuple(minds), tuple(routes), legs, walls))
+        return self._driven(seen, AtlasMemory(memory.team, tuple(states), tuple(routes), legs, walls))
 
     def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         """Return the maps after the robots have told each other of theirs, which they do not here."""
         return maps
 
-    def _planned(self, seen: Observations, team: Team, mind: Mind, i: int) -> tuple[Mind, Array | None]:
+    def _planned(
+        self, seen: Observations, team: Team, state: PlannerState, i: int
+    ) -> tuple[PlannerState, Array | None]:
         """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
         place = seen.positions[i]
         others, at = seen.neighbours.of(i), seen.neighbour_positions(i)
-        watch = mind.watch.goes_on(others, at, seen.time)
-        crowd = len(others) >= CREW
+        watch = state.watch.goes_on(others, at, seen.time)
+        crowd = len(others) >= MAX_PLANNING_GROUP
         if crowd:
-            near = np.sort(np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: CREW - 1])
+            near = np.sort(
+                np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: MAX_PLANNING_GROUP - 1]
+            )
             others, at = others[near], at[near]
         reach = 1.1 * float(np.sqrt(((at - place) ** 2).sum(axis=1).max())) if crowd else math.inf
         most = CROWD_NODES if crowd else OWN_NODES
-        window = Window.around(mind.known.raster, place, reach, most)
-        spacing = window.stride * mind.known.raster.cell
+        window = Window.around(state.known.raster, place, reach, most)
+        spacing = window.stride * state.known.raster.cell
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / float(team.max_speed[i]))
-        first = mind.planned is None
+        first = state.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         # a team that has changed may have much to do again
-        since = mind.since if np.array_equal(mind.watch.robots, watch.robots) and not first else seen.time
-        mind = replace(mind, due=due, watch=watch, since=since)
+        since = state.since if np.array_equal(state.watch.robots, watch.robots) and not first else seen.time
+        state = replace(state, due=due, watch=watch, since=since)
         still = seen.time - watch.since >= STILL_FOR
         situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
-        if mind.idle and mind.planned is mind.known and mind.ways is not None and mind.ways.window == window:
-            same = mind.crew is not None and np.array_equal(mind.crew, crew)
-            same = same and np.abs(situation - mind.situation).max() < _HARDLY * spacing
-            if same and mind.quiet == bool(still.all()):
-                return mind, None
-        mind = self._mapped(mind, window, float(team.radius[i]) + self.clearance)
-        ways = mind.ways
+        if (
+            state.idle
+            and state.planned is state.known
+            and state.ways is not None
+            and state.ways.window == window
+        ):
+            same = state.crew is not None and np.array_equal(state.crew, crew)
+            same = same and np.abs(situation - state.situation).max() < _HARDLY * spacing
+            if same and state.quiet == bool(still.all()):
+                return state, None
+        state = self._mapped(state, window, float(team.radius[i]) + self.clearance)
+        ways = state.ways
         assert ways is not None
-        mind = replace(mind, planned=mind.known, situation=situation, crew=crew, quiet=bool(still.all()))
-        settling = 2.0 ** min((seen.time - mind.since) / self.settling, 60.0)
-        stock = Stock(mind.known, window, seen.density)
-        together = seen.time - mind.since <= _TOGETHER * seen.region.diameter / float(team.max_speed[i])
+        state = replace(state, planned=state.known, situation=situation, crew=crew, quiet=bool(still.all()))
+        settling = 2.0 ** min((seen.time - state.since) / self.settling, 60.0)
+        demand = CoverageDemand(state.known, window, seen.density)
+        together = seen.time - state.since <= _TOGETHER * seen.region.diameter / float(team.max_speed[i])
         if crowd:
-            begin = ways.standing(place) if mind.node < 0 else mind.node
+            begin = ways.standing(place) if state.node < 0 else state.node
             elsewhere = at
         else:
             threshold = min(1.0, self.threshold * settling)
@@ -215,71 +226,79 @@ class Atlas:
                 still[:] = True
             # who is there already does not leave for what may not be there
             moving = Moving(threshold, min(1.0, self.nearby * settling), sure=not together)
-            mind, begin, elsewhere = self._plan_for_all(mind, seen, still, at, moving)
+            state, begin, elsewhere = self._plan_for_all(state, seen, still, at, moving)
         if begin < 0:
-            return replace(mind, own=place, idle=False), place
-        former = np.full(2, np.nan) if mind.own is None else mind.own
+            return replace(state, own=place, idle=False), place
+        former = np.full(2, np.nan) if state.own is None else state.own
         rest, steps = min(1.0, self.rest * settling), 3 if crowd else 6
-        own = own_place(ways, stock.weights, elsewhere, begin, former, rest, steps)
-        mind = replace(mind, own=own.goal, node=own.node)
-        return self._looking(mind, stock, own.mine, own.cost, place, period)
+        own = own_place(ways, demand.weights, elsewhere, begin, former, rest, steps)
+        state = replace(state, own=own.goal, node=own.node)
+        return self._looking(state, demand, own.mine, own.cost, place, period)
 
-    def _mapped(self, mind: Mind, window: Window, clearance: float) -> Mind:
-        """Return a mind with the ways of the present map; where no wall is new these are the former ones."""
-        ways = mind.ways
-        blocked = window.cut(mind.known.blocked, True)
+    def _mapped(self, state: PlannerState, window: Window, clearance: float) -> PlannerState:
+        """Return a state with the ways of the present map; where no wall is new these are the former ones."""
+        ways = state.ways
+        blocked = window.cut(state.known.blocked, True)
         same = ways is not None and ways.window == window
         if ways is not None and same and np.array_equal(ways.blocked, blocked):
-            return mind
+            return state
         # nodes of another window have other numbers
-        node = mind.node if same else -1
-        return replace(mind, ways=Ways(mind.known.raster, window, blocked, clearance), table=None, node=node)
+        node = state.node if same else -1
+        return replace(
+            state, ways=Ways(state.known.raster, window, blocked, clearance), table=None, node=node
+        )
 
     def _plan_for_all(
-        self, mind: Mind, seen: Observations, still: BoolArray, at: Array, moving: Moving
-    ) -> tuple[Mind, int, Array]:
-        """Return the mind with a plan for the team, the node of the own place, and those of the others."""
-        known, ways, situation, crew = mind.known, mind.ways, mind.situation, mind.crew
+        self, state: PlannerState, seen: Observations, still: BoolArray, at: Array, moving: Moving
+    ) -> tuple[PlannerState, int, Array]:
+        """Return the state with a plan for the team, the node of the own place, and those of the others."""
+        known, ways, situation, crew = state.known, state.ways, state.situation, state.crew
         assert ways is not None and situation is not None and crew is not None
-        table = mind.table
+        table = state.table
         if table is None:
             window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
             blocked = window.cut(known.blocked, True)
             table = Table.of(Ways(known.raster, window, blocked, ways.clearance))
-        weights = Stock(known, table.ways.window, seen.density, moving.sure).weights
+        weights = CoverageDemand(known, table.ways.window, seen.density, moving.sure).weights
         given = np.concatenate([[False], still])
         begin = situation.copy()
-        if mind.places is not None:
-            robots, places = mind.places[:, 0].astype(np.intp), mind.places[:, 1:]
+        if state.places is not None:
+            robots, places = state.places[:, 0].astype(np.intp), state.places[:, 1:]
             _, here, there = np.intersect1d(crew, robots, return_indices=True)
             free = ~given[here]
             begin[here[free]] = places[there[free]]
         places = team_places(table, weights, situation, begin, given, moving.threshold, moving.nearby)
-        mind = replace(mind, table=table, places=np.column_stack([crew, places]))
+        state = replace(state, table=table, places=np.column_stack([crew, places]))
         near = ((ways.nodes - places[0]) ** 2).sum(axis=1)
         near[~ways.roomy] = np.inf
         node = int(near.argmin()) if ways.roomy.any() else -1
-        return mind, node, np.where(still[:, None], at, places[1:])
+        return state, node, np.where(still[:, None], at, places[1:])
 
     def _looking(
-        self, mind: Mind, stock: Stock, mine: Array, cost: float, place: Array, period: float
-    ) -> tuple[Mind, Array]:
-        """Return the mind, and where to go: to the own place, or first to where there is something to see."""
-        ways, own = mind.ways, mind.own
+        self,
+        state: PlannerState,
+        demand: CoverageDemand,
+        mine: Array,
+        cost: float,
+        place: Array,
+        period: float,
+    ) -> tuple[PlannerState, Array]:
+        """Return the state, and where to go: to the own place, or first to what there is to see."""
+        ways, own = state.ways, state.own
         assert ways is not None and own is not None
-        former = mind.former
-        if mind.look is not None and math.dist(mind.look, place) < _ARRIVED:
-            former = (*former, mind.look)
-        if mind.look is None and math.dist(own, place) > _ARRIVED:
-            return replace(mind, idle=False), own
-        least = self.stake * cost * 2.0 ** min(mind.looked / self.patience, 60.0)
+        former = state.former
+        if state.look is not None and math.dist(state.look, place) < _ARRIVED:
+            former = (*former, state.look)
+        if state.look is None and math.dist(own, place) > _ARRIVED:
+            return replace(state, idle=False), own
+        least = self.stake * cost * 2.0 ** min(state.looked / self.patience, 60.0)
         node = ways.standing(place)
         look = None
         if node >= 0 and self.stake < 1.0:
-            look = stock.viewpoint(mine, ways.distances(node), ways.tight, least, former)
-        looked = mind.looked + period * (look is not None)
-        mind = replace(mind, look=look, former=former, looked=looked, idle=look is None)
-        return mind, own if look is None else look
+            look = demand.viewpoint(mine, ways.distances(node), ways.tight, least, former)
+        looked = state.looked + period * (look is not None)
+        state = replace(state, look=look, former=former, looked=looked, idle=look is None)
+        return state, own if look is None else look
 
     def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces towards the way-points, kept off walls and other robots."""
@@ -312,7 +331,7 @@ class Atlas:
         offsets = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
         walls = steering.wall_limits(offsets, team.radius)
         wanted = steering.clear_of_walls(wanted, walls)
-        wanted = steering.held(wanted, walls, robot, neighbours)
+        wanted = steering.scale_to_limits(wanted, walls, robot, neighbours)
         forces = drive(wanted, seen, team, self.response_time)
         goals = np.array([route[-1] for route in memory.routes])
         return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)

@@ -17,7 +17,7 @@ STILL_WITHIN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Watch:
+class RestTracker:
     """Since when each robot that is heard has been where it is.
 
     Attributes
@@ -31,18 +31,18 @@ class Watch:
     places: Array
     since: Array
 
-    def goes_on(self, robots: IntArray, places: Array, time: float) -> Watch:
+    def goes_on(self, robots: IntArray, places: Array, time: float) -> RestTracker:
         """Return the watch after one more look."""
         at, since = places.copy(), np.full(len(robots), time)
         _, here, there = np.intersect1d(robots, self.robots, assume_unique=True, return_indices=True)
         moved = np.sqrt(((places[here] - self.places[there]) ** 2).sum(axis=1))
         here, there = here[moved < STILL_WITHIN], there[moved < STILL_WITHIN]
         at[here], since[here] = self.places[there], self.since[there]
-        return Watch(robots, at, since)
+        return RestTracker(robots, at, since)
 
 
 @dataclass(frozen=True, eq=False)
-class Mind:
+class PlannerState:
     """What one robot remembers. Immutable.
 
     Attributes
@@ -50,7 +50,7 @@ class Mind:
     known : DiscoveredMap
     due : float, s
         When it plans next.
-    watch : Watch
+    watch : RestTracker
     since : float, s
         When it began, or the robots that it hears became others.
     ways : Ways or None
@@ -82,7 +82,7 @@ class Mind:
 
     known: DiscoveredMap
     due: float
-    watch: Watch
+    watch: RestTracker
     since: float = 0.0
     ways: Ways | None = None
     table: Table | None = None
@@ -98,7 +98,7 @@ class Mind:
     looked: float = 0.0
     idle: bool = False
 
-    def __deepcopy__(self, memo: object) -> Mind:
+    def __deepcopy__(self, memo: object) -> PlannerState:
         return self
 
 
@@ -110,7 +110,7 @@ class AtlasMemory:
     ----------
     team : Team
         A robot knows its own limits.
-    minds : tuple of Mind, one for each robot
+    states : tuple of PlannerState, one for each robot
     routes : tuple of (w, 2) m
         The way-points that are left, the last one the goal.
     legs : (n,)
@@ -120,7 +120,7 @@ class AtlasMemory:
     """
 
     team: Team
-    minds: tuple[Mind, ...]
+    states: tuple[PlannerState, ...]
     routes: tuple[Array, ...]
     legs: IntArray
     walls: Array
@@ -128,4 +128,4 @@ class AtlasMemory:
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:
         """The map that each robot has discovered."""
-        return tuple(mind.known for mind in self.minds)
+        return tuple(state.known for state in self.states)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers.driving import drive, kept_off, offsets_from_neighbours, summed
+from robocov.controllers.driving import drive, limit_approach_speed, offsets_from_neighbours, summed
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
@@ -97,7 +97,7 @@ class Dispersion:
         braking = np.where(robots, 0.25, 0.5) * team.max_acceleration[:, None]
         close = np.concatenate([others, walls], axis=1)
         wanted = self._dispersing(seen, team)
-        wanted = kept_off(wanted, close, clearance, self.k_avoid, braking, team.max_speed)
+        wanted = limit_approach_speed(wanted, close, clearance, self.k_avoid, braking, team.max_speed)
         forces = drive(wanted, seen, team, self.response_time)
         return Decision(forces=forces, terms={"attraction": forces}, memory=DispersionMemory(team, returns))
 

@@ -40,7 +40,7 @@ def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
 
 
-def kept_off(
+def limit_approach_speed(
     wanted: Array, away: Array, clearance: Array, rate: float, braking: Array, speed: Array
 ) -> Array:
     """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards what is close.

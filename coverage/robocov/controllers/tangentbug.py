@@ -10,7 +10,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.controllers.bug import Bug, Look, Mode
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import drive, kept_off, offsets_from_neighbours
+from robocov.controllers.driving import drive, limit_approach_speed, offsets_from_neighbours
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.controllers.tangents import free_distances
@@ -147,7 +147,7 @@ class TangentBug:
         # of two robots each brakes for its half of the way
         braking = np.where(robots, 0.25, 0.5) * team.max_acceleration[:, None]
         close = np.concatenate([others, walls], axis=1)
-        return kept_off(wanted, close, keep, _EAGERNESS, braking, team.max_speed)
+        return limit_approach_speed(wanted, close, keep, _EAGERNESS, braking, team.max_speed)
 
     def _bugs(
         self,

@@ -9,15 +9,17 @@ beside that it stays in the cell; no difference of two costs is ever formed, whi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from robocov.locational.cost import CellSides, OverEdge
+from robocov.locational.cost import CellSides
 
 if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.locational.cost import Performance
+    from collections.abc import Callable
+
+    from robocov.arrays import Array, BoolArray
+    from robocov.locational.cost import Performance, Seen
     from robocov.voronoi import VoronoiPartition
     from robocov.voronoi.weighted_cells import WeightedCells
 
@@ -67,51 +69,91 @@ def best_points(cells: VoronoiPartition | WeightedCells, f: Performance, start: 
     """
     start = (cells.centroid if start is None else start) - cells.generators
     sides = CellSides(cells.edges, len(start))
+
+    def slopes(x: Array, y: Array, seen: Seen, wanted: BoolArray) -> Slopes:
+        over = f.over_edges(seen)
+        return Slopes(*(f.sign * each for each in (*sides.gradient(over), *sides.hessian(over))))
+
+    return np.asarray(cells.generators + newton(sides, slopes, start))
+
+
+class Slopes(NamedTuple):
+    """Gradient and Hessian of what is to be small, (n,) each."""
+
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+
+
+def newton(
+    sides: CellSides,
+    slopes: Callable[[Array, Array, Seen, BoolArray], Slopes],
+    start: Array,
+    searching: BoolArray | None = None,
+    near: float = _NEAR,
+    rounds: int = _ROUNDS,
+) -> Array:
+    """Return where Newton's method, safeguarded, ends in each cell, (n, 2) m relative to the generators.
+
+    Parameters
+    ----------
+    sides : CellSides
+    slopes : callable
+        Of x and y, (n,) m, the edges as seen from there, and for which cells they are wanted.
+    start : (n, 2) m
+    searching : (n,) or None
+        In which cells; None: in all that are more than rounding.
+    near : float
+        A step so short, relative to the cell's size, is the last.
+    rounds : int
+        Evaluations after which a cell has what it has.
+    """
     x, y = start[:, 0].copy(), start[:, 1].copy()
     seen = sides.seen_from(x, y)
     room = sides.room(seen)
     confined = room > 0.0
-    searching = confined | (sides.area > _FLAT * np.square(sides.size))
+    if searching is None:
+        searching = confined | (sides.area > _FLAT * np.square(sides.size))
     if not searching.any():
-        return np.asarray(cells.generators + start)
+        return start
     room = np.where(confined, room, np.inf)
-    go_x, go_y, fall = _newton_steps(sides, f.over_edges(seen), f.sign)
+    go_x, go_y, fall = _newton_steps(slopes(x, y, seen, searching), sides.size)
     part = np.ones(len(x))
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         step_x, step_y = part * go_x, part * go_y
         length = np.sqrt(step_x * step_x + step_y * step_y)
-        last = searching & (length <= np.minimum(_NEAR * sides.size, room))
+        last = searching & (length <= np.minimum(near * sides.size, room))
         x[last] += step_x[last]
         y[last] += step_y[last]
-        searching &= ~last & (length > _NOTHING * sides.size)
+        searching = searching & ~last & (length > _NOTHING * sides.size)
         if not searching.any():
             break
         there_x, there_y = np.where(searching, x + step_x, x), np.where(searching, y + step_y, y)
         seen = sides.seen_from(there_x, there_y)
-        over = f.over_edges(seen)
-        gradient_x, gradient_y = sides.gradient(over)
-        slope = f.sign * (gradient_x * go_x + gradient_y * go_y)
         room_there = np.where(confined, sides.room(seen), np.inf)
         inside = room_there >= 0.0
+        there = slopes(there_x, there_y, seen, searching & inside)
+        slope = there.x * go_x + there.y * go_y
         taken = searching & inside & (slope <= -_RISE * fall)
         # where the line through both slopes is level, but neither too near nor too far
         level = np.clip(fall / np.minimum(fall - slope, -1e-300), _LEAST, _MOST)
         part = np.where(taken, 1.0, part * np.where(inside, level, _MOST))
         if taken.any():
-            next_x, next_y, next_fall = _newton_steps(sides, over, f.sign)
+            next_x, next_y, next_fall = _newton_steps(there, sides.size)
             x, y = np.where(taken, there_x, x), np.where(taken, there_y, y)
             go_x, go_y = np.where(taken, next_x, go_x), np.where(taken, next_y, go_y)
             fall, room = np.where(taken, next_fall, fall), np.where(taken, room_there, room)
-    return cells.generators + np.column_stack([x, y])
+    return np.column_stack([x, y])
 
 
-def _newton_steps(sides: CellSides, over: OverEdge, sign: float) -> tuple[Array, Array, Array]:
+def _newton_steps(slopes: Slopes, size: Array) -> tuple[Array, Array, Array]:
     """Return Newton's steps x and y, (n,) m, and how fast the cost falls along them: its slope, negative.
 
     No step is longer than half the cell's perimeter.
     """
-    slope_x, slope_y = (sign * each for each in sides.gradient(over))
-    xx, xy, yy = (sign * each for each in sides.hessian(over))
+    slope_x, slope_y, xx, xy, yy = slopes
     trace, determinant = xx + yy, xx * yy - xy * xy
     bowl = (trace > 0.0) & (determinant > _FLATTEST * trace * trace)
     if bowl.all():
@@ -123,7 +165,7 @@ def _newton_steps(sides: CellSides, over: OverEdge, sign: float) -> tuple[Array,
         go_x = np.where(bowl, (xy * slope_y - yy * slope_x) / safe, otherwise[0])
         go_y = np.where(bowl, (xy * slope_x - xx * slope_y) / safe, otherwise[1])
     length = np.sqrt(go_x * go_x + go_y * go_y)
-    part = sides.size / np.maximum(np.maximum(length, sides.size), 1e-300)
+    part = size / np.maximum(np.maximum(length, size), 1e-300)
     go_x, go_y = go_x * part, go_y * part
     return go_x, go_y, slope_x * go_x + slope_y * go_y
 

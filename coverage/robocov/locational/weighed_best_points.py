@@ -3,22 +3,22 @@
 A cell is taken apart into the triangles that the point itself spans with the edges. In the coordinates
 q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that Gauss's
 rule converges quickly where φ is smooth; where it jumps within a cell, the error is of the order of the
-distance of the nodes. Newton's method is safeguarded as in `best_points`: a step must not go beyond where the
-cost begins to rise.
+distance of the nodes. Newton's method is that of `best_points`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.locational.best_points import Slopes, newton
 from robocov.locational.cost import CellSides, Sensing
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray
     from robocov.density import Density
-    from robocov.locational.cost import Distance
+    from robocov.locational.cost import Distance, Seen
     from robocov.voronoi import VoronoiPartition
     from robocov.voronoi.weighted_cells import WeightedCells
 
@@ -31,21 +31,8 @@ _NEAR = 1e-6
 _ROUNDS = 30
 """Evaluations after which a cell has what it has."""
 
-_RISE = 0.5
-"""Where the cost rises again at the end of a step, it may rise so many times as fast as it fell."""
-
 _NOTHING = 1e-12
 """φ so small, relative to its highest value, all over a cell is nothing: its centroid is as good a point."""
-
-
-class _Slopes(NamedTuple):
-    """Gradient and Hessian of what is to be small, (n,) each."""
-
-    x: Array
-    y: Array
-    xx: Array
-    xy: Array
-    yy: Array
 
 
 def weighed_best_points(
@@ -65,32 +52,10 @@ def weighed_best_points(
     """
     start = cells.centroid - cells.generators
     sides = CellSides(cells.edges, len(start))
-    x, y = start[:, 0].copy(), start[:, 1].copy()
-    room = sides.room(sides.seen_from(x, y))
+    room = sides.room(sides.seen_from(*start.T))
     searching = (room > 1e-9 * sides.size) & (cells.mass > _NOTHING * density.highest * sides.area)
     quadrature = _Quadrature(cells, density, f, sides.size)
-    go_x, go_y, fall = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
-    part = np.ones_like(x)
-    fresh = searching
-    slopes = quadrature.slopes(x, y, fresh)
-    for _ in range(_ROUNDS):
-        step = _newton_steps(slopes, sides.size)
-        go_x, go_y = np.where(fresh, step[0], go_x), np.where(fresh, step[1], go_y)
-        fall, part = np.where(fresh, step[2], fall), np.where(fresh, 1.0, part)
-        there_x, there_y = x + part * go_x, y + part * go_y
-        length = part * np.hypot(go_x, go_y)
-        inside = sides.room(sides.seen_from(there_x, there_y)) > 0.0
-        last = searching & inside & (length <= _NEAR * sides.size)
-        x, y = np.where(last, there_x, x), np.where(last, there_y, y)
-        searching &= ~last & (length > 1e-3 * _NEAR * sides.size)
-        if not searching.any():
-            break
-        slopes = quadrature.slopes(there_x, there_y, searching & inside)
-        rise = slopes.x * go_x + slopes.y * go_y
-        fresh = searching & inside & (rise <= -_RISE * fall)
-        x, y = np.where(fresh, there_x, x), np.where(fresh, there_y, y)
-        part = np.where(fresh, part, 0.5 * part)
-    return cells.generators + np.column_stack([x, y])
+    return np.asarray(cells.generators + newton(sides, quadrature.slopes, start, searching, _NEAR, _ROUNDS))
 
 
 class _Quadrature:
@@ -118,7 +83,7 @@ class _Quadrature:
             self._u = np.broadcast_to(tau, (len(size), _OUTWARD))
             self._u_weights = np.broadcast_to(weights * tau, (len(size), _OUTWARD))
 
-    def slopes(self, x: Array, y: Array, wanted: BoolArray) -> _Slopes:
+    def slopes(self, x: Array, y: Array, seen: Seen, wanted: BoolArray) -> Slopes:
         """Return the slopes at points relative to the generators, zero for cells that are not wanted."""
         edges = self._edges
         some = np.flatnonzero(wanted[edges.cell])
@@ -157,26 +122,6 @@ class _Quadrature:
             first + second * dy * dy,
         )
         count = len(x)
-        return _Slopes(
+        return Slopes(
             *(np.bincount(cell, part.sum(axis=(1, 2)), minlength=count).astype(float) for part in parts)
         )
-
-
-def _newton_steps(slopes: _Slopes, size: Array) -> tuple[Array, Array, Array]:
-    """Return steps x and y, (n,) m, and the slope along them, which is not positive.
-
-    Newton's where the Hessian is positive definite, else down the slope; none longer than a quarter of the
-    cell's size, which is half its perimeter.
-    """
-    x, y, xx, xy, yy = slopes
-    determinant, trace = xx * yy - xy * xy, xx + yy
-    definite = (determinant > 1e-12 * trace * trace) & (trace > 0.0)
-    safe = np.where(definite, determinant, 1.0)
-    steep = np.hypot(x, y)
-    down = 0.25 * size / np.where(steep > 0.0, steep, 1.0)
-    go_x = np.where(definite, -(yy * x - xy * y) / safe, -x * down)
-    go_y = np.where(definite, -(xx * y - xy * x) / safe, -y * down)
-    length = np.hypot(go_x, go_y)
-    part = np.minimum(1.0, 0.25 * size / np.maximum(length, 1e-300))
-    go_x, go_y = go_x * part, go_y * part
-    return go_x, go_y, x * go_x + y * go_y

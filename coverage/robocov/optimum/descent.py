@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from scipy.optimize import LbfgsInvHessProduct
 from scipy.spatial import cKDTree
 
 from robocov.arrays import Array, IntArray
@@ -143,7 +144,7 @@ def descended(
     """
     result = cost(positions)
     slope = _slope(result)
-    learnt: deque[tuple[Array, Array, float]] = deque(maxlen=_MEMORY)
+    learnt: deque[tuple[Array, Array]] = deque(maxlen=_MEMORY)
     falls: deque[float] = deque(maxlen=_SLOW[0])
     for _ in range(_STEPS):
         if beat is not None:
@@ -163,7 +164,7 @@ def descended(
         along = float(np.vdot(step, bend))
         # only where it curves upwards the direction stays one of descent
         if along > 1e-10 * float(np.vdot(bend, bend)):
-            learnt.append((step, bend, 1.0 / along))
+            learnt.append((step, bend))
         falls.append(result.mean_distance - after.mean_distance)
         result, slope = after, slope_after
         if len(falls) == falls.maxlen and sum(falls) < _SLOW[1] * result.mean_distance:
@@ -196,19 +197,14 @@ def _curvature(result: CoverageResult, least: float) -> Array:
     return np.where(curvature > 0.0, curvature, 1.0)
 
 
-def _direction(slope: Array, scale: Array, learnt: deque[tuple[Array, Array, float]]) -> Array:
-    """Return the quasi-Newton direction (n, 2) m, by the two loops over the steps that were learnt from."""
-    way = slope.copy()
-    parts = []
-    for step, bend, inverse in reversed(learnt):
-        part = inverse * float(np.vdot(step, way))
-        parts.append(part)
-        way -= part * bend
-    _, bend, inverse = learnt[-1]
-    way /= scale * (inverse * float(np.vdot(bend, bend / scale)))
-    for (step, bend, inverse), part in zip(learnt, reversed(parts), strict=True):
-        way += step * (part - inverse * float(np.vdot(bend, way)))
-    return -way
+def _direction(slope: Array, scale: Array, learnt: deque[tuple[Array, Array]]) -> Array:
+    """Return the quasi-Newton direction (n, 2) m, by the steps that were learnt from."""
+    step, bend = np.array(learnt).reshape(len(learnt), 2, -1).transpose(1, 0, 2)
+    # in coordinates in which the curvature is about 1, from which scipy's recursion begins
+    scale = np.broadcast_to(scale, slope.shape).ravel()
+    root = np.sqrt(scale * (bend[-1] @ (bend[-1] / scale) / (step[-1] @ bend[-1])))
+    way = LbfgsInvHessProduct(step * root, bend / root) @ (slope.ravel() / root)
+    return np.asarray(-(way / root).reshape(slope.shape))
 
 
 def _shorter(

@@ -20,8 +20,8 @@ from scipy.spatial import cKDTree
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError, shown
+from robocov.k_median import best_swaps, lloyd_iterations, seeded
 from robocov.optimum.descent import Room, descended
-from robocov.optimum.interchange import alternated, interchanged, seeded
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:
@@ -259,8 +259,8 @@ class _Search:
         The table knows the cost only about: what came before stays where the exact cost says so.
         """
         drawn = seeded(self.table, self.robots, rng)
-        lloyd = alternated(self.table, drawn, beat)
-        stages = interchanged(self.table, lloyd, beat), lloyd, drawn
+        lloyd = lloyd_iterations(self.table, drawn, beat=beat)
+        stages = best_swaps(self.table, lloyd, beat), lloyd, drawn
         return min(map(np.sort, stages), key=lambda some: _rank(self.cost(self.places[some])))
 
     def descended(self, sources: IntArray, beat: Callable[[], None]) -> tuple[float, CoverageResult]:

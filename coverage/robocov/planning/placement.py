@@ -19,8 +19,8 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.k_median import improved, moved
 from robocov.planning.discovered import FREE, UNKNOWN
-from robocov.planning.medians import improved, moved
 from robocov.planning.openness import BLOCKS, openness
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _SEEN_ENOUGH = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Stock:
+class CoverageDemand:
     """What there is to be covered in a window of a discovered map.
 
     Attributes
@@ -58,7 +58,7 @@ class Stock:
     density: Density | None = None
     sure: bool = False
 
-    def __deepcopy__(self, memo: object) -> Stock:
+    def __deepcopy__(self, memo: object) -> CoverageDemand:
         return self
 
     @cached_property

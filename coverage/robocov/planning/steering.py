@@ -151,7 +151,7 @@ def clear_of_robots(velocity: Array, robot: IntArray, neighbours: Limits) -> Arr
     return velocity
 
 
-def held(velocity: Array, walls: Limits, robot: IntArray, neighbours: Limits) -> Array:
+def scale_to_limits(velocity: Array, walls: Limits, robot: IntArray, neighbours: Limits) -> Array:
     """Return velocities that are slowed down where they still approach anything faster than is allowed.
 
     Who is too close already may not get closer. Parameters are those of `clear_of_walls` and of

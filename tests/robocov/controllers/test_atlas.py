@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robocov.controllers import Atlas, AtlasShared, Rapf, information_of, make_controller
-from robocov.controllers.atlas import CREW
+from robocov.controllers.atlas import MAX_PLANNING_GROUP
 from robocov.controllers.atlas_memory import AtlasMemory
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
@@ -62,7 +62,7 @@ def test_it_comes_to_rest(finished: Simulation) -> None:
 
 def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulation) -> None:
     """Only then it may relocate: it plans once more then, though nothing that it sees has changed."""
-    assert all(mind.idle and mind.quiet for mind in finished.memory.minds)
+    assert all(state.idle and state.quiet for state in finished.memory.states)
 
 
 def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
@@ -139,7 +139,7 @@ def test_a_robot_alone_and_a_crowd() -> None:
     empty = Environment("empty", SQUARE)
     x, y = np.meshgrid(np.linspace(0.6, 2.4, 4), np.linspace(0.6, 2.4, 4))
     starts = np.column_stack([x.ravel(), y.ravel()])
-    assert len(starts) > CREW
+    assert len(starts) > MAX_PLANNING_GROUP
     crowd = Simulation(empty, Atlas(), starts, dt=0.05)
     cost = CoverageCost(empty, lattice=16)
     for _ in range(400):
@@ -150,12 +150,12 @@ def test_a_robot_alone_and_a_crowd() -> None:
 def test_it_plans_now_and_then() -> None:
     """Not all robots at the same moment, and less often where nodes are far apart."""
     some = simulation()
-    due = [mind.due for mind in some.memory.minds]
+    due = [state.due for state in some.memory.states]
     assert len(set(due)) == 4
     assert max(due) < 0.5
     while some.time < 0.5:
         some.step()
-    due = [mind.due for mind in some.memory.minds]
+    due = [state.due for state in some.memory.states]
     assert len(set(due)) == 4
     assert min(due) > 1.0
     assert max(due) < 2.5

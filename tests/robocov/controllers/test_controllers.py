@@ -54,7 +54,7 @@ class Homing:
 ROOM = Environment("room", tuple((x, y) for x, y in REGION.vertices.tolist()))
 COARSE = {"geodesic-lloyd": {"lattice": 8.0}}
 LARGEST = {"atlas": 12, "atlas-shared": 12}
-"""Teams of laws that plan are small here: above their `CREW` all robots are treated alike."""
+"""Teams of laws that plan are small here: above their `MAX_PLANNING_GROUP` all robots are treated alike."""
 ALL = [
     *(informed(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
     *(Rapf(target=word, height=0.5) for word in ("sensing", "median")),

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Dispersion
-from robocov.controllers.driving import approach, drive, kept_off, offsets_from_neighbours
+from robocov.controllers.driving import approach, drive, limit_approach_speed, offsets_from_neighbours
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.metrics import settled_at
@@ -53,7 +53,7 @@ def test_kept_off_one_thing_changes_the_approach_alone(seed: int) -> None:
     wanted *= np.minimum(1.0, 2.0 / np.hypot(*wanted.T))[:, None]
     away[0] = np.nan
     clearance, braking = np.full((20, 1), 0.4), np.full((20, 1), 1.0)
-    slowed = kept_off(wanted, away, clearance, 2.0, braking, np.full(20, 9.0))
+    slowed = limit_approach_speed(wanted, away, clearance, 2.0, braking, np.full(20, 9.0))
     np.testing.assert_allclose(slowed[0], wanted[0], rtol=1e-12)
     distance = np.hypot(*away[1:, 0].T)
     normal = away[1:, 0] / distance[:, None]
@@ -68,7 +68,7 @@ def test_kept_off_one_thing_changes_the_approach_alone(seed: int) -> None:
 def test_between_two_walls_that_are_too_close_it_goes_along() -> None:
     """Both ask to be left: then neither is approached."""
     away = np.array([[[0.1, 0.0], [-0.1, 0.0]]])
-    slowed = kept_off(
+    slowed = limit_approach_speed(
         np.array([[0.5, 0.7]]), away, np.full((1, 2), 0.3), 2.0, np.full((1, 2), 1.0), np.ones(1)
     )
     np.testing.assert_allclose(slowed, [[0.0, 0.7]], atol=1e-12)

@@ -16,9 +16,9 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
 from robocov.generator import generated_map
+from robocov.k_median import seeded
 from robocov.mapfile import load_map
 from robocov.optimum import optimum
-from robocov.optimum.interchange import seeded
 from robocov.optimum.search import _Search
 
 

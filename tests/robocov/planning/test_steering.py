@@ -73,7 +73,7 @@ def test_where_corrections_contradict_each_other_it_is_slow_enough_for_all(seed:
     offset = rng.normal(scale=0.4, size=(30, 2))
     distance, reach = np.hypot(*offset.T), np.full(30, 0.2)
     near = steering.robot_limits(offset, distance, reach)
-    safe = steering.held(velocity, steering.wall_limits(walls, radius), robot, near)
+    safe = steering.scale_to_limits(velocity, steering.wall_limits(walls, radius), robot, near)
     gap = np.hypot(*np.moveaxis(walls, -1, 0)) - 0.1 - steering.MARGIN
     toward = -(walls * safe[:, None]).sum(axis=2) / np.hypot(*np.moveaxis(walls, -1, 0))
     assert (toward <= np.sqrt(2 * steering.BRAKING * gap.clip(0)) + 0.0101).all()
@@ -83,5 +83,5 @@ def test_where_corrections_contradict_each_other_it_is_slow_enough_for_all(seed:
     # the direction is the same, and who approaches nothing goes on
     assert np.abs(velocity[:, 0] * safe[:, 1] - velocity[:, 1] * safe[:, 0]).max() < 1e-12
     nothing = steering.wall_limits(np.full((n, 1, 2), np.nan), radius)
-    free = steering.held(velocity, nothing, robot[:0], near)
+    free = steering.scale_to_limits(velocity, nothing, robot[:0], near)
     assert np.array_equal(free, velocity)
