@@ -236,9 +236,7 @@ def test_the_time_is_told_when_it_stands_and_not_while_it_runs(opened) -> None:
         ".observe(document.querySelector('.said'), {childList: true, characterData: true, subtree: true})"
     )
     opened.find(".main").click()
-    opened.until(
-        lambda: opened.time > 3.1
-    )  # not long, or it may have ended
+    opened.until(lambda: opened.time > 3.1)  # not long, or it may have ended
     assert opened.js("return window.told") == 0
     opened.find(".main").click()
     opened.until(lambda: opened.js("return window.told") == 1)
