@@ -162,3 +162,9 @@ def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
 def test_a_repr_says_what_differs() -> None:
     assert repr(Conditions(loss=0.2)) == "Conditions(loss=0.2)"
     assert eval(repr(Conditions(loss=0.2, failures=((1, 2),)))) == Conditions(loss=0.2, failures=((1, 2),))
+
+
+def test_the_earlier_of_two_failures_counts() -> None:
+    by_chance = Conditions(failure_rate=1.0, seed=5).lives(2)[1]
+    given_ = Conditions(failure_rate=1.0, seed=5, failures=((1, 500.0), (2, 1e-6))).lives(2)[1]
+    assert given_.tolist() == [by_chance[0], 1e-6]

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from robocov.controllers import Atlas, AtlasShared, Rapf, information_of, make_controller
+from robocov.conditions import Conditions
+from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
 from robocov.controllers.atlas import MAX_PLANNING_GROUP
 from robocov.controllers.atlas_memory import AtlasMemory
 from robocov.cost import CoverageCost
@@ -165,3 +167,48 @@ def test_gains_are_checked() -> None:
     assert make_controller("atlas", {"period": 2}) == replace(Atlas(), period=2.0)
     with pytest.raises(ParameterError, match=r"atlas-shared.threshold: -1"):
         make_controller("atlas-shared", {"threshold": -1})
+
+
+def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
+    some = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=Conditions(failures=((4, 2.0),)))
+    while some.time < 1.9:
+        some.step()
+    before = [mind.since for mind in some.memory.minds[:3]]
+    assert max(before) < 1.0
+    while some.time < 5.0:
+        some.step()
+    assert all(2.0 <= mind.since < 4.5 for mind in some.memory.minds[:3])
+
+
+def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each of the three parts by itself; from a while on, relocations only where all others rest."""
+    asked: list[tuple[float, float, float, float]] = []
+    plan, place = atlas.team_places, atlas.own_place
+
+    def planned(table, weights, situation, begin, given, threshold, nearby):
+        asked.append((some.time, threshold, nearby, math.nan))
+        return plan(table, weights, situation, begin, given, threshold, nearby)
+
+    def placed(ways, weights, elsewhere, begin, former, rest, steps):
+        asked[-1] = (*asked[-1][:3], rest)
+        return place(ways, weights, elsewhere, begin, former, rest, steps)
+
+    monkeypatch.setattr(atlas, "team_places", planned)
+    monkeypatch.setattr(atlas, "own_place", placed)
+    team = Team.homogeneous(2, communication_range=20.0, max_speed=4.0)
+    some = Simulation(ROOMS, Atlas(settling=2.0), CORNER[:2], team, dt=0.05)
+    since = max(mind.since for mind in some.memory.minds)
+    while some.time < 8.0:
+        some.step()
+    together = 1.5 * ROOMS.region.diameter / 4.0
+    time, threshold, nearby, rest = np.array([each for each in asked if each[0] >= 0.5]).T
+    assert since == 0.0
+    for base, part in ((0.003, nearby), (0.004, rest)):
+        expected = base * 2.0 ** (time / 2.0)
+        assert ((0.75 * expected < part) & (part < 1.01 * expected)).all()
+    early = time < together
+    assert early.any() and (threshold[early] < 0.02 * 2.0 ** (together / 2.0)).all()
+    assert (threshold[early] > 0.75 * 0.01 * 2.0 ** (time[early] / 2.0)).all()
+    assert (threshold[time > together + 0.5] == 1.0).any(), "somebody moved, so nobody goes elsewhere"

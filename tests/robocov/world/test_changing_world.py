@@ -190,3 +190,13 @@ def test_a_failure_beside_a_wall_changes_nothing_for_others() -> None:
         for each in made:
             each.step(forces, 0.05, time=step * 0.05)
     assert made[0].positions[0].tobytes() == made[1].positions[0].tobytes()
+
+
+def test_who_failed_earlier_stays_in_the_way_when_another_one_fails() -> None:
+    changing = world(Conditions(failures=((1, 0.2), (3, 0.4))))
+    for step in range(12):
+        changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
+    assert changing.wrecks[:, :2].tolist() == STARTS[[0, 2]].tolist()
+    assert changing.working.tolist() == [False, True, False, True]
+    with pytest.raises(ValueError, match="read-only"):
+        changing.working[...] = True

@@ -250,3 +250,14 @@ def test_a_robot_on_a_spring_follows_the_hand_and_is_thrown() -> None:
     for _ in range(int(speed / 2.0 * 60) + 60):
         world.step(np.zeros((1, 2)), 1 / 60)
     assert np.hypot(*world.velocities[0]) < 0.5
+
+
+def test_a_robot_that_is_pushed_is_no_faster_than_its_limit(empty: Environment) -> None:
+    team = Team.joined([Team.homogeneous(1, max_speed=2.0, mass=50.0), Team.homogeneous(1, max_speed=0.5)])
+    pair = World(
+        solid_pieces(empty), team, np.array([[3.0, 5.0], [3.5, 5.0]]), np.array([[2.0, 0.0], [0.0, 0.0]])
+    )
+    for _ in range(60):
+        pair.step(np.array([[500.0, 0.0], [0.0, 0.0]]), DT)
+        assert (np.hypot(*pair.velocities.T) <= team.max_speed + 1e-12).all()
+    assert pair.positions[1, 0] > 3.6, "it was pushed"

@@ -113,10 +113,8 @@ def test_what_has_changed_is_enough_to_know_the_whole(data):
 def test_only_the_newest_question_counts():
     sketch = crowded(100)
     with ReadoutWorker() as worker:
-        began = time.perf_counter()
         for k in range(200):
             worker.ask(edits.moved(sketch, Selection.of(0), 0.001 * k, 0.0).sketch, 0.2)
-        assert time.perf_counter() - began < 2.0
         result = answered(worker)
         assert result.free_area == readout(edits.moved(sketch, Selection.of(0), 0.199, 0.0).sketch).free_area
 
@@ -163,21 +161,21 @@ def test_nothing_is_there_before_one_asks():
     worker.close()
 
 
-def test_asking_and_polling_among_many_obstacles_takes_no_frame():
+def test_asked_among_many_obstacles_is_only_what_changed(monkeypatch):
+    sent = []
+    about = Question.about
+    monkeypatch.setattr(Question, "about", lambda *what: sent.append(about(*what)) or sent[-1])
     sketch = crowded(400)
     keys = [item.key for item in sketch.obstacles]
     with ReadoutWorker() as worker:
         worker.ask(sketch)
         answered(worker)
-        taken = []
+        first = len(sent)
         for k in range(60):
             sketch = edits.moved(sketch, Selection.of(keys[k]), 0.001, 0.0).sketch
-            began = time.perf_counter()
             worker.ask(sketch)
             worker.poll()
-            taken.append(time.perf_counter() - began)
-            time.sleep(0.01)
         result = answered(worker)
     assert result.vertices > 1200
-    # a frame is 16 ms; machines that do something else as well may miss a few
-    assert np.median(taken) < 0.004
+    assert sent[first:]
+    assert sum(len(question.changed) for question in sent[first:]) <= 60

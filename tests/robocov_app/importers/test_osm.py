@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
 from typing import Any
 
@@ -179,9 +178,7 @@ def crowd() -> str:
 def test_what_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
     path = tmp_path / "town.osm"
     path.write_text(text)
-    began = time.process_time()
     with pytest.raises(MapError) as caught:
         IMPORTERS["osm"].read(path, ReadOptions())
     assert wanted in str(caught.value)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
-    assert time.process_time() - began < 5.0

@@ -8,7 +8,6 @@ import json
 import pickle
 import struct
 import tarfile
-import time
 import zipfile
 from pathlib import Path
 
@@ -112,7 +111,6 @@ def test_what_is_read_is_none_of_them(target: str) -> None:
 
 
 @pytest.mark.parametrize("piece", [b"<!a>", b"<!--", b"<?", b" ", b"#\n", b'{"format"', b"solid ", b"v 1 "])
-def test_no_beginning_takes_long(piece: bytes) -> None:
-    began = time.process_time()
-    named_kind(Path("a.txt"), piece * (2**20 // len(piece)))
-    assert time.process_time() - began < 3.0
+def test_a_long_beginning_is_what_a_short_one_is(piece: bytes) -> None:
+    path = Path("a.txt")
+    assert named_kind(path, piece * (2**20 // len(piece))) == named_kind(path, piece * 8)

@@ -6,7 +6,6 @@ import builtins
 import importlib.util
 import logging
 import socket
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -134,9 +133,7 @@ def test_nobody_at_the_address_is_one_line(
             ("pigeon://home:1", "unknown address scheme"),
         ):
             words = ["sweep", str(study), "--out", str(tmp_path / "out"), "--scheduler", address]
-            began = time.monotonic()
             assert main(words) == 2
-            assert time.monotonic() - began < 10.0
             (line,) = (line for line in capsys.readouterr().err.splitlines() if "error" in line)
             assert line.startswith(f"robocov: error: --scheduler: {address}: cannot be reached: ")
             assert reason in line or "no answer" in line

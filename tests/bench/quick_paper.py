@@ -1,0 +1,37 @@
+"""The quick study of the paper as people call it, and what it finds: minutes, hence not among the tests.
+
+Its maps are few: what is close is for the full study.
+
+    python -m pytest -n 0 tests/bench/quick_paper.py
+"""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from robocov_app.cli import main
+
+
+def test_the_quick_study_finds_what_is_plain(tmp_path):
+    out = tmp_path / "out"
+    assert main(["paper", "--quick", "--without-beyond", "--out", str(out)]) == 0
+    assert not (out / "beyond.html").exists()
+    claims = {claim["key"]: claim for claim in json.loads((out / "claims.json").read_text())}
+    assert len(claims) == 15
+    assert claims["nonconvex-final-shared"]["verdict"] == "holds"
+    assert claims["nonconvex-motion-shared"]["verdict"] == "holds"
+    assert claims["gap-rpf"]["verdict"] == "holds"
+    assert claims["convex-spreading"]["verdict"] == "does not hold"
+    assert claims["convex-final"]["estimate"] == pytest.approx(1.0, abs=0.03)
+    assert claims["nonconvex-final-shared"]["estimate"] == pytest.approx(0.7, abs=0.2)
+    for claim in claims.values():
+        low, high = claim["interval"]
+        assert low <= claim["estimate"] <= high
+        assert claim["maps"] >= 5 and claim["runs"] >= 15
+    for number in range(1, 9):
+        for suffix in ("png", "svg", "pdf"):
+            assert (out / "figures" / f"figure-{number}.{suffix}").is_file()
+    assert len((out / "index.html").read_bytes()) < 1_500_000
+    assert (out / "studies" / "claims" / "results.parquet").is_file()
