@@ -173,7 +173,7 @@ def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
     some = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=Conditions(failures=((4, 2.0),)))
     while some.time < 1.9:
         some.step()
-    before = [mind.since for mind in some.memory.minds[:3]]
+    before = [state.since for state in some.memory.states[:3]]
     assert max(before) < 1.0
     while some.time < 5.0:
         some.step()
@@ -199,7 +199,7 @@ def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
     monkeypatch.setattr(atlas, "own_place", placed)
     team = Team.homogeneous(2, communication_range=20.0, max_speed=4.0)
     some = Simulation(ROOMS, Atlas(settling=2.0), CORNER[:2], team, dt=0.05)
-    since = max(mind.since for mind in some.memory.minds)
+    since = max(state.since for state in some.memory.states)
     while some.time < 8.0:
         some.step()
     together = 1.5 * ROOMS.region.diameter / 4.0
