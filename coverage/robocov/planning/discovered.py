@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation.scans import headings
@@ -190,15 +189,21 @@ class DiscoveredMap:
         return DiscoveredMap(self.raster, _fixed(state))
 
 
-def dilate(blocked: BoolArray, reach: float) -> BoolArray:
+def grown(blocked: BoolArray, reach: float) -> BoolArray:
     """Return the cells whose middle is at most `reach` sides from that of a blocked cell, or of one beside.
 
-    >>> dilate(np.eye(3, dtype=bool), 0.5).sum()
+    >>> grown(np.eye(3, dtype=bool), 0.5).sum()
     np.int64(3)
     """
-    side = np.arange(-int(reach), int(reach) + 1)
-    disc = side[:, None] ** 2 + side**2 <= reach * reach
-    return np.asarray(binary_dilation(blocked, disc, border_value=1))
+    margin = int(reach)
+    padded = np.pad(blocked, margin, constant_values=True)
+    rows, columns = blocked.shape
+    result = blocked.copy()
+    for up in range(-margin, margin + 1):
+        for right in range(-margin, margin + 1):
+            if 0 < up * up + right * right <= reach * reach:
+                result |= padded[margin + up : margin + up + rows, margin + right : margin + right + columns]
+    return result
 
 
 def _numbers(at: Array, origin: float, cell: float, count: int) -> IntArray:

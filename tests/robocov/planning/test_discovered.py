@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment
-from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, dilate
+from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, grown
 from robocov.sensor import RangeSensor
 from robocov.world.solid import solid_pieces
 
@@ -99,4 +99,4 @@ def test_grown_cells_are_those_near_blocked_ones(seed: int, reach: float) -> Non
     padded = np.pad(cells, 5, constant_values=True)
     for r, c in zip(*np.nonzero(padded), strict=True):
         expected |= (row - (r - 5)) ** 2 + (column - (c - 5)) ** 2 <= reach * reach
-    assert np.array_equal(dilate(cells, reach), expected)
+    assert np.array_equal(grown(cells, reach), expected)
