@@ -177,7 +177,7 @@ def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
     assert max(before) < 1.0
     while some.time < 5.0:
         some.step()
-    assert all(2.0 <= mind.since < 4.5 for mind in some.memory.minds[:3])
+    assert all(2.0 <= state.since < 4.5 for state in some.memory.states[:3])
 
 
 def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
