@@ -328,9 +328,8 @@ def _of_earlier_version(folder: Path, kind: Kind) -> set[str]:
 
 def _has_our_name(name: str) -> bool:
     """Return whether a file in a folder could be one of a result, by its name alone."""
-    *folders, own = name.split("/")
-    is_frame = folders[-1:] == ["frames"] and _FRAME.fullmatch(own) is not None
-    return own in _NAMES or own == _MANIFEST or is_frame or _HALF.fullmatch(own) is not None
+    own = name.rpartition("/")[2]
+    return own in _NAMES or own == _MANIFEST or bool(_FRAME.fullmatch(own) or _HALF.fullmatch(own))
 
 
 def _frames(folder: Path) -> list[str]:
