@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from robocov.cost import CoverageCost
 from robocov.files.array_cache import ArrayCache
+from robocov.mapfile.check import MANY_VERTICES, vertex_count
 from robocov_app.progress import progress
 
 if TYPE_CHECKING:
@@ -67,7 +68,10 @@ def built_cost(
 def cost_for_pictures(
     environment: Environment, cost: CoverageCost, least: int = PICTURE_LATTICE
 ) -> CoverageCost:
-    """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one."""
-    if cost.lattice >= least:
+    """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one.
+
+    Maps of many vertices are drawn as they were measured: finer pictures would double what a run takes.
+    """
+    if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
         return cost
     return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)

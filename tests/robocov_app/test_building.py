@@ -7,6 +7,7 @@ import pytest
 from drawn_run import ROOMS
 
 from robocov.cost import coverage as cost_module
+from robocov.mapfile.check import vertex_count
 from robocov_app import building
 from robocov_app.building import built_cost, cost_for_pictures
 
@@ -44,6 +45,12 @@ def test_the_users_cache_is_used(monkeypatch, tmp_path):
     entry.write_bytes(b"damaged")
     assert built_cost(ROOMS, 32)(PLACE).value == built_cost(ROOMS, 32)(PLACE).value
     assert entry.stat().st_size > 1000
+
+
+def test_large_maps_are_drawn_as_they_were_measured(monkeypatch):
+    coarse = built_cost(ROOMS, 16)
+    monkeypatch.setattr(building, "MANY_VERTICES", vertex_count(ROOMS) - 1)
+    assert cost_for_pictures(ROOMS, coarse) is coarse
 
 
 def test_pictures_want_a_fine_lattice():
