@@ -35,7 +35,7 @@ MAX_PLANNING_GROUP = 8
 the nearest of them, as they are, and looks for its own place."""
 
 STILL_FOR = 3.0
-"""Who has not got away (see `atlas_memory.RestTracker`) for so many seconds rests."""
+"""Seconds without getting away (see `atlas_memory.RestTracker`) after which a robot rests."""
 
 _HARDLY = 0.1
 """Part of the spacing of the nodes that others may move before a plan is made anew."""

@@ -448,7 +448,7 @@ _CHOICES: dict[str, dict[str, type[Model]]] = {
 }
 
 _PARTS: dict[str, type[Model]] = {"path": PathModel, "peaks": PeakModel, "areas": AreaModel}
-"""What is at these keys, or in their lists."""
+"""Values at these keys, or in their lists."""
 
 _POINT = "a point [x, y] in metres"
 _COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
