@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -14,6 +15,8 @@ from robocov.environment.starts import DiscStart, UniformStart
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""
 os.environ["ROBOCOV_DRAFTS"] = ""
+# but for what is compiled: every process of a test would take its time over that
+os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
 
 # what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -1,0 +1,192 @@
+"""Kernels: plain loops over arrays, compiled by numba when they are first called.
+
+Numba is imported only then. What it compiles is kept in the user's cache folder (``NUMBA_CACHE_DIR`` names
+another one), by the code of a kernel and of all kernels that it calls; an entry that is damaged, or of
+another numba or processor, counts as missing.
+With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from contextlib import suppress
+from functools import cached_property, update_wrapper
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import platformdirs
+
+from robocov.files.array_cache import ArrayCache
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+_FORMAT = 1
+"""Version of the entries in the cache."""
+
+on_compile: list[Callable[[str], None]] = []
+"""Called with the name of each kernel that is about to be compiled, because the cache does not hold it."""
+
+
+def kernel(function: _Function) -> _Function:
+    """Return a function of numbers, arrays and named tuples of these as a compiled one.
+
+    It may call other kernels, whatever module they come from, and read global numbers. Arithmetic is that of
+    Python, without fused or reordered operations, so that all processors give the same bits.
+
+    >>> @kernel
+    ... def doubled(x):
+    ...     return 2.0 * x
+    >>> doubled(0.5)
+    1.0
+    """
+    return _as_kernel(function)
+
+
+def inner_kernel(function: _Function) -> _Function:
+    """Return the same of a function that makes no array, for loops: references are not counted."""
+    return _as_kernel(function, _nrt=False)
+
+
+def inlined_kernel(function: _Function) -> _Function:
+    """Return the same of a short one, which becomes part of the loops that call it."""
+    return _as_kernel(function, _nrt=False, forceinline=True)
+
+
+def _as_kernel(function: _Function, **options: bool) -> _Function:
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return function
+    return Kernel(function, options)  # type: ignore[return-value]
+
+
+class Kernel:
+    """A function that is compiled when it is first called."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, bool]) -> None:
+        assert isinstance(function, FunctionType)
+        update_wrapper(self, function)
+        self._function, self._options = function, options
+
+    def __call__(self, *args: Any) -> Any:
+        """Return what the function returns."""
+        return self._dispatcher(*args)
+
+    @cached_property
+    def _callees(self) -> dict[str, Kernel]:
+        found = {name: self._function.__globals__.get(name) for name in self._function.__code__.co_names}
+        return {name: value for name, value in found.items() if isinstance(value, Kernel)}
+
+    @cached_property
+    def _linked(self) -> FunctionType:
+        # numba knows its own dispatchers only, in the place of the kernels that this one calls
+        known = {name: callee._inner for name, callee in self._callees.items()}
+        function = self._function
+        linked = FunctionType(function.__code__, function.__globals__ | known, function.__name__)
+        linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__
+        return linked
+
+    @cached_property
+    def _inner(self) -> Any:
+        """For other kernels: what Python needs to call it takes long to compile."""
+        numba = _numba()
+        options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **self._options}
+        inner = numba.njit(self._linked, error_model="numpy", **options)
+        template = inner.get_call_template
+
+        def without_literals(args: Any, kws: Any) -> Any:
+            # else each constant that a caller passes would be compiled anew
+            return template(tuple(map(numba.types.unliteral, args)), kws)
+
+        inner.get_call_template = without_literals
+        return inner
+
+    @cached_property
+    def _dispatcher(self) -> Any:
+        dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True)
+        dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
+        return dispatcher
+
+    @cached_property
+    def _identity(self) -> str:
+        """Name what the machine code comes from: the kernel, those that it calls, the numbers it reads."""
+        code, scope = self._function.__code__, self._function.__globals__
+        parts: list[str] = [self.__module__, self.__qualname__, code.co_code.hex()]  # type: ignore[attr-defined]
+        parts += map(repr, (code.co_consts, code.co_names, code.co_varnames, self._options))
+        for name in code.co_names:
+            value = scope.get(name)
+            if isinstance(value, (int, float)):
+                parts.append(f"{name}={value!r}")
+            elif isinstance(value, type):
+                parts.append(f"{name}={getattr(value, '_fields', None)}")
+        parts += [self._callees[name]._identity for name in sorted(self._callees)]
+        return ArrayCache.key(*parts)
+
+
+class _KernelCache:
+    """The machine code of one kernel in the user's cache, where numba looks: an entry for each signature."""
+
+    def __init__(self, name: str, identity: str) -> None:
+        self._name, self._identity = name, identity
+        # the variable of numba's own caches
+        named = os.environ.get("NUMBA_CACHE_DIR")
+        folder = (
+            Path(named) if named else platformdirs.user_cache_path("robocov", appauthor=False) / "kernels"
+        )
+        self._cache = ArrayCache(folder)
+
+    def _key(self, sig: Any, codegen: Any) -> str:
+        parts = _numba().__version__, np.__version__, sys.version, repr(codegen.magic_tuple())
+        return ArrayCache.key("kernel", _FORMAT, self._identity, *parts, *map(_described, sig))
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the machine code for the types of the arguments, None where it is to be compiled."""
+        from numba.core import compiler
+
+        target_context.refresh()
+        entry = self._cache.load(self._key(sig, target_context.codegen()))
+        if entry is not None:
+            # a cache is never in the way, whatever there may be in it
+            with suppress(Exception):
+                rebuild: Any = compiler.CompileResult._rebuild
+                return rebuild(target_context, *pickle.loads(entry["code"].tobytes()))
+        for tell in on_compile:
+            tell(self._name)
+        return None
+
+    def save_overload(self, sig: Any, result: Any) -> None:
+        """Keep what was compiled."""
+        code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
+        self._cache.save(self._key(sig, result.codegen), {"code": code})
+
+
+def _described(kind: Any) -> str:
+    """Return a type of numba's in words, with the names of fields."""
+    if hasattr(kind, "fields"):
+        return f"{kind.fields}({', '.join(map(_described, kind.types))})"
+    return repr(kind)
+
+
+def _numba() -> ModuleType:
+    """Return numba, imported in spite of a folder `coverage` on the path."""
+    if "numba" in sys.modules:
+        return sys.modules["numba"]
+    # numba takes any `coverage` for coverage.py, also our source root where it is on the path: an empty
+    # entry makes it go without
+    import importlib.util
+
+    found = None if "coverage" in sys.modules else importlib.util.find_spec("coverage")
+    ours = found is not None and found.origin is None
+    if ours:
+        sys.modules["coverage"] = None  # type: ignore[assignment]
+    try:
+        import numba
+    finally:
+        if ours:
+            del sys.modules["coverage"]
+    return numba

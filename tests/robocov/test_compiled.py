@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov.compiled import kernel, on_compile
+
+ROOT = Path(__file__).parents[2]
+
+FACTOR = 3.0
+
+SCRIPT = """
+import sys
+from robocov.compiled import kernel, on_compile
+assert "numba" not in sys.modules
+on_compile.append(print)
+@kernel
+def doubled(x):
+    return 2.0 * x
+print(doubled(0.5))
+"""
+
+
+def said(folder, *, jit=True, script=SCRIPT):
+    """Return what a script in the checkout's root says that calls a kernel."""
+    variables = {
+        "NUMBA_CACHE_DIR": str(folder),
+        "NUMBA_DISABLE_JIT": str(int(not jit)),
+        "PYTHONPATH": os.pathsep.join(str(ROOT / part) for part in ("", "coverage", "app")),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT,
+        env=os.environ | variables,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split()
+
+
+def test_a_kernel_is_compiled_once_and_a_damaged_cache_is_a_miss(tmp_path):
+    assert said(tmp_path) == ["doubled", "1.0"]
+    (entry,) = tmp_path.iterdir()
+    assert said(tmp_path) == ["1.0"]
+    whole = entry.read_bytes()
+    for damaged in (b"", whole[:1000], whole[:-1] + b"?"):
+        entry.write_bytes(damaged)
+        assert said(tmp_path) == ["doubled", "1.0"]
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    assert said(tmp_path / "file") == ["doubled", "1.0"]
+
+
+def test_without_the_compiler_kernels_are_python(tmp_path):
+    script = SCRIPT + "print('numba' in sys.modules)"
+    assert said(tmp_path, jit=False, script=script) == ["1.0", "False"]
+
+
+@kernel
+def tripled(x):
+    return FACTOR * x
+
+
+@kernel
+def summed(values):
+    total = 0.0
+    for value in values:
+        total += tripled(value)
+    return total
+
+
+def test_kernels_call_kernels():
+    assert summed(np.array([1.0, 2.0])) == 9.0
+    assert tripled(2.0) == 6.0
+
+
+def test_what_is_compiled_is_told(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    told = []
+    on_compile.append(told.append)
+    try:
+
+        @kernel
+        def halved(x):
+            return 0.5 * x
+
+        assert halved(3.0) == 1.5
+        assert halved(5.0) == 2.5
+        assert told == ["halved"]
+    finally:
+        on_compile.remove(told.append)
+
+
+@pytest.mark.parametrize("command", [["--help"], ["maps"]])
+def test_commands_that_measure_nothing_do_not_load_the_compiler(command):
+    script = f"""
+import sys, contextlib, io
+from robocov_app.cli import main
+with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+    main({command})
+print("numba" in sys.modules)
+"""
+    assert said(os.environ["NUMBA_CACHE_DIR"], script=script)[-1] == "False"
