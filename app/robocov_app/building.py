@@ -1,4 +1,4 @@
-"""Building the coverage cost of a map: from the user's cache where it is there, else with progress."""
+"""Building the coverage cost of a map, with progress."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from robocov.cost import CoverageCost
-from robocov.files.array_cache import ArrayCache
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
 from robocov_app.progress import progress
 
@@ -57,9 +56,7 @@ def built_cost(
             if update is not None:
                 update(round(100 * done))
 
-        cost = CoverageCost(
-            environment, lattice, progress=tell, cache=ArrayCache.of_user(), geodesics=geodesics
-        )
+        cost = CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
         if update is not None:
             update(100)
     return cost

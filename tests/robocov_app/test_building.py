@@ -37,16 +37,6 @@ def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
     assert "100/100" in capsys.readouterr().err
 
 
-def test_the_users_cache_is_used(monkeypatch, tmp_path):
-    monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path))
-    monkeypatch.setattr(cost_module, "_WORTH_KEEPING", 0.0)
-    built_cost(ROOMS, 32)
-    (entry,) = tmp_path.iterdir()
-    entry.write_bytes(b"damaged")
-    assert built_cost(ROOMS, 32)(PLACE).value == built_cost(ROOMS, 32)(PLACE).value
-    assert entry.stat().st_size > 1000
-
-
 def test_large_maps_are_drawn_as_they_were_measured(monkeypatch):
     coarse = built_cost(ROOMS, 16)
     monkeypatch.setattr(building, "MANY_VERTICES", vertex_count(ROOMS) - 1)

@@ -13,7 +13,6 @@ import numpy as np
 import tyro
 
 from robocov.errors import InputError, ParameterError
-from robocov.files.array_cache import ArrayCache
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
@@ -165,7 +164,6 @@ def _searched(options: Arguments, environment: Environment, robots: int, radius:
             restarts=options.restarts,
             seed=options.seed,
             progress=tell,
-            cache=ArrayCache.of_user(),
         )
 
 

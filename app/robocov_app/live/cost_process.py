@@ -14,7 +14,6 @@ from typing import BinaryIO
 from robocov.cost import CoverageCost
 from robocov.cost.momentary_cost import MomentaryCost
 from robocov.errors import RobocovError
-from robocov.files.array_cache import ArrayCache
 from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of
 from robocov_app.live.own_process import own_streams
@@ -78,9 +77,7 @@ class Process:
         try:
             cost = self._weighed(build)
             if cost is None:
-                cost = CoverageCost(
-                    build.environment, build.lattice, progress=tell, cache=ArrayCache.of_user()
-                )
+                cost = CoverageCost(build.environment, build.lattice, progress=tell)
         except _NewerError:
             return
         except RobocovError as error:

@@ -66,7 +66,7 @@ def _reference(
     if not search:
         return None
     try:
-        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS, cache=cache)
+        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
     except ParameterError:
         return None  # more robots than have room at rest
     reference = Reference(best.mean_distance, best.uncovered_area)

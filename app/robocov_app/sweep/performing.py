@@ -18,7 +18,6 @@ from robocov.controllers import make_controller
 from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
-from robocov.files.array_cache import ArrayCache
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
@@ -148,7 +147,7 @@ def prepared(task: Task) -> tuple[Environment, CoverageCost]:
 @lru_cache(_REMEMBERED)
 def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
     environment = from_json(json.loads(document), name)
-    return environment, CoverageCost(environment, lattice, cache=ArrayCache.of_user())
+    return environment, CoverageCost(environment, lattice)
 
 
 _ONE_AT_A_TIME = threading.Lock()

@@ -5,37 +5,32 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.arrays.grouping import least, weighted_mean
+from robocov.arrays.grouping import weighted_mean
 from robocov.cost.arrivals import Ways, checked_speeds, first_there
-from robocov.cost.corner_views import CornerViews
 from robocov.cost.lattice import Lattice, Number, Sites
-from robocov.cost.robot_views import RobotViews
+from robocov.cost.site_paths import CornerViews, looked_for, site_paths
 from robocov.density.masses import means_over_squares
 from robocov.drawing import drawing_backend
 from robocov.errors import InputError, checked, counted
 from robocov.geodesic import Geodesics
+from robocov.geodesic.corners import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
-    from robocov.files.array_cache import ArrayCache
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
-_CACHED = 1
-"""Version of the tables in the cache; another one whenever they mean something else."""
-
-_WORTH_KEEPING = 0.5
-"""Seconds; what is computed faster is not put into the cache."""
+_BLOCK = 64
+"""Corners that look at the sites between two words of progress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +183,6 @@ class CoverageCost:
     progress : callable
         Called now and then, while what is known before the positions is computed, with the part that is
         done. It may raise, to give up.
-    cache : ArrayCache
-        Where the part of it that takes long is looked for, and kept.
     geodesics : Geodesics
         The shortest paths of this very environment, where another lattice on it has found them already.
 
@@ -229,7 +222,6 @@ class CoverageCost:
         lattice: int = 64,
         *,
         progress: Callable[[float], None] | None = None,
-        cache: ArrayCache | None = None,
         geodesics: Geodesics | None = None,
     ) -> None:
         self.lattice = int(checked("lattice", lattice, 1, MAX_LATTICE, whole=True))
@@ -239,11 +231,10 @@ class CoverageCost:
         self._areas = np.array([part.area for part in environment.free.geoms])
         self._masses = environment.free_masses
         self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
-        self._corner_views = self._looked_up(progress, cache)
+        self.corners = frozen(self.geodesics.corners)
+        self._views = self._corner_views(progress)
         self.sites = self._lattice.sites
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
-        corners = np.column_stack([self.geodesics.corner_x, self.geodesics.corner_y])
-        self.corners = frozen(self.geodesics.walls.grid.metres(corners))
         self.weights = self._weights()
 
     def weighed(self, environment: Environment) -> CoverageCost:
@@ -266,23 +257,19 @@ class CoverageCost:
             return None
         return frozen(means_over_squares(density, self.points, self.spacing))
 
-    def _looked_up(self, progress: Callable[[float], None] | None, cache: ArrayCache | None) -> CornerViews:
-        """Return what the sites see of the corners, from the cache if it is there; this takes the longest."""
-        walls = self.geodesics.walls
-        if cache is None:
-            return CornerViews.looked_for(self.geodesics, self._lattice, progress)
-        origin_x, origin_y = walls.grid.origin.tolist()
-        place = walls.grid.unit, origin_x, origin_y, self.geodesics.size
-        key = cache.key("corner views", _CACHED, walls.free.wkb, *place, self.lattice)
-        tables = cache.load(key)
-        if tables is not None:
-            return CornerViews(self._lattice, tables["corner"], tables["first"], tables["length"])
-        begin = perf_counter()
-        views = CornerViews.looked_for(self.geodesics, self._lattice, progress)
-        if perf_counter() - begin > _WORTH_KEEPING:
-            tables = {"corner": views.corner, "first": views.first, "length": views.length}
-            cache.save(key, tables)
-        return views
+    def _corner_views(self, progress: Callable[[float], None] | None) -> CornerViews:
+        """Return what the corners see of the sites."""
+        scene, tiles, count = self.geodesics.scene, self._lattice.tiles, len(self.corners)
+        pieces = [(np.empty((0, 3), dtype=np.int64), np.empty((0, 2)))]
+        for begin in range(0, count, _BLOCK):
+            if progress is not None:
+                progress(begin / count)
+            pieces.append(looked_for(scene, tiles, begin, min(begin + _BLOCK, count)))
+        rows, lengths = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        order = np.argsort(rows[:, 1], kind="stable")
+        first = np.searchsorted(rows[order, 1], np.arange(len(tiles.first)))
+        corner, _, mask = columns(rows[order])
+        return CornerViews(first, corner, mask, *columns(lengths[order]))
 
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -312,47 +299,7 @@ class CoverageCost:
 
     def _nearest(self, x: Array, y: Array, covered: BoolArray) -> Ways:
         """Return the ways of the nearest of the robots at (x, y), which stand in some of the components."""
-        paths, sites = self.geodesics, self._lattice
-        runs = sites.scanlines.nearest(x, y)
-        owner = runs.robot.repeat(runs.length)
-        dx = sites.x - x[runs.robot].repeat(runs.length)
-        dy = sites.y - y[runs.robot].repeat(runs.length)
-        distance2 = dx * dx + dy * dy
-        # of a run the first or the last site is the farthest
-        reach2 = np.zeros(len(x))
-        for end in (runs.begin, runs.begin + runs.length - 1):
-            np.maximum.at(reach2, runs.robot, distance2[end])
-        robots = RobotViews(paths, x, y, np.sqrt(reach2))
-        hidden = ~robots.see(owner, dx, dy, distance2)
-        distance = np.sqrt(distance2)
-        corner, last_corner = np.full((2, len(owner)), -1, dtype=np.intp)
-        if not covered.all():
-            away = ~covered[sites.component]
-            owner[away], distance[away], hidden[away] = -1, np.inf, False
-
-        place = hidden[sites.by_tile].nonzero()[0]
-        if len(place):
-            site, tile = sites.by_tile[place], sites.tile[place]
-            ways = robots.to_corners()
-            shortest, way = self._corner_views.shortest(tile, sites.slot[place], ways.distance)
-            nearest = owner[site]
-            if len(ways.first):
-                corner[site], last_corner[site], owner[site] = ways.first[way], way, ways.owner[way]
-            # whoever else is nearer than by way of a corner may see the site
-            bound2 = shortest * shortest
-            index, other, dx, dy, distance2 = sites.within(place, bound2, x, y)
-            some = (other != nearest[index]).nonzero()[0]
-            index, other, distance2 = index[some], other[some], distance2[some]
-            seen = robots.see_beyond(other, dx[some], dy[some], distance2).nonzero()[0]
-            index, other = index[seen], other[seen]
-            robot = np.full(len(site), -1, dtype=np.intp)
-            least(index, distance2[seen], bound2, (robot, other))
-            straight = (robot >= 0).nonzero()[0]
-            shortest[straight] = np.sqrt(bound2[straight])
-            distance[site] = shortest
-            site = site[straight]
-            corner[site], last_corner[site], owner[site] = -1, -1, robot[straight]
-        return distance, owner, corner, last_corner
+        return site_paths(self.geodesics.scene, self._lattice.tiles, self._views, x, y, covered)
 
     def _result(
         self, positions: Array, covered: BoolArray, ways: Ways, speeds: Array | None = None

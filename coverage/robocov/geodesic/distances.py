@@ -8,29 +8,202 @@ other holds all that is needed.
 
 from __future__ import annotations
 
-import itertools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import inner_kernel, kernel
 from robocov.environment import GRID
 from robocov.errors import InputError
-from robocov.geodesic.corners import Walls
-from robocov.geodesic.orientation import Grid
-from robocov.geodesic.visibility import Fans, WallIndex
+from robocov.geodesic.corners import Corners, Walls, useful
+from robocov.geodesic.orientation import BITS, Grid
+from robocov.geodesic.visibility import (
+    LEAF,
+    Boxes,
+    Fans,
+    WallTree,
+    along_z_curve,
+    beyond_horizon,
+    boxes_around,
+    fans_of,
+    sees,
+    skipped,
+    wall_tree,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
 
-_CORNER_BINS = 256
-"""Angular bins of a corner, which looks at many targets; other sources have the default."""
+BINS, CORNER_BINS = 64, 256
+"""Angular bins of a source; a corner looks at many targets."""
 
-_PAIRS = 1 << 20
-"""Pairs of corners looked at in one piece, which bounds the memory."""
+_BLOCK = 256
+"""Corners that are looked at between two beats."""
+
+
+class Graph(NamedTuple):
+    """The corners that see each other and can follow each other on a shortest path."""
+
+    first: IntArray
+    """(k + 1,) The links of a corner are those from its own `first` up to the next."""
+    corner: IntArray
+    length: Array
+
+
+class Scene(NamedTuple):
+    """What the kernels know of a map, all in grid steps."""
+
+    tree: WallTree
+    corners: Corners
+    order: IntArray
+    """(k,) The corners, neighbours together, and"""
+    boxes: Boxes
+    """boxes around them."""
+    graph: Graph
+
+
+@inner_kernel
+def seen_corners(scene: Scene, fans: Fans, i: int, least: int, out: IntArray) -> int:
+    """Write the corners from number `least` on in useful view of source i of `fans`; return how many.
+
+    The fan must reach everywhere.
+    """
+    x, y, horizon, boxes = fans.x[i], fans.y[i], fans.horizon[i], scene.boxes
+    corners, leaves, found = scene.corners, len(scene.boxes.low_x) // 2, 0
+    node = 1
+    while node:
+        if boxes.low_x[node] == np.inf or beyond_horizon(boxes, node, x, y, horizon):
+            node = skipped(node)
+            continue
+        if node < leaves:
+            node *= 2
+            continue
+        begin = (node - leaves) * LEAF
+        for k in scene.order[begin : begin + LEAF]:
+            if (
+                k >= least
+                and useful(corners, k, x, y)
+                and sees(scene.tree, fans, i, corners.x[k], corners.y[k])
+            ):
+                out[found] = k
+                found += 1
+        node = skipped(node)
+    return found
+
+
+@kernel
+def corner_links(scene: Scene, begin: int, end: int) -> IntArray:
+    """Return the linked pairs of a corner, from `begin` to `end`, and one of higher number, (p, 2)."""
+    corners, count = scene.corners, len(scene.corners.x)
+    pairs, used = np.empty((16 * (end - begin) + count, 2), dtype=np.int64), 0
+    seen = np.empty(count, dtype=np.int64)
+    reach = np.full(1, np.inf)
+    for i in range(begin, end):
+        fans = fans_of(scene.tree, corners.x[i : i + 1], corners.y[i : i + 1], reach, CORNER_BINS)
+        for k in seen[: seen_corners(scene, fans, 0, i + 1, seen)]:
+            # each of the two must be useful to the other
+            if useful(corners, i, corners.x[k], corners.y[k]):
+                if used == len(pairs):
+                    more = np.empty((2 * used, 2), dtype=np.int64)
+                    more[:used] = pairs
+                    pairs = more
+                pairs[used, 0], pairs[used, 1] = i, k
+                used += 1
+    return pairs[:used]
+
+
+@kernel
+def relax(graph: Graph, distance: Array, before: IntArray) -> None:
+    """Lower the distances of the corners from the sources to those by way of other corners.
+
+    Parameters
+    ----------
+    graph : Graph
+    distance : (k,) grid steps
+        In direct view; inf where there is none. Changed.
+    before : (k,)
+        Written where a distance is lowered: the corner before on the shortest path.
+    """
+    count = len(distance)
+    waiting = distance < np.inf
+    queue = np.empty(count + 1, dtype=np.int64)
+    head, tail = 0, 0
+    for k in np.argsort(distance):
+        if waiting[k]:
+            queue[tail] = k
+            tail += 1
+    while head != tail:
+        k = queue[head]
+        head = (head + 1) % (count + 1)
+        waiting[k] = False
+        for link in range(graph.first[k], graph.first[k + 1]):
+            other, total = graph.corner[link], distance[k] + graph.length[link]
+            if total < distance[other]:
+                distance[other], before[other] = total, k
+                if not waiting[other]:
+                    waiting[other] = True
+                    queue[tail] = other
+                    tail = (tail + 1) % (count + 1)
+
+
+@kernel
+def corner_reach(scene: Scene, fans: Fans, i: int) -> Array:
+    """Return the distance of source i of `fans` to the corners in useful view, (k,), inf to the others."""
+    corners = scene.corners
+    reach = np.full(len(corners.x), np.inf)
+    seen = np.empty(len(corners.x), dtype=np.int64)
+    for k in seen[: seen_corners(scene, fans, i, 0, seen)]:
+        dx, dy = corners.x[k] - fans.x[i], corners.y[k] - fans.y[i]
+        reach[k] = np.sqrt(dx * dx + dy * dy)
+    return reach
+
+
+@kernel
+def distance_table(scene: Scene, px: Array, py: Array, qx: Array, qy: Array) -> Array:
+    """Return the distances of (n,) sources and (m,) targets, (n, m), inf where no way leads."""
+    fans = fans_of(scene.tree, px, py, np.full(len(px), np.inf), BINS)
+    n, m, count = len(px), len(qx), len(scene.corners.x)
+    last, before = np.empty((m, count)), np.empty(count, dtype=np.int64)
+    for j in range(m):
+        target = fans_of(scene.tree, qx[j : j + 1], qy[j : j + 1], np.full(1, np.inf), BINS)
+        last[j] = corner_reach(scene, target, 0)
+    table = np.empty((n, m))
+    for i in range(n):
+        reach = corner_reach(scene, fans, i)
+        relax(scene.graph, reach, before)
+        for j in range(m):
+            best = np.inf
+            if sees(scene.tree, fans, i, qx[j], qy[j]):
+                dx, dy = qx[j] - px[i], qy[j] - py[i]
+                best = np.sqrt(dx * dx + dy * dy)
+            for k in range(count):
+                best = min(best, reach[k] + last[j, k])
+            table[i, j] = best
+    return table
+
+
+@kernel
+def corners_between(scene: Scene, x: Array, y: Array) -> tuple[bool, IntArray]:
+    """Return whether a way leads from the first of two points to the second, and where it bends."""
+    fans = fans_of(scene.tree, x, y, np.full(2, np.inf), BINS)
+    if sees(scene.tree, fans, 0, x[1], y[1]):
+        return True, np.empty(0, dtype=np.int64)
+    distance, before = corner_reach(scene, fans, 0), np.full(len(scene.corners.x), -1)
+    relax(scene.graph, distance, before)
+    total = distance + corner_reach(scene, fans, 1)
+    if not np.any(total < np.inf):
+        return False, np.empty(0, dtype=np.int64)
+    chain, length = np.empty(len(total), dtype=np.int64), 0
+    k = np.argmin(total)
+    while k >= 0:
+        chain[length] = k
+        length += 1
+        k = before[k]
+    return True, chain[:length][::-1].copy()
 
 
 class Geodesics:
@@ -46,15 +219,12 @@ class Geodesics:
     ----------
     walls : Walls
         Vertices, edges and corners, in grid coordinates.
-    index : WallIndex
-        The edges for `Fans`.
-    corner_fans : Fans
-        The views of the corners.
+    scene : Scene
+        The same for kernels.
     size : float, m
         Side of the square over the region's bounding box.
-    graph_row, graph_column : (g,)
-        Pairs of corners that see each other and can follow each other on a shortest path, sorted.
-    graph_length : (g,) grid steps
+    corners : (k, 2) m
+        The corners.
     """
 
     def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:
@@ -63,39 +233,26 @@ class Geodesics:
         self._name = environment.name
         self.walls = Walls.of(environment.free, Grid.over(np.array([low_x, low_y]), self.size))
         shapely.prepare(list(self.walls.free.geoms))
-        self.corner_x, self.corner_y = self.walls.corner_x, self.walls.corner_y
-        self.index = WallIndex(self.walls)
-        everywhere = np.full(len(self.corner_x), np.inf)
-        self.corner_fans = Fans(self.index, self.corner_x, self.corner_y, everywhere, _CORNER_BINS)
-        self._link(beat)
-
-    def _link(self, beat: Callable[[], None] | None) -> None:
-        """Build the graph of the corners."""
-        count = len(self.corner_x)
-        corner = np.arange(count)
-        pieces = [(np.empty(0, np.intp), np.empty(0, np.intp))]
-        block = max(1, _PAIRS // max(1, count))
-        for begin in range(0, count, block):
+        corners = self.walls.corners
+        x, y = corners.x, corners.y
+        self.corners = self.walls.grid.metres(np.column_stack([x, y]))
+        key = along_z_curve(*((part * 2.0 ** (16 - BITS)).clip(0, 65535).astype(np.int64) for part in (x, y)))
+        order = np.argsort(key, kind="stable")
+        boxes = boxes_around(x[order], y[order], x[order], y[order])
+        nothing = np.empty(0, dtype=np.int64)
+        graph = Graph(nothing, nothing, np.empty(0))
+        self.scene = Scene(wall_tree(self.walls, 2.0**BITS), corners, order, boxes, graph)
+        pieces = [np.empty((0, 2), dtype=np.int64)]
+        for begin in range(0, len(x), _BLOCK):
             if beat is not None:
                 beat()
-            # each of the two must be useful to the other
-            some = corner[begin : begin + block, None]
-            good = self.walls.useful(some, self.corner_x, self.corner_y) & (some < corner)
-            good &= self.walls.useful(corner, self.corner_x[some], self.corner_y[some])
-            row, column = good.nonzero()
-            row += begin
-            seen = self.corner_fans.see(row, self.corner_x[column], self.corner_y[column])
-            pieces.append((row[seen], column[seen]))
-        row, column = (np.concatenate([piece[k] for piece in pieces]) for k in (0, 1))
-        row, column = np.concatenate([row, column]), np.concatenate([column, row])
-        order = np.lexsort((column, row))
-        self.graph_row, self.graph_column = row[order], column[order]
-        self.graph_length = np.hypot(
-            self.corner_x[self.graph_row] - self.corner_x[self.graph_column],
-            self.corner_y[self.graph_row] - self.corner_y[self.graph_column],
-        )
-        # corners without links have no place in reduceat
-        self._linked, self._linked_first = np.unique(self.graph_row, return_index=True)
+            pieces.append(corner_links(self.scene, begin, min(begin + _BLOCK, len(x))))
+        links = np.concatenate(pieces)
+        links = np.concatenate([links, links[:, ::-1]])
+        one, other = links[np.lexsort((links[:, 1], links[:, 0]))].T
+        first = np.searchsorted(one, np.arange(len(x) + 1))
+        length = np.sqrt((x[one] - x[other]) ** 2 + (y[one] - y[other]) ** 2)
+        self.scene = self.scene._replace(graph=Graph(first, other.copy(), length))
 
     def place(self, points: Array, what: str = "positions") -> tuple[Array, Array, BoolArray]:
         """Return points in grid coordinates, those a hair outside the free space moved into it.
@@ -155,78 +312,8 @@ class Geodesics:
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         around = around[self._holds(around).any(axis=1)]
         if not len(around):
-            around = np.column_stack([self.walls.x, self.walls.y])
+            around = np.column_stack([self.walls.sectors.x, self.walls.sectors.y])
         return np.asarray(around[np.hypot(*(around - point).T).argmin()])
-
-    def see(self, fans: Fans, vertex: IntArray, source: IntArray, x: Array, y: Array) -> BoolArray:
-        """Return for (m,) pairs of a source and a target whether the source sees the target.
-
-        `vertex` (n,) is the vertex that each source coincides with, -1 for none.
-        """
-        dx, dy = x - fans.x[source], y - fans.y[source]
-        return self.see_along(fans, vertex, source, dx, dy, dx * dx + dy * dy)
-
-    def see_along(
-        self, fans: Fans, vertex: IntArray, source: IntArray, dx: Array, dy: Array, distance2: Array
-    ) -> BoolArray:
-        """Return the same for targets at (dx, dy) from their sources, and the square of that distance."""
-        seen = fans.see_along(source, dx, dy, distance2)
-        for i in np.nonzero(vertex >= 0)[0]:
-            pairs = np.nonzero(source == i)[0]
-            seen[pairs] &= self.walls.sectors_hold(int(vertex[i]), dx[pairs], dy[pairs])
-        return seen
-
-    def relax(self, reach: Array, sweeps: int | None = None) -> Array:
-        """Return the distance of every corner from the sources, given that by direct view.
-
-        After a limited number of sweeps, which is a bound, paths may bend at as many corners more.
-
-        Parameters
-        ----------
-        reach : (..., k) grid steps
-            Distance to the sources in direct view; inf where there is none.
-
-        Returns
-        -------
-        (..., k) grid steps
-        """
-        if not len(self._linked):
-            return reach
-        for _ in itertools.count() if sweeps is None else range(sweeps):
-            by_way_of = reach.take(self.graph_column, axis=-1) + self.graph_length
-            shorter = np.minimum.reduceat(by_way_of, self._linked_first, axis=-1)
-            former = reach.take(self._linked, axis=-1)
-            if not (shorter < former).any():
-                break
-            reach = reach.copy()
-            reach[..., self._linked] = np.minimum(former, shorter)
-        return reach
-
-    def previous(self, distance: Array, reach: Array) -> IntArray:
-        """Return for every corner the one before it on its shortest path, -1 where that is the source.
-
-        `distance` (k,) is ``relax(reach)``. Of equally short ways the direct one, then that by the
-        corner of lowest index.
-        """
-        before = np.full(len(distance), -1, dtype=np.intp)
-        by_way_of = distance[self.graph_column] + self.graph_length
-        hit = np.nonzero((by_way_of == distance[self.graph_row]) & np.isfinite(by_way_of))[0][::-1]
-        before[self.graph_row[hit]] = self.graph_column[hit]
-        before[reach <= distance] = -1
-        return before
-
-    def _views(self, x: Array, y: Array) -> tuple[Fans, IntArray, Array]:
-        """Return fans and vertices of (n,) points, and their (n, k) distances to useful corners in view."""
-        fans, vertex = Fans(self.index, x, y, np.full(len(x), np.inf)), self.walls.vertex_at(x, y)
-        count = len(self.corner_x)
-        source, corner = np.indices((len(x), count)).reshape(2, -1)
-        good = self.walls.useful(corner, x[source], y[source])
-        source, corner = source[good], corner[good]
-        good = self.see(fans, vertex, source, self.corner_x[corner], self.corner_y[corner])
-        source, corner = source[good], corner[good]
-        reach = np.full((len(x), count), np.inf)
-        reach[source, corner] = np.hypot(self.corner_x[corner] - x[source], self.corner_y[corner] - y[source])
-        return fans, vertex, reach
 
     def distances(self, sources: Array, targets: Array) -> Array:
         """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads.
@@ -238,17 +325,7 @@ class Geodesics:
         """
         px, py, _ = self.place(sources, "sources")
         qx, qy, _ = self.place(targets, "targets")
-        fans, vertex, reach = self._views(px, py)
-        _, _, last = self._views(qx, qy)
-        reach = self.relax(reach)
-        distance = np.full((len(px), len(qx)), np.inf)
-        for k in range(len(self.corner_x)):
-            np.minimum(distance, reach[:, k, None] + last[:, k], out=distance)
-        source, target = np.indices(distance.shape).reshape(2, -1)
-        straight = np.hypot(qx[target] - px[source], qy[target] - py[source])
-        seen = self.see(fans, vertex, source, qx[target], qy[target])
-        distance = np.minimum(distance, np.where(seen, straight, np.inf).reshape(distance.shape))
-        return np.asarray(distance * self.walls.grid.unit)
+        return np.asarray(distance_table(self.scene, px, py, qx, qy) * self.walls.grid.unit)
 
     def path(self, source: Array, target: Array) -> Array:
         """Return the way-points of a shortest path, (w, 2) m, both ends included; (0, 2) where none leads.
@@ -259,20 +336,8 @@ class Geodesics:
             When an end lies outside the free space.
         """
         x, y, _ = self.place(np.stack([source, target]), "ends of the path")
-        fans, vertex, views = self._views(x, y)
-        straight = self.see(fans, vertex, np.zeros(1, dtype=np.intp), x[1:], y[1:])[0]
-        corners: list[int] = []
-        if not straight:
-            distance = self.relax(views[0])
-            total = distance + views[1]
-            if not np.isfinite(total).any():
-                return np.empty((0, 2))
-            before = self.previous(distance, views[0])
-            corner = int(total.argmin())
-            while corner >= 0:
-                corners.insert(0, corner)
-                corner = int(before[corner])
-        way = np.column_stack(
-            [np.r_[x[0], self.corner_x[corners], x[1]], np.r_[y[0], self.corner_y[corners], y[1]]]
-        )
-        return self.walls.grid.metres(way)
+        reached, bends = corners_between(self.scene, x, y)
+        if not reached:
+            return np.empty((0, 2))
+        ends = self.walls.grid.metres(np.column_stack([x, y]))
+        return np.concatenate([ends[:1], self.corners[bends], ends[1:]])

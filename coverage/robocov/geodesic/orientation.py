@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array
+from robocov.compiled import inlined_kernel, kernel
 
 BITS = 48
 """The square that holds the map is 2**48 grid steps wide: 4e-15 of its side, below a double's rounding
@@ -15,9 +16,6 @@ for a map that does not start at zero, yet few enough that `cross` can be exact.
 
 _DOUBT = 2.0**48
 """More than the roundings of a cross product of two differences, whose products are below 2**98."""
-
-_LIMB = 24
-_MASK = (1 << _LIMB) - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,34 +47,28 @@ class Grid:
         return np.asarray(points * self.unit + self.origin)
 
 
-def cross(ux: Array, uy: Array, vx: Array, vy: Array) -> Array:
-    """Return ``ux vy - uy vx`` with its exact sign; the four broadcast against each other.
+@inlined_kernel
+def cross(ux: float, uy: float, vx: float, vy: float) -> float:
+    """Return ``ux vy - uy vx`` with its exact sign.
 
     Positive where v points to the left of u. The value is rounded as usual; the sign is right for
     whole numbers of magnitude up to 2**49, which differences of grid coordinates are.
 
-    >>> big = np.array([2.0**40 + 1])
+    >>> big = 2.0**40 + 1
     >>> cross(big, big - 1, big + 1, big)  # naive floats give 0
-    array([1.])
+    1.0
     """
     value = ux * vy - uy * vx
-    size = np.abs(value)
-    if np.minimum.reduce(size, axis=None, initial=np.inf) < _DOUBT:
-        at = (size < _DOUBT).nonzero()
-        value[at] = _exact_cross(*(part[at] for part in np.broadcast_arrays(ux, uy, vx, vy)))
+    if abs(value) < _DOUBT:
+        # integers wrap around at 2**64, so that a small difference of large products comes out right
+        value = float(int(ux) * int(vy) - int(uy) * int(vx))
     return value
 
 
-def _exact_cross(ux: Array, uy: Array, vx: Array, vy: Array) -> Array:
-    """Return the cross product in three limbs of 24 bits, then as floats."""
-    (ux1, ux0), (uy1, uy0), (vx1, vx0), (vy1, vy0) = (_limbs(part) for part in (ux, uy, vx, vy))
-    low = ux0 * vy0 - uy0 * vx0
-    middle = ux1 * vy0 + ux0 * vy1 - uy1 * vx0 - uy0 * vx1 + (low >> _LIMB)
-    high = ux1 * vy1 - uy1 * vx1 + (middle >> _LIMB)
-    rest = ((middle & _MASK) << _LIMB) + (low & _MASK)
-    return np.asarray(high * 2.0 ** (2 * _LIMB) + rest)
-
-
-def _limbs(values: Array) -> tuple[IntArray, IntArray]:
-    whole = values.astype(np.int64)
-    return whole >> _LIMB, whole & _MASK
+@kernel
+def crosses(u: Array, v: Array) -> Array:
+    """Return the cross products of (n, 2) vectors."""
+    values = np.empty(len(u))
+    for i in range(len(u)):
+        values[i] = cross(u[i, 0], u[i, 1], v[i, 0], v[i, 1])
+    return values

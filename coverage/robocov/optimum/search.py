@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     from robocov.cost import CoverageResult
     from robocov.environment import Environment
-    from robocov.files.array_cache import ArrayCache
 
 MOST_ROBOTS = 500
 
@@ -108,7 +107,6 @@ def optimum(
     restarts: int = 24,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
-    cache: ArrayCache | None = None,
 ) -> Optimum:
     """Return the best positions for a team on a map that is known.
 
@@ -131,8 +129,6 @@ def optimum(
     seed : int
     progress : callable
         Called now and then with the part that is done. It may raise, to give up.
-    cache : ArrayCache
-        As of `CoverageCost`.
 
     Raises
     ------
@@ -152,7 +148,7 @@ def optimum(
     if not (isinstance(radius, (int, float, np.floating)) and 0.0 < radius < math.inf):
         raise ParameterError(f"radius: {shown(radius)} m, but a number above 0 was wanted")
     tell = progress or (lambda part: None)
-    cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT * part), cache=cache)
+    cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT * part))
     search = _Search(environment, cost, robots, float(radius))
     tell(_TABLED)
 

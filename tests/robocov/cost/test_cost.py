@@ -9,13 +9,9 @@ from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, box, environment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.cost import CoverageCost, corner_views, robot_views
-from robocov.cost import coverage as cost_module
-from robocov.cost.corner_views import CornerViews
+from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import InputError, ParameterError
-from robocov.files.array_cache import ArrayCache
-from robocov.geodesic import distances, visibility
 
 
 @pytest.mark.parametrize(
@@ -98,15 +94,8 @@ def test_a_room_too_small_for_a_site_has_no_mean():
     assert result.gradient.tolist() == [[0.0, 0.0]]
 
 
-@pytest.mark.parametrize("few", [0, 1 << 13])
 @pytest.mark.parametrize("n", [1, 2, 7, 40])
-def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n, few, monkeypatch):
-    # the walls in reach first, or all at once; everything in one piece, or in many
-    monkeypatch.setattr(robot_views, "_FEW", few)
-    if not few:
-        for module in (visibility, corner_views, distances, robot_views):
-            monkeypatch.setattr(module, "_PAIRS", 100)
-        monkeypatch.setattr(visibility, "_REST", 0)
+def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n):
     cost = CoverageCost(OFFICE, lattice=24)
     robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
     result = cost(robots)
@@ -229,35 +218,6 @@ def test_building_tells_how_far_it_is_and_can_be_given_up():
 
     with pytest.raises(UnwantedError):
         CoverageCost(OFFICE, lattice=64, progress=refuse)
-
-
-def test_the_cache_changes_nothing_but_the_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(cost_module, "_WORTH_KEEPING", 0.0)
-    positions = [[1.0, 1.0], [8.0, 4.0], [5.0, 6.8]]
-    cache = ArrayCache(tmp_path)
-    fresh = CoverageCost(OFFICE, 48, cache=cache)
-    assert len(list(tmp_path.iterdir())) == 1
-
-    def never(*args):
-        raise AssertionError
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CornerViews, "looked_for", never)
-        kept = CoverageCost(OFFICE, 48, cache=cache)
-        # whatever the result depends on makes another entry
-        moved = Environment("office", tuple((x + 1.0, y) for x, y in OFFICE.boundary), OFFICE.obstacles)
-        for other, lattice in ((OFFICE, 47), (PILLAR, 48), (moved, 48)):
-            with pytest.raises(AssertionError):
-                CoverageCost(other, lattice, cache=cache)
-    one, two = fresh(positions), kept(positions)
-    for name in ("distances", "owner", "corner", "gradient"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
-    assert one.value == two.value
-
-
-def test_quick_builds_are_not_kept(tmp_path):
-    CoverageCost(PILLAR, 8, cache=ArrayCache(tmp_path))
-    assert not list(tmp_path.iterdir())
 
 
 def test_sealed_rooms_without_a_corner():

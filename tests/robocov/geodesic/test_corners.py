@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.geodesic.corners import Walls
+from robocov.geodesic.corners import Walls, useful, vertex_at
 from robocov.geodesic.orientation import Grid
 
 SIZE = 8.0
@@ -28,38 +28,38 @@ def places(x, y):
 
 def test_an_empty_square_has_neither_corners_nor_walls_that_hide():
     empty = walls()
-    assert len(empty.corner_x) == 0
+    assert len(empty.corners.x) == 0
     assert len(empty.start) == 0
-    assert len(empty.sector_vertex) == 4
+    assert len(empty.sectors.wide) == 4
 
 
 def test_corners_are_where_free_space_turns_round_an_obstacle():
     pillar = walls(box(3, 3, 5, 5))
-    assert places(pillar.corner_x, pillar.corner_y) == [(3, 3), (3, 5), (5, 3), (5, 5)]
+    assert places(pillar.corners.x, pillar.corners.y) == [(3, 3), (3, 5), (5, 3), (5, 5)]
     assert len(pillar.start) == 4
     room = walls(boundary=((0, 0), (8, 0), (8, 4), (4, 4), (4, 8), (0, 8)))
-    assert places(room.corner_x, room.corner_y) == [(4, 4)]
+    assert places(room.corners.x, room.corners.y) == [(4, 4)]
     assert len(room.start) == 2
 
 
 def test_vertices_in_line_are_no_corners():
     pillar = walls(((3, 3), (4, 3), (5, 3), (5, 5), (3, 5)))
-    assert places(pillar.corner_x, pillar.corner_y) == [(3, 3), (3, 5), (5, 3), (5, 5)]
+    assert places(pillar.corners.x, pillar.corners.y) == [(3, 3), (3, 5), (5, 3), (5, 5)]
 
 
 @pytest.mark.parametrize("touching", [box(5, 5, 7, 7), ((5, 5), (7, 5), (6, 7))])
 def test_a_pinch_has_two_narrow_sectors_and_no_corner(touching):
     pinch = walls(box(3, 3, 5, 5), touching)
-    at = pinch.vertex_at(np.array([5.0 / 8]) * 2.0**48, np.array([5.0 / 8]) * 2.0**48)[0]
-    sectors = pinch.sector_vertex == at
-    assert sectors.sum() == 2
-    assert (5.0, 5.0) not in places(pinch.corner_x, pinch.corner_y)
-    assert not pinch.sector_wide[sectors].any()
+    at = vertex_at(pinch.sectors, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
+    sectors = slice(*pinch.sectors.first[at : at + 2])
+    assert len(pinch.sectors.wide[sectors]) == 2
+    assert (5.0, 5.0) not in places(pinch.corners.x, pinch.corners.y)
+    assert not pinch.sectors.wide[sectors].any()
 
 
 def test_a_straight_wall_past_a_pinch_is_a_corner():
     line = walls(((1, 1), (3, 1), (2, 3)), box(3, 1, 6, 4))
-    assert (3.0, 1.0) in places(line.corner_x, line.corner_y)
+    assert (3.0, 1.0) in places(line.corners.x, line.corners.y)
 
 
 def test_useful_points_of_a_corner_are_those_beside_its_walls():
@@ -78,12 +78,13 @@ def test_useful_points_of_a_corner_are_those_beside_its_walls():
         (4.001, 6): False,
     }
     x, y = (np.array(list(points)) / SIZE * 2.0**48).T
-    assert room.useful(np.zeros(len(x), dtype=np.intp), x, y).tolist() == list(points.values())
+    found = [useful(room.corners, 0, *point) for point in zip(x, y, strict=True)]
+    assert found == list(points.values())
 
 
 def test_vertices_are_found_by_their_place():
     pillar = walls(box(3, 3, 5, 5))
-    vertices = np.arange(len(pillar.x))
-    np.testing.assert_array_equal(pillar.vertex_at(pillar.x, pillar.y), vertices)
-    np.testing.assert_array_equal(pillar.vertex_at(pillar.x + 1, pillar.y), -1)
-    np.testing.assert_array_equal(pillar.vertex_at(pillar.x, pillar.y - 1), -1)
+    sectors = pillar.sectors
+    for number, (x, y) in enumerate(zip(sectors.x, sectors.y, strict=True)):
+        assert vertex_at(sectors, x, y) == number
+        assert vertex_at(sectors, x + 1, y) == vertex_at(sectors, x, y - 1) == -1

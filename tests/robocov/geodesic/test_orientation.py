@@ -15,7 +15,7 @@ whole = st.integers(-(2**49), 2**49)
 def test_the_side_of_a_line_is_exact(ux, uy, near_x, near_y, multiple, wx, wy):
     pairs = [(ux // 5 * multiple + near_x, uy // 5 * multiple + near_y), (wx, wy)]
     for vx, vy in pairs:
-        value = cross(*(np.array([float(c)]) for c in (ux, uy, vx, vy)))[0]
+        value = cross(*map(float, (ux, uy, vx, vy)))
         exact = ux * vy - uy * vx
         assert np.sign(value) == (exact > 0) - (exact < 0)
         assert value == pytest.approx(exact, rel=1e-12, abs=2.0**50)
