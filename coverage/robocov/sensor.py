@@ -44,28 +44,30 @@ class RangeSensor:
         # an empty step builds the static index; queries never change the space
         self._space.step(1e-9)
         self._movers = [(added_mover(self._space, mover), mover.path) for mover in movers]
-        self._wrecks: dict[tuple[float, float, float], pymunk.Circle] = {}
+        self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
         self._direct = _DirectQueries.of(self._space)
 
-    def show(self, time: float, wrecks: Array | None = None) -> None:
+    def show(self, time: float, failed_robots: Array | None = None) -> None:
         """Let all that is asked from now on be of a time, s, with robots that failed among the obstacles.
 
         Parameters
         ----------
         time : float, s
-        wrecks : (w, 3) m or None
+        failed_robots : (w, 3) m or None
             x, y and radius of each.
         """
         for body, path in self._movers:
             body.position = tuple(path.shift(time).tolist())
             self._space.reindex_shapes_for_body(body)
-        wanted = {(x, y, radius) for x, y, radius in ([] if wrecks is None else wrecks.tolist())}
-        for gone in self._wrecks.keys() - wanted:
-            self._space.remove(self._wrecks.pop(gone))
-        for x, y, radius in sorted(wanted - self._wrecks.keys()):
+        wanted = {
+            (x, y, radius) for x, y, radius in ([] if failed_robots is None else failed_robots.tolist())
+        }
+        for gone in self._failed_robots.keys() - wanted:
+            self._space.remove(self._failed_robots.pop(gone))
+        for x, y, radius in sorted(wanted - self._failed_robots.keys()):
             disc = pymunk.Circle(self._space.static_body, radius, (x, y))
             self._space.add(disc)
-            self._wrecks[x, y, radius] = disc
+            self._failed_robots[x, y, radius] = disc
 
     def nearest(self, positions: Array, ranges: Array) -> Array:
         """Return the closest solid point of each robot within its range.

@@ -128,7 +128,7 @@ class Simulation:
         self._inbox = None if self._perception is None else self._perception.begin()
         self._began = time
         self._steps = 0
-        self._law = self._asked(lambda: informed(controller, environment.standing))
+        self._law = self._asked(lambda: informed(controller, environment.static))
         self._memory = self._asked(lambda: self._law.begin(environment.region, self.team))
         self._scanning: Scanning | None = self._asked(lambda: getattr(controller, "scanning", None))
         if not isinstance(self._scanning, Scanning | None):
@@ -160,8 +160,8 @@ class Simulation:
     @property
     def sensor(self) -> RangeSensor:
         """The range sensor of the robots, for ray scans of the present."""
-        wrecks = self._world.wrecks if isinstance(self._world, ChangingWorld) else None
-        self._sensor.show(self.time, wrecks)
+        failed_robots = self._world.failed_robots if isinstance(self._world, ChangingWorld) else None
+        self._sensor.show(self.time, failed_robots)
         return self._sensor
 
     @property
@@ -257,12 +257,12 @@ class Simulation:
         hit.setflags(write=False)
         return Scans(distances, hit)
 
-    def step(self, pushes: Array | None = None, *, forces: Array | None = None) -> None:
+    def step(self, external_forces: Array | None = None, *, forces: Array | None = None) -> None:
         """Make one control step.
 
         Parameters
         ----------
-        pushes : (n, 2) N or None
+        external_forces : (n, 2) N or None
             Forces from outside, as by a hand, beside the controller's; see `World.step`. A record does
             not know of them.
         forces : (n, 2) N or None
@@ -271,14 +271,17 @@ class Simulation:
         Raises
         ------
         ParameterError
-            When the controller returns anything but finite forces of shape (n, 2), or the pushes or
+            When the controller returns anything but finite forces of shape (n, 2), or the external
             forces are not.
         """
         count = len(self.team)
-        pushes, forces = given_forces(pushes, count, "pushes"), given_forces(forces, count, "forces")
+        external_forces, forces = (
+            given_forces(external_forces, count, "external_forces"),
+            given_forces(forces, count, "forces"),
+        )
         decision = self.snapshot.decision
         forces = decision.forces if forces is None else forces
-        self._world.step(forces, self.dt, pushes, time=self.time)
+        self._world.step(forces, self.dt, external_forces, time=self.time)
         self._memory, self._inbox = decision.memory, self._received
         self._steps += 1
         self._snapshot = None
@@ -334,7 +337,7 @@ class Simulation:
         twin._snapshot = None  # it holds the memory that the step after it will hand on
         return twin
 
-    def weighed(self, environment: Environment) -> Simulation:
+    def with_density(self, environment: Environment) -> Simulation:
         """Return a simulation that goes on from here by another density; this one stays as it is.
 
         Parameters
@@ -344,7 +347,7 @@ class Simulation:
         """
         twin = self.copy()
         twin.environment = environment
-        twin._law = twin._asked(lambda: informed(twin.controller, environment.standing))
+        twin._law = twin._asked(lambda: informed(twin.controller, environment.static))
         return twin
 
     def remembering(self, memory: Any, inbox: Inbox | None = None) -> Simulation:

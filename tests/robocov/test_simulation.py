@@ -407,9 +407,9 @@ class TestChanges:
             before.changed(team=Team.homogeneous(3))
         with pytest.raises(StartError, match=r"velocities: .* were wanted"):
             before.changed(velocities=np.full((6, 2), np.nan))
-        with pytest.raises(ParameterError, match=r"pushes of shape \(2, 2\)"):
+        with pytest.raises(ParameterError, match=r"external_forces of shape \(2, 2\)"):
             before.step(np.zeros((2, 2)))
-        with pytest.raises(ParameterError, match=r"pushes: .* finite newtons"):
+        with pytest.raises(ParameterError, match=r"external_forces: .* finite newtons"):
             before.step(np.full((6, 2), np.inf))
 
     def test_pushed_robots_move_and_the_others_do_not_notice_by_force(self) -> None:

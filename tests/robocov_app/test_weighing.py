@@ -21,7 +21,7 @@ from robocov_app.report.embedding import embedded_map
 from robocov_app.weighing import density_kind, weighed_lines
 
 PLAIN = Environment("plain", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)))
-HEAVY = PLAIN.weighed(Gaussians((Gaussian((5.0, 5.0), 4.0, sigma=1.0),), 0.5))
+HEAVY = PLAIN.with_density(Gaussians((Gaussian((5.0, 5.0), 4.0, sigma=1.0),), 0.5))
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def told(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_the_line() -> None:
-    assert list(weighed_lines(PLAIN)) == list(weighed_lines(PLAIN.weighed(Uniform(2.0)))) == []
+    assert list(weighed_lines(PLAIN)) == list(weighed_lines(PLAIN.with_density(Uniform(2.0)))) == []
     assert list(weighed_lines(HEAVY)) == ["weighed by φ    gaussians, 0.5 to 4.5"]
     assert density_kind(PLAIN) is None and density_kind(HEAVY) == "gaussians"
 
@@ -109,7 +109,7 @@ def test_a_report_shows_and_tells_it(maps, capsys, tmp_path) -> None:
 
 
 def test_the_picture_in_pages() -> None:
-    assert density_picture(PLAIN) == density_picture(PLAIN.weighed(Uniform(2.0))) == ""
+    assert density_picture(PLAIN) == density_picture(PLAIN.with_density(Uniform(2.0))) == ""
     assert "density" not in embedded_map(PLAIN)
     address = embedded_map(HEAVY)["density"]
     head, _, data = address.partition(",")

@@ -161,7 +161,7 @@ class Brush(Base):
         self._dirty = True
 
     def _painted(self, session: Session) -> Environment:
-        return session.environment.weighed(Raster(np.round(self._values, _DECIMALS), self._extent))
+        return session.environment.with_density(Raster(np.round(self._values, _DECIMALS), self._extent))
 
     def _show(self, session: Session) -> None:
         """Let the robots know of it."""

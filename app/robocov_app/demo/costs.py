@@ -122,7 +122,7 @@ class DirectCosts:
         self.known, self.state, self._asked = {}, "", {}
         self._cost = self._momentary = None
         if before is not None and before.environment.same_place(environment):
-            self._cost = before.weighed(environment)
+            self._cost = before.with_density(environment)
         else:
             try:
                 self._cost = CoverageCost(environment, self._lattice)

@@ -175,7 +175,7 @@ class Lane:
         # the same controller goes on remembering
         controller = None if circumstances.law == self.law else circumstances.law.made()
         if self._only_weighed(wanted):
-            return old.weighed(environment)
+            return old.with_density(environment)
         changed = _fitted(
             lambda positions, velocities: old.changed(
                 environment=environment,

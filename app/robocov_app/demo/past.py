@@ -63,7 +63,7 @@ class _Explaining:
         self._by_time = circumstances.law.gains.get("cells") == "time" and self._team.mixed_speeds
         self._controller: Controller | None = None
         with suppress(ParameterError):  # what a saved run was made with may be gone
-            self._controller = informed(circumstances.law.made(), circumstances.solid.standing)
+            self._controller = informed(circumstances.law.made(), circumstances.solid.static)
 
     def snapshot(self, state: State, time: float) -> Snapshot:
         self._sensor.show(time)

@@ -293,7 +293,7 @@ def _memories_of(record: Record, law: Law) -> list[Any]:
         return nothing
     found: list[Any] = []
     try:
-        controller = informed(controller, record.environment.standing)
+        controller = informed(controller, record.environment.static)
         memory = controller.begin(record.environment.region, record.team)
         for k in range(len(record)):
             found.append(deepcopy(memory))

@@ -158,7 +158,7 @@ class Session(Touches):
         """Let the map as it is now have the density of another one, and be that one if they are alike."""
         now = self.environment
         if not environment.same_place(now) or environment.starts != now.starts:
-            environment = now.weighed(environment.density)
+            environment = now.with_density(environment.density)
         self._change_all(lambda lane: Wanted(replace(lane.circumstances, environment=environment)))
         self.scenario = replace(self.scenario, environment=environment)
 

@@ -103,7 +103,7 @@ class Process:
         cost, environment = self._cost, build.environment
         if cost is None or cost.lattice != build.lattice or not cost.environment.same_place(environment):
             return None
-        return cost.weighed(environment)
+        return cost.with_density(environment)
 
     def _answer(self) -> None:
         """Answer the newest question, if there is one and a map for it."""

@@ -101,7 +101,7 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
     low_x, low_y, high_x, high_y = environment.region.bounds
     extent = max(high_x - low_x, high_y - low_y)
     unit = 10.0 ** min(-3, math.floor(math.log10(extent)) - 3)
-    blocked = environment.standing.blocked
+    blocked = environment.static.blocked
     if shapely.get_num_coordinates(blocked) > _VERTICES:
         blocked = shapely.simplify(blocked, extent / 2000)
     parts = [part for part in shapely.get_parts(blocked) if not part.is_empty]

@@ -93,7 +93,7 @@ class Selection(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None or scene.selected is None:
             return
-        if scene.snapshot.seen.heard is not None:
+        if scene.snapshot.seen.reported_positions is not None:
             self._draw_belief(canvas, scene.snapshot, scene.selected)
         radius = drawn_radii(canvas, scene)[scene.selected] + 4.0 * canvas.scale
         center = canvas.camera.to_pixels(scene.snapshot.positions[scene.selected]).tolist()
@@ -105,7 +105,7 @@ class Selection(Layer):
             colour = mix(canvas.theme.robots[0], canvas.theme.ink, 0.2)
             canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), (x, y))
 
-        if scene.snapshot is None or scene.selected is None or scene.snapshot.seen.heard is None:
+        if scene.snapshot is None or scene.selected is None or scene.snapshot.seen.reported_positions is None:
             return []
         return [LegendEntry(f"as robot {scene.number(scene.selected)} believes", glyph)]
 

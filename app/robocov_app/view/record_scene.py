@@ -85,8 +85,8 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
             obstacle_points=seen.obstacle_points[rows],
             max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
             scans=None,
-            heard=None if seen.heard is None else seen.heard[kept],
-            heard_age=None if seen.heard_age is None else seen.heard_age[kept],
+            reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
+            report_ages=None if seen.report_ages is None else seen.report_ages[kept],
         ),
         replace(
             decision,

@@ -128,7 +128,7 @@ class Scene:
         if (
             not isinstance(cells, (VoronoiPartition, WeightedCells))
             or not np.isinf(team.communication_range).all()
-            or snapshot.seen.heard is not None
+            or snapshot.seen.reported_positions is not None
             or not np.array_equal(cells.generators, snapshot.positions)
         ):
             where, density = snapshot.positions, environment.density

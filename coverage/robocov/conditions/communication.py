@@ -136,7 +136,7 @@ class Radio:
             places[receiver, sender] = each.places[sender]
         return Inbox(sent, arrived, places, on_the_way[len(due) :])
 
-    def heard(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+    def reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
         """Return what robots that work know of others.
 
         Returns

@@ -69,8 +69,8 @@ class Perception:
         if self._radio is None or inbox is None:
             return replace(seen, neighbours=seen.neighbours.among(working)), None
         inbox = self._radio.exchange(inbox, step, positions, truth, working)
-        neighbours, heard, ages = self._radio.heard(inbox, step, working)
-        return replace(seen, neighbours=neighbours, heard=heard, heard_age=ages), inbox
+        neighbours, places, ages = self._radio.reports(inbox, step, working)
+        return replace(seen, neighbours=neighbours, reported_positions=places, report_ages=ages), inbox
 
     def _estimated(self, step: int, positions: Array) -> Array:
         """Return where the robots believe themselves to be, (n, 2) m."""

@@ -45,9 +45,14 @@ def cells_seen(
             seen.region,
             seen.neighbours,
             warm,
-            heard=seen.heard,
+            heard=seen.reported_positions,
             density=seen.density,
         )
     return partition(
-        seen.positions, seen.region, seen.neighbours, warm=warm, heard=seen.heard, density=seen.density
+        seen.positions,
+        seen.region,
+        seen.neighbours,
+        warm=warm,
+        heard=seen.reported_positions,
+        density=seen.density,
     )

@@ -93,7 +93,12 @@ class Individually:
     def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
         """Ask the law for each robot's force."""
         cells = partition(
-            seen.positions, seen.region, seen.neighbours, warm=memory, heard=seen.heard, density=seen.density
+            seen.positions,
+            seen.region,
+            seen.neighbours,
+            warm=memory,
+            heard=seen.reported_positions,
+            density=seen.density,
         )
         forces = np.empty_like(seen.positions)
         for i in range(len(forces)):

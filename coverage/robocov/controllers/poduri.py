@@ -98,7 +98,7 @@ class Poduri:
         # for its own sake: one of its K nearest, while at most K are near
         critical: BoolArray = (near.sum(axis=1)[robot] <= most) & (_rank(robot, distance) < most)
         # for the neighbour's: by the same rule, on those of the neighbour's neighbours that the robot hears
-        if seen.heard is not None:
+        if seen.reported_positions is not None:
             ask = np.flatnonzero(~critical)
             crowd, nearer = self._counted(seen, robot[ask], neighbour[ask], distance[ask], reach[ask])
             critical[ask] = (crowd <= most) & (nearer < most)

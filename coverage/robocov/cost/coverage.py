@@ -237,7 +237,7 @@ class CoverageCost:
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         self.weights = self._weights()
 
-    def weighed(self, environment: Environment) -> CoverageCost:
+    def with_density(self, environment: Environment) -> CoverageCost:
         """Return the coverage cost of the same map with another density; nothing else is computed again.
 
         Parameters

@@ -181,7 +181,7 @@ class Environment:
         return any(shape.path is not None for shape in self.obstacles)
 
     @cached_property
-    def standing(self) -> Environment:
+    def static(self) -> Environment:
         """The map without the obstacles that move; this one where none does."""
         if not self.moves:
             return self
@@ -217,7 +217,7 @@ class Environment:
             return frozen([part.area * weight for part in parts])
         return frozen(masses_of_polygons(self.density, list(parts)))
 
-    def weighed(self, density: Density | None) -> Environment:
+    def with_density(self, density: Density | None) -> Environment:
         """Return the same map with another density; what is derived from its geometry is kept."""
         twin = replace(self, density=density)
         kept = ("region", "boundary_polygon", "free", "blocked")

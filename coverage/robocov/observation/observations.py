@@ -43,10 +43,10 @@ class Observations:
     region : Region
         The known convex outer boundary.
     time : float, s
-    heard : (m, 2) m or None
+    reported_positions : (m, 2) m or None
         Where robots know their neighbours to be, in the order of ``neighbours.indices``: what the last
         message said that arrived. None: where they are, ``positions``.
-    heard_age : (m,) s or None
+    report_ages : (m,) s or None
         How old that is.
     max_speeds : (n,) m/s or None
         The largest speed of each robot: its own, and what its neighbours tell of theirs. None: not told.
@@ -63,16 +63,16 @@ class Observations:
     region: Region
     time: float = 0.0
     max_speeds: Array | None = None
-    heard: Array | None = None
-    heard_age: Array | None = None
+    reported_positions: Array | None = None
+    report_ages: Array | None = None
     density: Density | None = None
     scans: Scans | None = None
 
     def neighbour_positions(self, robot: int) -> Array:
         """Return where a robot knows its neighbours to be, (k, 2) m, in the order of ``neighbours.of``."""
-        if self.heard is None:
+        if self.reported_positions is None:
             return self.positions[self.neighbours.of(robot)]
-        return self.heard[self.neighbours.row(robot)]
+        return self.reported_positions[self.neighbours.row(robot)]
 
     def neighbours_within(self, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
         """Return the directed pairs of neighbours that are at most `reach` metres apart, for all they know.
@@ -85,11 +85,11 @@ class Observations:
             From the neighbour, as the robot knows it, to the robot.
         distance : (m,) m
         """
-        if self.heard is None:
+        if self.reported_positions is None:
             robot, neighbour, distance = self.neighbours.closer_than(self.positions, reach)
             return robot, neighbour, self.positions[robot] - self.positions[neighbour], distance
         robot, neighbour = self.neighbours.pairs()
-        offset = self.positions[robot] - self.heard
+        offset = self.positions[robot] - self.reported_positions
         distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
         near = distance <= reach
         return robot[near], neighbour[near], offset[near], distance[near]

@@ -51,7 +51,7 @@ class World:
     velocities : (n, 2) m/s, at rest by default
     movers : tuple of Mover
         Obstacles that move, as kinematic bodies; see `robocov.world.moving_bodies`.
-    wrecks : (w, 3) m or None
+    failed_robots : (w, 3) m or None
         x, y and radius of robots that have failed, and stand in the way.
 
     Raises
@@ -68,16 +68,16 @@ class World:
         velocities: Array | None = None,
         *,
         movers: tuple[Mover, ...] = (),
-        wrecks: Array | None = None,
+        failed_robots: Array | None = None,
     ) -> None:
         self.team = team
-        self._pieces, self._movers, self._wrecks = pieces, movers, wrecks
+        self._pieces, self._movers, self._failed_robots = pieces, movers, failed_robots
         light, heavy = float(team.mass.min()), float(team.mass.max())
         if heavy > MAX_MASS_RATIO * light:
             most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
             raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
         # this space only tells who touches: nothing is pushed out of an overlap, nothing is remembered
-        self._space = obstacle_space(pieces, movers, wrecks)
+        self._space = obstacle_space(pieces, movers, failed_robots)
         self._space.iterations = self._space.collision_persistence = 1
         self._space.collision_bias = 1.0
         self._contacts: ContactSolver | None = None
@@ -134,10 +134,12 @@ class World:
             self._positions,
             self._velocities,
             movers=self._movers,
-            wrecks=self._wrecks,
+            failed_robots=self._failed_robots,
         )
 
-    def step(self, forces: Array, dt: float, pushes: Array | None = None, *, time: float = 0.0) -> None:
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
         """Move on by `dt` seconds under `forces`, (n, 2) N.
 
         The forces are the controllers'; viscosity and limits are added here, the same for all.
@@ -146,14 +148,14 @@ class World:
         ----------
         forces : (n, 2) N
         dt : float, s
-        pushes : (n, 2) N or None
+        external_forces : (n, 2) N or None
             From outside, as by a hand. They know no limits; a robot that they have made faster than it
             can be brakes as hard as it can.
         """
         fastest = self._fastest
-        if pushes is not None or self._thrown:
+        if external_forces is not None or self._thrown:
             speed = np.hypot(*self._velocities.T)
-            gain = 0.0 if pushes is None else np.hypot(*pushes.T) / self.team.mass * dt
+            gain = 0.0 if external_forces is None else np.hypot(*external_forces.T) / self.team.mass * dt
             fastest = max(fastest, float((speed + gain).max()))
         fastest += self._fastest_mover
         # a robot must not cross a thin wall within one substep
@@ -162,15 +164,15 @@ class World:
             if self._movers:
                 self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
                 self._write_state()
-            self._substep(forces, dt / parts, pushes)
+            self._substep(forces, dt / parts, external_forces)
 
-    def _substep(self, forces: Array, dt: float, pushes: Array | None) -> None:
+    def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
         limit = self._speed_limit(dt)
         net = self._net_force(forces, dt, limit)
-        if pushes is not None:
-            net = net + pushes
+        if external_forces is not None:
+            net = net + external_forces
             limit = np.maximum(
-                limit, np.hypot(*self._velocities.T) + np.hypot(*pushes.T) / self.team.mass * dt
+                limit, np.hypot(*self._velocities.T) + np.hypot(*external_forces.T) / self.team.mass * dt
             )
         before = self._positions, self._velocities
         self._force[self._rows] = net
@@ -180,7 +182,7 @@ class World:
         touching = self._touching()
         if touching:
             self._resolve_contacts(np.array(touching), np.hstack(before), net, dt, limit)
-        if pushes is not None or self._thrown:
+        if external_forces is not None or self._thrown:
             self._thrown = bool((np.hypot(*self._velocities.T) > self.team.max_speed).any())
 
     def _speed_limit(self, dt: float) -> Array:
@@ -220,7 +222,7 @@ class World:
     def _resolve_contacts(self, rows: IntArray, before: Array, net: Array, dt: float, limit: Array) -> None:
         """Move robots again that touch something, and with them whoever they are moved against."""
         if self._contacts is None:
-            self._contacts = ContactSolver(self._pieces, self.team, self._movers, self._wrecks)
+            self._contacts = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
         radius, free = self.team.radius, np.hstack([self._positions, self._velocities])
         while True:
             state = free.copy()

@@ -81,7 +81,7 @@ class ChangingWorld:
         return self._working
 
     @property
-    def wrecks(self) -> Array:
+    def failed_robots(self) -> Array:
         """x, y and radius of the robots that have failed, (w, 3) m."""
         return np.column_stack([self._positions, self.team.radius])[self._failed]
 
@@ -92,7 +92,9 @@ class ChangingWorld:
         twin._world = None if self._world is None else self._world.copy()
         return twin
 
-    def step(self, forces: Array, dt: float, pushes: Array | None = None, *, time: float = 0.0) -> None:
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
         """Move on by `dt` seconds, as `World.step`; then robots fail and join whose time has come.
 
         Raises
@@ -102,7 +104,9 @@ class ChangingWorld:
         """
         rows = self._rows
         if self._world is not None:
-            self._world.step(forces[rows], dt, None if pushes is None else pushes[rows], time=time)
+            self._world.step(
+                forces[rows], dt, None if external_forces is None else external_forces[rows], time=time
+            )
             self._positions, self._velocities = self._positions.copy(), np.zeros_like(self._velocities)
             self._positions[rows], self._velocities[rows] = self._world.positions, self._world.velocities
             self._protect()
@@ -155,7 +159,7 @@ class ChangingWorld:
                 self._positions[rows],
                 self._velocities[rows],
                 movers=self._movers,
-                wrecks=self.wrecks,
+                failed_robots=self.failed_robots,
             )
 
     def _protect(self) -> None:

@@ -31,15 +31,15 @@ class ContactSolver:
 
     Parameters
     ----------
-    pieces, team, movers, wrecks
+    pieces, team, movers, failed_robots
         As of `World`.
     """
 
     def __init__(
-        self, pieces: tuple[Array, ...], team: Team, movers: tuple[Mover, ...], wrecks: Array | None
+        self, pieces: tuple[Array, ...], team: Team, movers: tuple[Mover, ...], failed_robots: Array | None
     ) -> None:
         self._team, self._movers = team, movers
-        self._space = obstacle_space(pieces, movers, wrecks)
+        self._space = obstacle_space(pieces, movers, failed_robots)
         # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
         self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
         self._space.collision_slop = 1e-4
@@ -118,12 +118,12 @@ class ContactSolver:
 
 
 def obstacle_space(
-    pieces: tuple[Array, ...], movers: tuple[Mover, ...], wrecks: Array | None
+    pieces: tuple[Array, ...], movers: tuple[Mover, ...], failed_robots: Array | None
 ) -> pymunk.Space:
     """Return a space with all that robots may run into but each other."""
     space = pymunk.Space()
     walls: list[pymunk.Shape] = [pymunk.Poly(space.static_body, ring.tolist()) for ring in pieces]
-    for x, y, radius in [] if wrecks is None else wrecks.tolist():
+    for x, y, radius in [] if failed_robots is None else failed_robots.tolist():
         walls.append(pymunk.Circle(space.static_body, radius, (x, y)))
     for wall in walls:
         wall.friction = wall.elasticity = 0.0

@@ -87,7 +87,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
     expected = told_one_by_one(conditions, ranges, places, working)
     for step, now in enumerate(places):
         inbox = radio.exchange(inbox, step, now, now, working[step])
-        neighbours, heard, ages = radio.heard(inbox, step, working[step])
+        neighbours, heard, ages = radio.reports(inbox, step, working[step])
         robot, other = neighbours.pairs()
         assert list(zip(robot.tolist(), other.tolist(), strict=True)) == sorted(expected[step])
         for k, pair in enumerate(sorted(expected[step])):
@@ -125,7 +125,7 @@ def test_loss_is_as_often_as_it_says() -> None:
     inbox, working, got = Inbox.empty(n), np.ones(n, dtype=bool), 0
     for step, now in enumerate(walks(n, steps, 1)):
         inbox = radio.exchange(inbox, step, now, now, working)
-        got += len(radio.heard(inbox, step, working)[1])
+        got += len(radio.reports(inbox, step, working)[1])
     sent = steps * n * (n - 1)
     assert abs(got / sent - 0.7) < 5 * np.sqrt(0.21 / sent)
 
@@ -151,8 +151,8 @@ def seen_by(
         SQUARE,
         max_speeds=np.ones(len(places)),
         scans=scans,
-        heard=heard,
-        heard_age=None if heard is None else np.zeros(len(heard)),
+        reported_positions=heard,
+        report_ages=None if heard is None else np.zeros(len(heard)),
     )
 
 
@@ -203,7 +203,7 @@ def test_a_robot_goes_by_what_it_heard_not_by_where_others_are(kind: type, n: in
     # all others are elsewhere, and have heard other things
     elsewhere = np.where((np.arange(n) == i)[:, None], places, rng.uniform(1, 9, size=(n, 2)))
     otherwise = np.where((robot == i)[:, None], heard, rng.uniform(1, 9, size=heard.shape))
-    moved = replace(seen, positions=elsewhere, heard=otherwise)
+    moved = replace(seen, positions=elsewhere, reported_positions=otherwise)
     after = controller.decide(moved, controller.begin(SQUARE, team)).forces[i]
     assert before.tobytes() == after.tobytes()
 

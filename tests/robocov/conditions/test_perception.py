@@ -40,7 +40,7 @@ def bits(one: Simulation, steps: int) -> list[bytes]:
     found = []
     for _ in range(steps):
         seen = one.snapshot.seen
-        heard = b"" if seen.heard is None else seen.heard.tobytes()
+        heard = b"" if seen.reported_positions is None else seen.reported_positions.tobytes()
         found.append(
             one.positions.tobytes()
             + one.velocities.tobytes()
@@ -97,9 +97,9 @@ def test_looking_twice_is_looking_once() -> None:
     for _ in range(6):
         first, second = one.observe(), one.observe()
         assert first.positions.tobytes() == second.positions.tobytes()
-        assert first.heard is not None
-        assert second.heard is not None
-        assert first.heard.tobytes() == second.heard.tobytes()
+        assert first.reported_positions is not None
+        assert second.reported_positions is not None
+        assert first.reported_positions.tobytes() == second.reported_positions.tobytes()
         one.step()
 
 
@@ -176,21 +176,21 @@ def test_the_record_holds_the_truth() -> None:
 def test_what_is_told_is_what_is_believed() -> None:
     one = simulation(Conditions(position_noise=0.3, seed=9))
     seen = one.observe()
-    assert seen.heard is not None
-    assert (seen.heard == seen.positions[seen.neighbours.pairs()[1]]).all()
-    assert seen.heard_age is not None
-    assert not seen.heard_age.any()
+    assert seen.reported_positions is not None
+    assert (seen.reported_positions == seen.positions[seen.neighbours.pairs()[1]]).all()
+    assert seen.report_ages is not None
+    assert not seen.report_ages.any()
 
 
 def test_delay_is_age() -> None:
     one = simulation(Conditions(delay=0.2))
     for step in range(12):
         seen = one.observe()
-        assert seen.heard_age is not None
+        assert seen.report_ages is not None
         if step < 4:
-            assert len(seen.heard_age) == 0
+            assert len(seen.report_ages) == 0
         else:
-            np.testing.assert_allclose(seen.heard_age, 0.2)
+            np.testing.assert_allclose(seen.report_ages, 0.2)
         one.step()
 
 

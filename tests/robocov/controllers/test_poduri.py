@@ -112,7 +112,7 @@ def test_forces_are_those_of_the_rule_written_down_robot_by_robot(seed: int, k: 
     # with what was heard, which is the truth here, the same by the other way
     heard = replace(
         seen_from(positions, min(reach, 100.0)),
-        heard=positions[Neighbours.within(positions, np.full(9, min(reach, 100.0))).pairs()[1]],
+        reported_positions=positions[Neighbours.within(positions, np.full(9, min(reach, 100.0))).pairs()[1]],
     )
     again = law.decide(heard, law.begin(HALL.region, Team.homogeneous(9, communication_range=reach)))
     np.testing.assert_allclose(again.forces, decision.forces, rtol=1e-9, atol=1e-9)

@@ -25,7 +25,7 @@ HALVES = Environment("halves", RING, (WallObstacle(((4.0, -1.0), (4.0, 9.0)), 0.
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 def test_it_is_the_mean_with_the_weights_of_the_sites(density):
-    cost = CoverageCost(ROOMS.weighed(density), 40)
+    cost = CoverageCost(ROOMS.with_density(density), 40)
     result = cost(ROBOTS)
     weights = means_over_squares(density, cost.points, cost.spacing)
     assert result.mean_distance == pytest.approx(np.average(result.distances, weights=weights), rel=1e-12)
@@ -38,17 +38,17 @@ def test_it_is_the_mean_with_the_weights_of_the_sites(density):
 
 
 def test_one_everywhere_changes_nothing_to_the_last_bit():
-    plain, one = CoverageCost(ROOMS, 32)(ROBOTS), CoverageCost(ROOMS.weighed(Uniform()), 32)(ROBOTS)
+    plain, one = CoverageCost(ROOMS, 32)(ROBOTS), CoverageCost(ROOMS.with_density(Uniform()), 32)(ROBOTS)
     assert (plain.mean_distance, plain.value) == (one.mean_distance, one.value)
     assert np.array_equal(plain.gradient, one.gradient)
-    three = CoverageCost(ROOMS.weighed(Uniform(3.0)), 32)(ROBOTS)
+    three = CoverageCost(ROOMS.with_density(Uniform(3.0)), 32)(ROBOTS)
     assert three.mean_distance == plain.mean_distance
     assert three.value == pytest.approx(3.0 * plain.value, rel=1e-14)
 
 
 @pytest.mark.parametrize("density", [GAUSSIANS["two"], POLYGONS["rooms"]])
 def test_the_gradient_by_finite_differences(density):
-    cost, step = CoverageCost(ROOMS.weighed(density), 24), 1e-6
+    cost, step = CoverageCost(ROOMS.with_density(density), 24), 1e-6
     slope = cost(ROBOTS).gradient
     for i in range(len(ROBOTS)):
         for axis in (0, 1):
@@ -62,17 +62,17 @@ def test_the_gradient_by_finite_differences(density):
 
 def test_another_density_needs_no_new_tables():
     cost = CoverageCost(ROOMS, 24)
-    other = ROOMS.weighed(GAUSSIANS["two"])
-    quick, slow = cost.weighed(other), CoverageCost(other, 24)
+    other = ROOMS.with_density(GAUSSIANS["two"])
+    quick, slow = cost.with_density(other), CoverageCost(other, 24)
     assert quick.geodesics is cost.geodesics
     assert quick(ROBOTS).value == slow(ROBOTS).value and cost.weights is None
-    assert quick.weighed(ROOMS)(ROBOTS).value == cost(ROBOTS).value
+    assert quick.with_density(ROOMS)(ROBOTS).value == cost(ROBOTS).value
 
 
 def test_only_covered_components_count():
     left = WeightedArea(((0.0, 0.0), (4.0, 0.0), (4.0, 8.0), (0.0, 8.0)), 5.0)
     density = WeightedPolygons((left,), 1.0)
-    result = CoverageCost(HALVES.weighed(density), 40)(np.array([[6.0, 4.0]]))
+    result = CoverageCost(HALVES.with_density(density), 40)(np.array([[6.0, 4.0]]))
     plain = CoverageCost(HALVES, 40)(np.array([[6.0, 4.0]]))
     assert result.mean_distance == pytest.approx(plain.mean_distance, rel=1e-12)
     assert result.value == pytest.approx(plain.value, rel=1e-12)
@@ -81,14 +81,14 @@ def test_only_covered_components_count():
 
 def test_where_all_that_is_covered_counts_nothing_there_is_no_mean():
     left = WeightedArea(((0.0, 0.0), (4.0, 0.0), (4.0, 8.0), (0.0, 8.0)), 5.0)
-    result = CoverageCost(HALVES.weighed(WeightedPolygons((left,), 0.0)), 40)(np.array([[6.0, 4.0]]))
+    result = CoverageCost(HALVES.with_density(WeightedPolygons((left,), 0.0)), 40)(np.array([[6.0, 4.0]]))
     assert np.isnan(result.mean_distance)
     assert not result.gradient.any()
 
 
 def test_the_optimum_goes_where_it_counts():
     spot = (6.2, 2.0)
-    heavy = ROOMS.weighed(Gaussians((Gaussian(spot, 50.0, sigma=0.6),), 0.1))
+    heavy = ROOMS.with_density(Gaussians((Gaussian(spot, 50.0, sigma=0.6),), 0.1))
     best = optimum(heavy, 1, lattice=32, restarts=4)
     assert np.hypot(*(best.positions[0] - spot)) < 0.3
     both = optimum(heavy, 3, lattice=32, restarts=4)
@@ -101,7 +101,7 @@ def test_the_optimum_goes_where_it_counts():
 @pytest.mark.parametrize("controller", [Rapf(), Lloyd()])
 def test_robots_go_where_it_counts(controller):
     square = Environment("square", RING)
-    heavy = square.weighed(Gaussians((Gaussian((6.5, 6.5), 20.0, sigma=0.8),), 0.1))
+    heavy = square.with_density(Gaussians((Gaussian((6.5, 6.5), 20.0, sigma=0.8),), 0.1))
     starts = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [2.0, 2.0]])
     ends = [Simulation(each, controller, starts, dt=0.05).run(20.0).positions[-1] for each in (heavy, square)]
     near = [np.sort(np.hypot(*(end - (6.5, 6.5)).T)) for end in ends]
@@ -112,11 +112,11 @@ def test_robots_go_where_it_counts(controller):
 
 def test_a_run_by_another_density_from_now_on():
     square = Environment("square", RING)
-    heavy = square.weighed(GAUSSIANS["two"])
+    heavy = square.with_density(GAUSSIANS["two"])
     simulation = Simulation(square, Rapf(), ROBOTS)
     for _ in range(30):
         simulation.step()
-    twin, anew = simulation.weighed(heavy), simulation.changed(environment=heavy)
+    twin, anew = simulation.with_density(heavy), simulation.changed(environment=heavy)
     assert simulation.environment is square and twin.environment is heavy
     assert twin.snapshot.seen.density is heavy.density
     for _ in range(30):

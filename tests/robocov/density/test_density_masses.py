@@ -60,17 +60,17 @@ def test_the_free_space_of_a_map():
     ring = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
     pillar = Environment("pillar", ring, (CircleObstacle((2.0, 2.0), 0.5),))
     assert pillar.free_masses.tolist() == [part.area for part in pillar.free.geoms]
-    assert pillar.weighed(Uniform(2.0)).free_masses == pytest.approx(2.0 * pillar.free_area)
+    assert pillar.with_density(Uniform(2.0)).free_masses == pytest.approx(2.0 * pillar.free_area)
     peak = Gaussians((Gaussian((2.0, 2.0), 1.0, sigma=0.1),), 0.0)
     # nearly all of it is inside the pillar
-    assert pillar.weighed(peak).free_masses[0] < 1e-4 * 2.0 * np.pi * 0.01
+    assert pillar.with_density(peak).free_masses[0] < 1e-4 * 2.0 * np.pi * 0.01
 
 
 def test_weighed_maps_keep_their_geometry():
     ring = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
     plain = Environment("pillar", ring, (CircleObstacle((2.0, 2.0), 0.5),))
     region, free = plain.region, plain.free
-    twin = plain.weighed(Uniform(2.0))
+    twin = plain.with_density(Uniform(2.0))
     assert twin.region is region and twin.free is free and twin.density == Uniform(2.0)
-    assert twin != plain and twin.same_place(plain) and twin.weighed(None) == plain
+    assert twin != plain and twin.same_place(plain) and twin.with_density(None) == plain
     assert not plain.same_place(Environment("other", ring))

@@ -86,14 +86,14 @@ def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
     for time in (0.0, 1.3, 4.0):
         assert environment.at(time).free_area == pytest.approx(environment.free_area, abs=1e-4)
     assert environment.at(3.0).free.wkb == environment.at(3.0 + 24.0).free.wkb
-    assert environment.standing.obstacles == environment.obstacles[:1]
+    assert environment.static.obstacles == environment.obstacles[:1]
 
 
 def test_where_nothing_moves_the_map_is_always_itself() -> None:
     hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
     assert not hall.moves
     assert hall.at(7.0) is hall
-    assert hall.standing is hall
+    assert hall.static is hall
 
 
 def test_a_file_keeps_it() -> None:

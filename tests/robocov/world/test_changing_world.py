@@ -48,7 +48,7 @@ def test_who_failed_stands_still_and_is_in_the_way() -> None:
     assert 0.1 < moved < 0.5
     assert (changing.velocities[1] == 0.0).all()
     assert changing.working.tolist() == [True, False]
-    assert changing.wrecks.tolist() == [[*changing.positions[1].tolist(), 0.1]]
+    assert changing.failed_robots.tolist() == [[*changing.positions[1].tolist(), 0.1]]
     # the other leans on it, and does not get past
     assert changing.positions[0, 0] == pytest.approx(changing.positions[1, 0] - 0.2, abs=2e-3)
 
@@ -196,7 +196,7 @@ def test_who_failed_earlier_stays_in_the_way_when_another_one_fails() -> None:
     changing = world(Conditions(failures=((1, 0.2), (3, 0.4))))
     for step in range(12):
         changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
-    assert changing.wrecks[:, :2].tolist() == STARTS[[0, 2]].tolist()
+    assert changing.failed_robots[:, :2].tolist() == STARTS[[0, 2]].tolist()
     assert changing.working.tolist() == [False, True, False, True]
     with pytest.raises(ValueError, match="read-only"):
         changing.working[...] = True

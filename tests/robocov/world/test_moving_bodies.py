@@ -64,7 +64,7 @@ def test_nobody_is_pushed_into_a_wall_or_through_one(
         one = Simulation(environment, Lloyd() if lloyd else Rapf(), places, dt=1 / 30)
     except StartError:
         return
-    walls = environment.standing.free.geoms
+    walls = environment.static.free.geoms
     side = next(part for part in walls if part.contains(shapely.Point(1.5, 1.0)))
     for _ in range(int(1.2 * 5.2 / speed * 30) + 1):
         one.step()
@@ -147,7 +147,7 @@ def test_the_cost_of_a_place_that_comes_by_again_is_known() -> None:
     momentary = MomentaryCost(CoverageCost(HALL, 8))
     assert momentary.at(3.0) is momentary.at(3.0 + 24.0)
     assert momentary.at(3.0) is not momentary.at(3.5)
-    standing = CoverageCost(HALL.standing, 8)
+    standing = CoverageCost(HALL.static, 8)
     assert MomentaryCost(standing).at(9.0) is standing
 
 

@@ -24,7 +24,7 @@ def engine_area(ring: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", sorted(bundled_maps()))
 def test_the_engine_gets_exactly_what_is_not_free(name: str) -> None:
-    environment = load_map(name).standing  # what moves is no part of the walls
+    environment = load_map(name).static  # what moves is no part of the walls
     pieces = solid_pieces(environment)
     frame = shapely.box(*shapely.union_all([shapely.Polygon(ring) for ring in pieces]).bounds)
     solid = shapely.union_all([shapely.Polygon(ring) for ring in pieces])

@@ -134,12 +134,12 @@ def test_another_map_in_the_midst_of_a_stroke_ends_it():
 
 def test_what_is_painted_on():
     peak = Gaussians((Gaussian((2.0, 2.0), 3.0, sigma=0.5),), 0.5)
-    raster = painted_raster(HALL.weighed(peak))
+    raster = painted_raster(HALL.with_density(peak))
     assert raster.values.shape == (round(CELLS * 4 / 6), CELLS) and raster.extent == (0.0, 0.0, 6.0, 4.0)
-    assert painted_raster(HALL.weighed(raster)) is raster
-    assert painted_raster(HALL.weighed(Uniform(2.0))).values.max() == 2.0
+    assert painted_raster(HALL.with_density(raster)) is raster
+    assert painted_raster(HALL.with_density(Uniform(2.0))).values.max() == 2.0
     cells = Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cells")
-    assert painted_raster(HALL.weighed(cells)).interpolation == "bilinear"
+    assert painted_raster(HALL.with_density(cells)).interpolation == "bilinear"
 
 
 def test_its_size():
@@ -199,7 +199,7 @@ def test_the_process_for_the_cost_weighs_anew_what_it_has():
     peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
     places = np.array([[1.0, 1.0], [5.0, 3.2]])
     with CostWorker() as worker:
-        for environment in (HALL, HALL.weighed(peak), HALL):
+        for environment in (HALL, HALL.with_density(peak), HALL):
             generation = worker.environment(environment, 24)
             end, answer = time.monotonic() + 60.0, None
             while answer is None and time.monotonic() < end:
@@ -218,7 +218,7 @@ def test_at_once_it_is_weighed_anew_too():
     peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
     places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), DirectCosts(24)
     found = []
-    for environment in (HALL, HALL.weighed(peak), HALL):
+    for environment in (HALL, HALL.with_density(peak), HALL):
         costs.environment(environment)
         costs.ask(0, 0.0, places)
         ((_, known),) = costs.poll()

@@ -61,7 +61,7 @@ def states(session: Session, steps: int) -> list[bytes]:
         session.step()
         for lane in session.lanes:
             seen = lane.simulation.snapshot.seen
-            heard = b"" if seen.heard is None else seen.heard.tobytes()
+            heard = b"" if seen.reported_positions is None else seen.reported_positions.tobytes()
             found.append(lane.simulation.positions.tobytes() + seen.positions.tobytes() + heard)
     return found
 
@@ -98,9 +98,9 @@ def test_the_past_is_explained_as_it_was() -> None:
     session.look_at(8 * 0.05)
     past = session.snapshot(lane)
     assert past.decision.forces.tobytes() == then[8].decision.forces.tobytes()
-    assert past.seen.heard is not None
-    assert then[8].seen.heard is not None
-    assert past.seen.heard.tobytes() == then[8].seen.heard.tobytes()
+    assert past.seen.reported_positions is not None
+    assert then[8].seen.reported_positions is not None
+    assert past.seen.reported_positions.tobytes() == then[8].seen.reported_positions.tobytes()
     assert (past.positions == then[8].positions).all()
 
 

@@ -121,7 +121,7 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
         linked,
         np.full((2, 2), np.nan),
         REGION,
-        heard=np.array([[1.5, 1.0], [1.0, 3.0]]),
+        reported_positions=np.array([[1.5, 1.0], [1.0, 3.0]]),
     )
     rows = ObservationLayout(1).rows(seen, Team.homogeneous(2))
     np.testing.assert_allclose(rows[:, 7:], [[0.05, 0.0, 1.0], [-0.1, 0.2, 1.0]], atol=1e-7)

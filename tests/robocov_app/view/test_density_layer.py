@@ -22,7 +22,7 @@ from robocov_app.view.theme import DARK, LIGHT
 
 RING = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (2.0, 8.0))
 PLAIN = Environment("plain", RING, (CircleObstacle((5.0, 5.0), 0.5),))
-HEAVY = PLAIN.weighed(GAUSSIANS["one"])
+HEAVY = PLAIN.with_density(GAUSSIANS["one"])
 STARTS = np.array([[3.0, 1.0], [6.0, 2.0], [4.0, 6.0]])
 
 
@@ -59,7 +59,7 @@ def test_the_legend_tells_of_it():
     painter = Painter(HEAVY, (500, 460))
     assert "density φ, 0.1 to 2.1" in painter.legend(scene_of(HEAVY))
     assert not any("φ" in words for words in painter.legend(scene_of(PLAIN)))
-    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN.weighed(Uniform(2.0)))))
+    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN.with_density(Uniform(2.0)))))
     painter.visible.discard("density")
     assert not any("φ" in words for words in painter.legend(scene_of(HEAVY)))
 
@@ -79,7 +79,7 @@ def test_colours_of_distances_hide_it():
 def test_another_density_is_drawn_anew():
     painter = Painter(PLAIN, (400, 380))
     first = painter.frame(scene_of(HEAVY))
-    other = PLAIN.weighed(POLYGONS["rooms"])
+    other = PLAIN.with_density(POLYGONS["rooms"])
     second = painter.frame(scene_of(other))
     assert not np.array_equal(first, second)
     assert np.array_equal(painter.frame(scene_of(HEAVY)), first)

@@ -85,7 +85,7 @@ def test_when_all_have_failed_the_map_is_still_drawn() -> None:
 
 
 def test_a_record_of_ideal_conditions_is_shown_as_ever() -> None:
-    record = Simulation(HALL.standing, Rapf(), STARTS).run(0.1)
+    record = Simulation(HALL.static, Rapf(), STARTS).run(0.1)
     scene = record_scene(record, 3)
     assert scene.numbers is None
     assert scene.environment is record.environment
