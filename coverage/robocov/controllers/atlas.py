@@ -11,12 +11,12 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.atlas_memory import AtlasMemory, PlannerState, RestTracker
 from robocov.controllers.base import Information
-from robocov.controllers.driving import drive
+from robocov.controllers.driving import approach, drive, limit_approach_speed, offsets_from_neighbours
 from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.observation.scans import Scanning, headings
-from robocov.planning import steering
+from robocov.observation.scans import Scanning
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.placement import CoverageDemand, Table, own_place, team_places
 from robocov.planning.wayfinding import Ways, Window
@@ -48,6 +48,21 @@ _TURN = 0.2
 
 _HEEDED = 1.5
 """Metres up to which other robots matter to the velocity."""
+
+_BRAKING = 0.4
+"""Part of the acceleration that is counted on: less than half of it, for the lag of the drive."""
+
+_MARGIN, _APART = 0.02, 0.04
+"""Gaps that are left to walls and to other robots, m."""
+
+_CREEP = 0.15
+"""Speed at which a robot moves along what it is closest to, m/s; the more room, the faster."""
+
+_ASIDE = 0.3
+"""Largest speed, m/s, at which robots that stand in each other's way pass on the left."""
+
+_EAGERNESS = 10.0
+"""Speed in 1/s with which the distance to what is close may fall to its clearance."""
 
 _FOR_TURNING = 0.7
 """Part of the acceleration that is spent on where to go; the rest is left for not running into anything."""
@@ -92,7 +107,7 @@ class Atlas:
        parabola; a goal that saves less than the part `rest` of what its own cell costs is not worth moving.
     3. *A look.* When it is there, it looks at what is still unknown of its own cell, as long as what is at
        stake is more than the part `stake` of J; that doubles for each `patience` seconds of looking.
-    4. *The way* is the shortest on its map, with braking before walls and other robots (`steering`).
+    4. *The way* is the shortest on its map, braking before walls and other robots (`driving`).
 
     What a relocation or a goal must save doubles every `settling` seconds until the team changes. Private
     maps agree ever more where it matters, and so do the plans; by 1 and by what doubles the team comes to
@@ -139,15 +154,12 @@ class Atlas:
             ),
             (np.full((1, 2), np.nan),) * n,
             np.zeros(n, dtype=np.intp),
-            np.full((n, self.scanning.rays, 2), np.nan),
         )
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces that lead each robot on its way."""
-        states, walls = list(memory.states), memory.walls
+        states = list(memory.states)
         if seen.scans is not None:
-            walls = seen.positions[:, None] + seen.scans.distances[..., None] * headings(seen.scans.rays)
-            walls[~seen.scans.hit] = np.nan
             maps = [
                 state.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
                 for i, state in enumerate(states)
@@ -166,7 +178,8 @@ class Atlas:
                     routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
             elif state.planned is None:
                 routes[i] = seen.positions[i : i + 1]
-        return self._driven(seen, AtlasMemory(memory.team, tuple(states), tuple(routes), legs, walls))
+        returns = last_returns(seen, memory.returns)
+        return self._driven(seen, AtlasMemory(memory.team, tuple(states), tuple(routes), legs, returns))
 
     def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         """Return the maps after the robots have told each other of theirs, which they do not here."""
@@ -302,39 +315,48 @@ class Atlas:
 
     def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces towards the way-points, kept off walls and other robots."""
-        team, positions, legs = memory.team, seen.positions, memory.legs
-        aim = np.array([route[leg] for route, leg in zip(memory.routes, legs.tolist(), strict=True)])
-        last = np.array([len(route) - 1 for route in memory.routes])
-        offset = aim - positions
-        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-        turning = (legs < last) & (distance < _TURN)
-        if turning.any():
-            legs = legs + turning
-            memory = replace(memory, legs=legs)
-            for i in turning.nonzero()[0].tolist():
-                aim[i] = memory.routes[i][legs[i]]
-            offset = aim - positions
-            distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-        braked = np.where(legs == last, self.k_prop * distance, np.inf)
-        speed = np.minimum(team.max_speed, braked)
-        wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
-
-        to_wall = positions - seen.obstacle_points
-        gap = np.sqrt(to_wall[:, 0] ** 2 + to_wall[:, 1] ** 2) - team.radius
-        wanted = steering.slowed(wanted, gap)
+        team, positions, routes = memory.team, seen.positions, memory.routes
+        aim = np.array([route[leg] for route, leg in zip(routes, memory.legs.tolist(), strict=True)])
+        last = np.array([len(route) - 1 for route in routes])
+        legs = memory.legs + ((memory.legs < last) & (np.hypot(*(aim - positions).T) < _TURN))
+        aim = np.array([route[leg] for route, leg in zip(routes, legs.tolist(), strict=True)])
+        walls = positions[:, None] - with_nearest(seen, memory.returns)
+        others = offsets_from_neighbours(seen, _HEEDED)
+        # what is behind a corner comes into sight late: in a narrow place nothing is far
+        braking = _BRAKING * team.max_acceleration
+        gap = np.maximum(np.hypot(*walls[:, 0].T) - team.radius, 0.0)
+        speed = np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _CREEP)
+        wanted = approach(aim - positions, math.inf, speed)
+        wanted = np.where((legs == last)[:, None], approach(aim - positions, self.k_prop, speed), wanted)
+        # who turns would else spend on that the acceleration that is needed for braking
         change = _FOR_TURNING * team.max_acceleration * self.response_time
-        wanted = steering.reachable(wanted, seen.velocities, change)
-        robot, _, away, apart = seen.neighbours_within(_HEEDED)
+        wanted = seen.velocities + approach(wanted - seen.velocities, 1.0, change)
         # of the size of others a robot knows its own
-        neighbours = steering.robot_limits(away, apart, 2.0 * team.radius[robot])
-        wanted = steering.clear_of_robots(wanted, robot, neighbours)
-        offsets = np.concatenate([to_wall[:, None], positions[:, None] - memory.walls], axis=1)
-        walls = steering.wall_limits(offsets, team.radius)
-        wanted = steering.clear_of_walls(wanted, walls)
-        wanted = steering.scale_to_limits(wanted, walls, robot, neighbours)
+        apart = (2.0 * team.radius + _APART)[:, None]
+        wanted = wanted + _aside(wanted, others, apart, braking)
+        robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
+        clearance = np.where(robots, apart, (team.radius + _MARGIN)[:, None])
+        # of two robots each brakes for its half of the way
+        each = braking[:, None] * np.where(robots, 0.25, 1.0)
+        close = np.concatenate([others, walls], axis=1)
+        wanted = limit_approach_speed(wanted, close, clearance, _EAGERNESS, each, team.max_speed)
         forces = drive(wanted, seen, team, self.response_time)
-        goals = np.array([route[-1] for route in memory.routes])
+        goals = np.array([route[-1] for route in routes])
+        memory = replace(memory, legs=legs)
         return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)
+
+
+def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:
+    """Return velocities (n, 2) m/s to the left of whom each robot approaches the most too fast."""
+    if not others.shape[1]:
+        return np.zeros_like(wanted)
+    distance = np.hypot(*np.moveaxis(others, -1, 0))
+    away = others / np.maximum(distance, 1e-9)[..., None]
+    allowed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - apart, 0.0))
+    excess = np.nan_to_num(-(away * wanted[:, None]).sum(axis=2) - allowed, nan=-np.inf)
+    worst = np.arange(len(wanted)), excess.argmax(axis=1)
+    left = np.nan_to_num(away[worst])[:, ::-1] * [1.0, -1.0]
+    return np.asarray(left * np.clip(excess[worst], 0.0, _ASIDE)[:, None])
 
 
 @dataclass(frozen=True)

@@ -115,7 +115,7 @@ class AtlasMemory:
         The way-points that are left, the last one the goal.
     legs : (n,)
         The way-point that is headed for.
-    walls : (n, rays, 2) m
+    returns : (n, rays, 2) m or None
         The points that the last scan hit; nan where a ray met nothing.
     """
 
@@ -123,7 +123,7 @@ class AtlasMemory:
     states: tuple[PlannerState, ...]
     routes: tuple[Array, ...]
     legs: IntArray
-    walls: Array
+    returns: Array | None = None
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:

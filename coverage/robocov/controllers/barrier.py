@@ -9,9 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, in_rows
+from robocov.controllers.driving import approach, in_rows, nearest_allowed
 from robocov.controllers.gains import gain, validate_gains
-from robocov.controllers.projection import nearest_allowed
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region

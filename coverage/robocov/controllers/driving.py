@@ -1,40 +1,27 @@
-"""From a wanted velocity to the force: for laws that say where to go, not how hard to push."""
+"""From a wanted velocity to a safe one, and to the force, for laws that say where to go."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from robocov.arrays import Array, IntArray
-from robocov.controllers.projection import nearest_allowed
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
 from robocov.observation import Observations
 from robocov.robots import Team
 
 
 def approach(offset: Array, k_prop: float, speed: Array) -> Array:
-    """Return velocities, (n, 2) m/s, towards goals: proportional to the distance, and at most so fast.
-
-    Parameters
-    ----------
-    offset : (n, 2) m
-        From the robots to their goals.
-    k_prop : float, 1/s
-    speed : (n,) m/s
-    """
+    """Return velocities (n, 2) m/s: k_prop (1/s) times the (n, 2) m offsets of goals, (n,) m/s at most."""
     distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
     return np.asarray(offset * np.minimum(k_prop, speed / np.maximum(distance, 1e-300))[:, None])
 
 
 def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -> Array:
-    """Return the forces, (n, 2) N, that bring each robot to its wanted velocity.
+    """Return the forces (n, 2) N with which velocities follow the wanted ones, (n, 2) m/s.
 
-    The velocity follows with the time constant `response_time`; what viscosity takes is made up for.
-
-    Parameters
-    ----------
-    wanted : (n, 2) m/s
-    seen : Observations
-    team : Team
-    response_time : float, s
+    They do so with the time constant `response_time` in s; viscosity is compensated for.
     """
     change = (wanted - seen.velocities) * (team.mass / response_time)[:, None]
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
@@ -53,9 +40,8 @@ def limit_approach_speed(
     wanted : (n, 2) m/s
     away : (n, k, 2) m
         From the things that are close to the robot; nan where there is none.
-    clearance : (n, k) m
+    clearance, braking : (n, k) m, m/s²
     rate : float, 1/s
-    braking : (n, k) m/s²
     speed : (n,) m/s
         The largest.
     """
@@ -74,11 +60,70 @@ def limit_approach_speed(
     return slowed
 
 
+@kernel
+def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array) -> tuple[Array, BoolArray]:
+    """Return for each robot the point of a disc, cut by half planes, that is nearest to the wanted one.
+
+    Minimise |u - wanted|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints
+    are added one by one: where the optimum so far violates the next one, the new optimum lies on its line,
+    in the interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3,
+    incremental linear programming, with this objective).
+
+    Parameters
+    ----------
+    wanted : (n, 2)
+    normals : (n, m, 2)
+        Of length 1; nan for no constraint.
+    offsets : (n, m)
+    radius : (n,)
+
+    Returns
+    -------
+    best : (n, 2)
+    feasible : (n,)
+        Where it is False, `best` means nothing.
+    """
+    best = np.empty(wanted.shape)
+    feasible = np.ones(len(wanted), dtype=np.bool_)
+    for i in range(len(wanted)):
+        r = radius[i]
+        slack = 1e-12 * max(r, 1.0)
+        x, y = wanted[i, 0], wanted[i, 1]
+        size = math.sqrt(x * x + y * y)
+        if size > r:
+            x, y = x * (r / size), y * (r / size)
+        for k in range(offsets.shape[1]):
+            nx, ny, level = normals[i, k, 0], normals[i, k, 1], offsets[i, k]
+            # what the disc meets anyhow, and nan, is no constraint
+            if not (level < r and nx * x + ny * y - level > slack):
+                continue
+            high = math.sqrt(max(r * r - level * level, 0.0))
+            low = -high
+            if level < -r:
+                low = math.inf
+            for j in range(k):
+                # points of the line are level n + t (-ny, nx)
+                rate = normals[i, j, 1] * nx - normals[i, j, 0] * ny
+                room = offsets[i, j] - level * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
+                if rate >= 1e-12:
+                    high = min(high, room / rate)
+                elif rate <= -1e-12:
+                    low = max(low, room / rate)
+                elif room < -slack:
+                    low = math.inf
+            if low > high + slack:
+                feasible[i] = False
+                break
+            t = min(max(wanted[i, 1] * nx - wanted[i, 0] * ny, min(low, high)), high)
+            x, y = level * nx - t * ny, level * ny + t * nx
+        best[i, 0], best[i, 1] = x, y
+    return best, feasible
+
+
 def offsets_from_neighbours(seen: Observations, reach: float) -> Array:
     """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m; nan for none."""
-    n = len(seen.positions)
     robot, _, offset, _ = seen.neighbours_within(reach)
-    return in_rows(robot, n, offset, np.nan)
+    return in_rows(robot, len(seen.positions), offset, np.nan)
 
 
 def in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:

@@ -104,13 +104,15 @@ def test_what_was_remembered_stays_as_it_was() -> None:
     for _ in range(40):
         some.step()
     memory: AtlasMemory = some.memory
-    legs, walls, states = memory.legs.copy(), memory.walls.copy(), [each.state.copy() for each in memory.maps]
+    assert memory.returns is not None
+    legs, returns = memory.legs.copy(), memory.returns.copy()
+    states = [each.state.copy() for each in memory.maps]
     again = some.remembering(memory)
     for _ in range(40):
         some.step()
         again.step()
     assert np.array_equal(memory.legs, legs)
-    assert np.array_equal(memory.walls, walls, equal_nan=True)
+    assert np.array_equal(memory.returns, returns, equal_nan=True)
     assert all(np.array_equal(each.state, was) for each, was in zip(memory.maps, states, strict=True))
     assert some.positions.tobytes() == again.positions.tobytes()
 
@@ -212,3 +214,22 @@ def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
     assert early.any() and (threshold[early] < 0.02 * 2.0 ** (together / 2.0)).all()
     assert (threshold[early] > 0.75 * 0.01 * 2.0 ** (time[early] / 2.0)).all()
     assert (threshold[time > together + 0.5] == 1.0).any(), "somebody moved, so nobody goes elsewhere"
+
+
+def test_robots_that_meet_pass_on_the_left() -> None:
+    meeting = [[3.0, 4.0], [5.0, 4.0]]
+    some = Simulation(Environment("empty", SQUARE), Atlas(), meeting, dt=0.05)
+    goals = np.array([[[7.0, 4.0]], [[1.0, 4.0]]])
+    sideways = np.zeros(2)
+    for _ in range(120):
+        memory = some.memory
+        states = tuple(replace(state, due=math.inf, planned=state.known) for state in memory.states)
+        legs = np.zeros(2, dtype=np.intp)
+        some = some.remembering(replace(memory, states=states, routes=tuple(goals), legs=legs))
+        some.step()
+        between = some.positions[0] - some.positions[1]
+        assert np.hypot(*between) > 0.23
+        if abs(between[0]) < 0.5:
+            sideways = some.positions[:, 1] - 4.0
+    assert sideways[0] > 0.0 > sideways[1]
+    np.testing.assert_allclose(some.positions, goals[:, 0], atol=0.2)

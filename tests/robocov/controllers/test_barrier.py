@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
 from robocov.controllers.barrier import BarrierMemory
-from robocov.controllers.projection import nearest_allowed
+from robocov.controllers.driving import nearest_allowed
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
