@@ -112,7 +112,7 @@ def _guarded(name: str, rest: list[str]) -> int:
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
     except Exception as error:
-        from robocov.controllers.faults import users_fault
+        from robocov.controllers.user_modules import users_fault
 
         if fault := users_fault(error):
             return _complain(str(fault))

@@ -14,7 +14,7 @@ from robocov.conditions.communication import Inbox
 from robocov.conditions.perception import Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller
-from robocov.controllers.faults import fault_of
+from robocov.controllers.user_modules import fault_of
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.observation import Decision, Observations, Snapshot

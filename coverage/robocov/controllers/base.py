@@ -37,43 +37,30 @@ class Controller(Protocol):
     @property
     def name(self) -> str:
         """As it is given on the command line."""
-        ...
 
     @property
     def label(self) -> str:
         """As it is shown to people."""
-        ...
 
     @property
     def summary(self) -> str:
         """One line."""
-        ...
 
     def begin(self, region: Region, team: Team) -> Any:
         """Return what the robots remember before the first decision."""
-        ...
 
     def decide(self, seen: Observations, memory: Any) -> Decision:
         """Return the forces for all robots, from what each of them knows."""
-        ...
 
 
 def information_of(controller: Any) -> Information:
-    """Return what a controller, or a class of controllers, goes by.
-
-    Raises
-    ------
-    ParameterError
-        When it states something that is no `Information`.
-    """
+    """Return what a controller, or a class of controllers, goes by, or raise a ParameterError."""
     # a law for one robot stands in an adapter
     stated = getattr(getattr(controller, "law", controller), "information", "own")
     if stated not in get_args(Information):
-        name = getattr(controller, "name", "?")
-        words = ", ".join(get_args(Information))
-        raise ParameterError(
-            f"controller {name!r}: information: {shown(stated)}, but one of {words} was wanted"
-        )
+        name, words = getattr(controller, "name", "?"), ", ".join(get_args(Information))
+        wanted = f"information: {shown(stated)}, but one of {words} was wanted"
+        raise ParameterError(f"controller {name!r}: {wanted}")
     return cast(Information, stated)
 
 
@@ -85,8 +72,8 @@ def informed(controller: Controller, environment: Environment) -> Controller:
     ParameterError
         When a law is told the map that does not say so.
     """
-    tell = getattr(controller, "informed", None)
     information = information_of(controller)
+    tell = getattr(controller, "informed", None)
     if tell is None:
         return controller
     if information != "whole map":

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-from robocov.controllers.faults import fault_of
-from robocov.errors import ParameterError, RobocovError, shown, unknown_name
+from robocov.controllers.user_modules import fault_of
+from robocov.errors import ParameterError, RobocovError, is_number, shown, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,17 +29,7 @@ def value_text(value: Value, *, digits: int = 6, none: str = "none") -> str:
 
 @dataclass(frozen=True)
 class Gain:
-    """What is known of one gain that is a number.
-
-    Attributes
-    ----------
-    name, unit, meaning : str
-    default : float or None
-    low, high : float
-        The range, both ends included.
-    optional : bool
-        Whether None ("no limit") is a value.
-    """
+    """A gain that is a number from `low` to `high`, or, where it is `optional`, None for no limit."""
 
     name: str
     default: float | None
@@ -50,35 +40,22 @@ class Gain:
     optional: bool = False
 
     def validated(self, value: object, where: str) -> float | None:
-        """Return `value` as the gain takes it.
-
-        Raises
-        ------
-        ParameterError
-            When it is not a number in range; the message names `where`, value and range.
-        """
+        """Return `value` as the gain takes it, or raise a ParameterError that names `where`."""
         if value is None and self.optional:
             return None
-        also = ", or null for no limit," if self.optional else ""
-        unit = f" {self.unit}" if self.unit else ""
-        wanted = f"but a number from {self.low:g} to {self.high:g}{unit}{also} was wanted"
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
-        if not self.low <= value <= min(self.high, sys.float_info.max):
-            raise ParameterError(f"{where}.{self.name}: {shown(value)}, {wanted}")
+        if not (is_number(value) and self.low <= value <= min(self.high, sys.float_info.max)):
+            unit = f" {self.unit}" if self.unit else ""
+            also = ", or null for no limit," if self.optional else ""
+            raise ParameterError(
+                f"{where}.{self.name}: {shown(value)}, but a number from {self.low:g} to {self.high:g}{unit}"
+                f"{also} was wanted"
+            )
         return float(value)
 
 
 @dataclass(frozen=True)
 class Option:
-    """What is known of one gain that is a word.
-
-    Attributes
-    ----------
-    name, default, meaning : str
-    words : tuple of str
-        Those to choose from.
-    """
+    """A gain that is one of several words."""
 
     name: str
     default: str
@@ -88,19 +65,14 @@ class Option:
     optional: ClassVar[bool] = False
 
     def validated(self, value: object, where: str) -> str:
-        """Return `value` when it is one of the words.
-
-        Raises
-        ------
-        ParameterError
-            When it is not; the message names `where`, the value and the words, and the nearest of them.
-        """
-        wanted = f"one of {', '.join(self.words)} was wanted"
-        if not isinstance(value, str):
-            raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {wanted}")
-        if value not in self.words:
-            raise ParameterError(f"{where}.{self.name}: {unknown_name('word', value, self.words)}")
-        return value
+        """Return `value` when it is one of the words, or raise a ParameterError that names `where`."""
+        if isinstance(value, str) and value in self.words:
+            return value
+        said = f"{shown(value)}, but one of {', '.join(self.words)} was wanted"
+        raise ParameterError(
+            f"{where}.{self.name}: "
+            f"{unknown_name('word', value, self.words) if isinstance(value, str) else said}"
+        )
 
 
 def gain(
@@ -120,7 +92,7 @@ def gain(
     >>> gains_of(Mine)["k"].unit
     'N/m'
     """
-    return field(default=default, metadata={"gain": (unit, low, high, meaning, optional)})
+    return field(default=default, metadata={"gain": Gain("", default, unit, low, high, meaning, optional)})
 
 
 def choice(default: str, words: Sequence[str], meaning: str) -> Any:
@@ -131,37 +103,27 @@ def choice(default: str, words: Sequence[str], meaning: str) -> Any:
     ...     side: str = choice("left", ("left", "right"), "where to pass each other")
     >>> gains_of(Mine)["side"].words
     ('left', 'right')
-
-    Raises
-    ------
-    ValueError
-        When the default is none of the words.
     """
     if default not in words:
         raise ValueError(f"default {default!r}, but one of {', '.join(words)} was wanted")
-    return field(default=default, metadata={"option": (tuple(words), meaning)})
+    return field(default=default, metadata={"gain": Option("", default, tuple(words), meaning)})
 
 
 def gains_of(controller: Any) -> dict[str, Gain | Option]:
     """Return the gains of a controller class or instance by name, in their order of declaration.
 
-    One that is no dataclass has none.
+    One that is no dataclass has none; a plain number of a user's dataclass is a gain of any value.
     """
     found: dict[str, Gain | Option] = {}
     for each in fields(controller) if is_dataclass(controller) else ():
-        if "option" in each.metadata:
-            found[each.name] = Option(each.name, str(each.default), *each.metadata["option"])
-            continue
+        known = each.metadata.get("gain")
         default = None if each.default is MISSING else each.default
-        if "gain" in each.metadata:
-            unit, low, high, meaning, optional = each.metadata["gain"]
-            unit = "" if unit == "1" else unit  # a unit in formulas, and nothing behind a number
-        elif isinstance(default, int | float) and not isinstance(default, bool):
-            # a user's plain dataclass field is a gain of any value
-            unit, low, high, meaning, optional = "", -1e12, 1e12, "", False
-        else:
-            continue
-        found[each.name] = Gain(each.name, default, unit, low, high, meaning, optional)
+        if known is not None:
+            # 1 is a unit in formulas, and nothing behind a number
+            unit = {"unit": ""} if known.unit == "1" else {}
+            found[each.name] = replace(known, name=each.name, default=default, **unit)
+        elif is_number(default):
+            found[each.name] = Gain(each.name, default, "", -1e12, 1e12, "")
     return found
 
 
@@ -171,13 +133,7 @@ def gain_values(controller: Any) -> dict[str, Value]:
 
 
 def validate_gains(controller: Any) -> None:
-    """Check every gain of a controller instance; call it from ``__post_init__``.
-
-    Raises
-    ------
-    ParameterError
-        On the first gain out of range.
-    """
+    """Check every gain of a controller instance, or raise a ParameterError, from ``__post_init__``."""
     where = getattr(controller, "name", type(controller).__name__)
     for name, known in gains_of(controller).items():
         object.__setattr__(controller, name, known.validated(getattr(controller, name), where))
@@ -189,15 +145,13 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     Raises
     ------
     ParameterError
-        On an unknown gain (with the nearest name) a value out of range, or a class that raises something.
+        On an unknown gain (with the nearest name), a value out of range, or a class that raises something.
     """
-    known = gains_of(kind)
-    where = getattr(kind, "name", kind.__name__)
+    known, where = gains_of(kind), getattr(kind, "name", kind.__name__)
     for name in values:
         if name not in known:
-            if not known:
-                raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
-            raise ParameterError(f"{where}: {unknown_name('gain', name, known)}")
+            nothing = f"{where}.{name}: controller {where!r} has no gains"
+            raise ParameterError(f"{where}: {unknown_name('gain', name, known)}" if known else nothing)
     given = {name: known[name].validated(value, where) for name, value in values.items()}
     try:
         return kind(**given)

@@ -26,9 +26,8 @@ class OwnView:
     Attributes
     ----------
     number : int
-        The robot's own number, from 0.
-    position : (2,) m
-    velocity : (2,) m/s
+        The robot's own, from 0.
+    position, velocity : (2,) m, m/s
     neighbours : (k, 2) m
         Positions of the robots that it hears, as the last message of each has it.
     obstacle_point : (2,) m or None
@@ -64,7 +63,6 @@ class IndividualController(Protocol):
 
     def force(self, own: OwnView) -> Sequence[float] | Array:
         """Return the force in newtons, two numbers."""
-        ...
 
 
 class Individually:

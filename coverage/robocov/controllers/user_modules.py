@@ -1,56 +1,114 @@
-"""A controller's file and the modules of its author that it imports, as texts that run on any machine."""
+"""Controllers in users' files: their classes, the modules that they import, and their faults in one line.
+
+A file and the modules of its author that it imports are texts as well, which run on any machine.
+"""
 
 from __future__ import annotations
 
 import ast
+import hashlib
 import importlib.abc
 import importlib.machinery
 import importlib.util
 import os
 import sys
 import sysconfig
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from robocov.errors import ParameterError, shown, unknown_name
 
 if TYPE_CHECKING:
     from types import CodeType, ModuleType
 
-_OTHERS = frozenset(("site-packages", "dist-packages"))
+_MODULE = "robocov_user_"
+"""Prefix of the names of modules loaded from files of users."""
+
+_OURS = str(Path(__file__).parents[1])
+
+_INSTALLED = frozenset(("site-packages", "dist-packages"))
 """Folders of installed packages, which have versions."""
 
 
 class Module(NamedTuple):
-    """A module that a controller's file imports.
-
-    Attributes
-    ----------
-    path : str
-        Of its file; empty for a package without ``__init__.py``.
-    text : str
-    """
+    """A module that a controller's file imports; a package without ``__init__.py`` has no path."""
 
     path: str
     text: str
 
 
 class Source(NamedTuple):
-    """The file of a controller.
-
-    Attributes
-    ----------
-    path : str
-        Absolute.
-    text : str
-    modules : dict of name to Module
-        Those of the author's own that it imports, directly or not; see `own_modules`.
-    """
+    """The file of a controller, its absolute path, and the `own_modules` that it imports, by name."""
 
     path: str
     text: str
     modules: Mapping[str, Module] = {}
+
+
+def fault_of(where: str, error: BaseException, when: str = "") -> ParameterError:
+    """Return the error that tells what went wrong in code that is not ours, and in which line of it.
+
+    Its message begins with `where`: whose code, and what it was to do; it ends with `when`.
+    """
+    frames = _frames(error)
+    theirs = [frame for frame in frames if frame[0].startswith(_MODULE)]
+    theirs = theirs or [frame for frame in frames if not frame[1].startswith((_OURS, "<"))]
+    at = f" ({Path(theirs[-1][1]).name}, line {theirs[-1][2]})" if theirs else ""
+    return ParameterError(f"{where}: {type(error).__name__}: {error}{at}{when}")
+
+
+def users_fault(error: BaseException) -> ParameterError | None:
+    """Return what tells of an error that came up in a user's file; None where it did elsewhere."""
+    theirs = any(frame[0].startswith(_MODULE) for frame in _frames(error))
+    return fault_of("a controller of your own", error) if theirs else None
+
+
+def _frames(error: BaseException) -> list[tuple[str, str, int]]:
+    """Return module, file and line of each call that led to an error."""
+    return [
+        (str(frame.f_globals.get("__name__")), frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+    ]
+
+
+def class_in_file(name: str, source: Source | None) -> type[Any]:
+    """Return the controller class ``file.py:ClassName``; this runs the file, or its text in `source`."""
+    file, _, class_name = name.rpartition(":")
+    where = f"controller {shown(name)}"
+    if not class_name or not file.endswith(".py"):
+        raise ParameterError(f"{where}: a file and a class, as in mine.py:MyController, was wanted")
+    path = os.path.realpath(file) if source is None else source.path
+    if source is None and not Path(path).is_file():
+        raise ParameterError(f"{where}: there is no file {file}")
+    # a name of its own for each file, so that two files called mine.py do not replace each other
+    module_name = f"{_MODULE}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
+    loader = None if source is None else _TextLoader(source.path, source.text)
+    spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
+    assert spec is not None and spec.loader is not None
+    sys.modules[module_name] = module = importlib.util.module_from_spec(spec)
+    try:
+        with provided({} if source is None else source.modules):
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise fault_of(f"{where}: {file} cannot be run", error) from error
+    kind = vars(module).get(class_name)
+    if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
+        if kind is not None:
+            wanted = "has neither a method decide(seen, memory) nor force(own)"
+            raise ParameterError(f"{where}: {class_name} {wanted}")
+        kinds = [
+            key for key, each in vars(module).items() if hasattr(each, "decide") or hasattr(each, "force")
+        ]
+        raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
+    parameters = getattr(kind, "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
+        wanted = "is not a frozen dataclass; @dataclass(frozen=True) above it was wanted"
+        raise ParameterError(f"{where}: {class_name} {wanted}")
+    return kind
 
 
 def own_modules(text: str) -> dict[str, Module]:
@@ -65,9 +123,8 @@ def own_modules(text: str) -> dict[str, Module]:
     places: dict[str, list[str] | None] = {}  # where the submodules of what was looked for are
     waiting = list(_imported(text, ""))
     while waiting:
-        name = waiting.pop()
         where: list[str] | None = None
-        for part in accumulate(name.split("."), "{}.{}".format):
+        for part in accumulate(waiting.pop().split("."), "{}.{}".format):
             if part not in places:
                 spec = importlib.machinery.PathFinder.find_spec(part, where)
                 places[part] = None if spec is None else list(spec.submodule_search_locations or ())
@@ -103,33 +160,28 @@ def _imported(text: str, package: str) -> Iterator[str]:
 
 def _is_own(spec: importlib.machinery.ModuleSpec) -> bool:
     """Return whether a module is neither installed nor a part of Python or robocov."""
-
-    if spec.name.partition(".")[0] in ("robocov", "robocov_app"):
+    built_in = spec.origin is not None and not spec.has_location  # or frozen
+    if built_in or spec.name.partition(".")[0] in ("robocov", "robocov_app"):
         return False
-    place = spec.origin or next(iter(spec.submodule_search_locations or ()), "")
-    if spec.origin is not None and not spec.has_location:  # built in, or frozen
-        return False
-    path = Path(os.path.realpath(place))
+    path = Path(os.path.realpath(spec.origin or next(iter(spec.submodule_search_locations or ()), "")))
     others = [os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
-    return not _OTHERS.intersection(path.parts) and not any(path.is_relative_to(each) for each in others)
+    return not _INSTALLED.intersection(path.parts) and not any(path.is_relative_to(each) for each in others)
 
 
-class TextLoader(importlib.abc.SourceLoader):
+class _TextLoader(importlib.abc.SourceLoader):
     """Loads a module from the text of its file, which need not be there any more."""
 
     def __init__(self, path: str, text: str) -> None:
         self._path, self._text = path, text
 
     def get_filename(self, fullname: str) -> str:
-        """Return the path of the file."""
         return self._path
 
     def get_data(self, path: str) -> bytes:
-        """Return the text."""
         return self._text.encode()
 
     def source_to_code(self, data: object, path: object, **_: object) -> CodeType:  # type: ignore[override]
-        """Compile the text itself: what it says of its encoding was true of the file."""
+        # the text itself: what it says of its encoding was true of the file
         return compile(self._text, self._path, "exec", dont_inherit=True)
 
 
@@ -147,7 +199,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
             return None
         if not module.path:
             return importlib.machinery.ModuleSpec(fullname, None, is_package=True)
-        loader = TextLoader(module.path, module.text)
+        loader = _TextLoader(module.path, module.text)
         return importlib.util.spec_from_file_location(fullname, module.path, loader=loader)
 
 

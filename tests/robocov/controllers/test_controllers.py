@@ -177,7 +177,12 @@ def test_the_information_test_can_fail(controller: Controller) -> None:
     team = Team.homogeneous(3)
     seen = observations(positions, np.inf, 1)
     # who flees at full speed goes by the direction alone, who plans by what is nearest on a lattice
-    steps = {"dispersion": [0.5, 0.7], "atlas": [-2.5, -3.0], "atlas-shared": [-2.5, -3.0]}
+    steps = {
+        "dispersion": [0.5, 0.7],
+        "geodesic-lloyd": [1.2, 0.6],
+        "atlas": [-2.5, -3.0],
+        "atlas-shared": [-2.5, -3.0],
+    }
     step = steps.get(controller.name, [0.6, 0.3])
     moved = observations(positions + [[0, 0], step, [0, 0]], np.inf, 1)
     one = controller.decide(seen, controller.begin(REGION, team)).forces[0]
@@ -302,7 +307,7 @@ def test_every_gain_has_a_unit_a_meaning_and_a_default_in_range() -> None:
     for kind in CONTROLLERS.values():
         assert kind.summary
         assert kind.label
-        declared = {each.name: each.metadata["gain"][0] for each in fields(kind) if "gain" in each.metadata}
+        declared = {each.name: each.metadata["gain"].unit for each in fields(kind) if "gain" in each.metadata}
         for known in gains_of(kind).values():
             assert isinstance(known, Option) or declared[known.name]
             assert known.unit != "1"  # nobody reads it behind a number
