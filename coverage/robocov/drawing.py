@@ -8,15 +8,9 @@ offers ``matplotlib``.
 from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from robocov.errors import ParameterError, RobocovError, unknown_name
-
-if TYPE_CHECKING:
-    from robocov.cost import CoverageResult
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
 
 GROUP = "robocov.drawing"
 """The entry-point group."""
@@ -33,29 +27,84 @@ class DrawingBackend(Protocol):
     backend's as well.
     """
 
-    def plot_environment(self, environment: Environment, axes: Any = None, **options: Any) -> Any:
-        """Plot a map, and return the axes."""
+    def plot_environment(self, environment: Any, axes: Any = None, **options: Any) -> Any:
+        """Plot an `Environment`, and return the axes."""
 
-    def plot_record(self, record: Record, axes: Any = None, **options: Any) -> Any:
-        """Plot a run: the map, where the robots began, went and ended; and return the axes."""
+    def plot_record(self, record: Any, axes: Any = None, **options: Any) -> Any:
+        """Plot a `Record`: the map, where the robots began, went and ended; and return the axes."""
 
-    def plot_history(self, history: CostHistory, axes: Any = None, **options: Any) -> Any:
-        """Plot the mean distance against time, and return the axes."""
+    def plot_history(self, history: Any, axes: Any = None, **options: Any) -> Any:
+        """Plot the mean distance of a `CostHistory` against time, and return the axes."""
 
-    def plot_result(self, result: CoverageResult, axes: Any = None, **options: Any) -> Any:
-        """Plot the distance of every place to its nearest robot, and return the axes."""
+    def plot_result(self, result: Any, axes: Any = None, **options: Any) -> Any:
+        """Plot the distances of a `CoverageResult` from each place to its robot, and return the axes."""
 
-    def environment_html(self, environment: Environment) -> str:
+    def environment_html(self, environment: Any) -> str:
         """Return what a notebook shows of a map."""
 
-    def environment_png(self, environment: Environment) -> bytes:
+    def environment_png(self, environment: Any) -> bytes:
         """Return a picture of a map for where there is no HTML."""
 
-    def record_html(self, record: Record) -> str:
-        """Return what a notebook shows of a run."""
+    def record_html(self, record: Any) -> str:
+        """Return what a notebook shows of a run: it can be played."""
 
-    def record_png(self, record: Record) -> bytes:
+    def record_png(self, record: Any) -> bytes:
         """Return a picture of a run for where there is no HTML."""
+
+
+class Drawable:
+    """A thing that backends draw; notebooks show it where the backend has an HTML page or a PNG of it."""
+
+    _drawn_as: ClassVar[str]
+    """In the names of the backend's functions."""
+
+    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
+        """Plot it.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes or None
+            Where to draw. None makes a page with what belongs to it, as a title, a scale bar or a legend.
+        backend : str or None
+            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+        theme : {"light", "dark"}
+        size : (width, height), px
+            Of the page.
+        colours : {"paper", "robots"}
+            Of a record: green starts, red trajectories, blue final positions, or a hue for each robot.
+        mean_distance, mean_time : float, m, s
+            Of a record's final positions, for the page's title.
+        label, controller, title : str
+            Of a cost history: the curve's name, whose it is (the paper's controllers have colours of their
+            own), and the page's title.
+        radius : float or (n,), m
+            Of the robots of a coverage result.
+
+        Returns
+        -------
+        matplotlib Axes
+            The given ones, or those on the page, which is their ``figure``; notebooks show the page.
+
+        Raises
+        ------
+        ParameterError
+            On axes or options that cannot be used.
+        """
+        return getattr(drawing_backend(backend), f"plot_{self._drawn_as}")(self, axes, **options)
+
+    def _repr_html_(self) -> Any:
+        return self._displayed("html")
+
+    def _repr_png_(self) -> Any:
+        return self._displayed("png")
+
+    def _displayed(self, form: str) -> Any:
+        """Return what a notebook shows; None, for the text, where nobody draws it."""
+        try:
+            draw = getattr(drawing_backend(), f"{self._drawn_as}_{form}", None)
+        except RobocovError:
+            return None
+        return None if draw is None else draw(self)
 
 
 def drawing_backend(name: str | None = None) -> DrawingBackend:
@@ -86,11 +135,3 @@ def drawing_backend(name: str | None = None) -> DrawingBackend:
             f"{type(error).__name__}: {error}"
         ) from error
     return backend
-
-
-def displaying_backend() -> DrawingBackend | None:
-    """Return who draws for notebooks, None where nobody can: they show the text then."""
-    try:
-        return drawing_backend()
-    except RobocovError:
-        return None

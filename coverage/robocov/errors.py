@@ -1,4 +1,4 @@
-"""The errors that robocov raises on purpose.
+"""The errors that robocov raises on purpose, and the words of their messages.
 
     RobocovError
     ├── InputError            what a user gave cannot be used (exit status 2)
@@ -13,18 +13,22 @@ the value found there and what was wanted.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeAlias, TypeGuard
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+JsonPath: TypeAlias = tuple[str | int, ...]
+"""Keys and indices, from the whole document inwards."""
 
-    from robocov.files.mistakes import Mistake
+MOST_LISTED = 20
+"""Mistakes of one document that are told of; the rest is counted. To find the line of each takes about as
+long as reading the file again."""
 
-
-_LONGEST_KNOWN = 60
-"""Names that are known are told up to so many characters."""
+_LONGEST_NAME = 60
+"""Characters of a known name, or of a key, that are told."""
 
 
 class RobocovError(Exception):
@@ -33,6 +37,42 @@ class RobocovError(Exception):
 
 class InputError(RobocovError):
     """Something that the user gave cannot be used."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """Something wrong in a JSON document.
+
+    Attributes
+    ----------
+    path : tuple of str and int
+        To the value that is wrong, or that is missing; empty for the whole document.
+    text : str
+        The place as people read it, the value found there and what was wanted.
+    at_key : bool
+        The key at the end of the path is wrong, not its value.
+    line, column : int or None
+        Where that begins in the file, counted from 1, characters as columns; None where there is no file.
+    """
+
+    path: JsonPath
+    text: str
+    at_key: bool = False
+    line: int | None = None
+    column: int | None = None
+
+    @classmethod
+    def at(cls, path: JsonPath, what: str, *, at_key: bool = False) -> Mistake:
+        """Return the mistake whose text is the place of `path` and `what` is wrong there."""
+        return cls(path, f"{place(path)}: {what}" if path else what, at_key)
+
+    def told(self, where: str) -> str:
+        """Return the line for the mistake in a document that messages call `where`.
+
+        Where the line is known, it begins as compilers' messages do: ``mine.json:14:9: ...``. Terminals and
+        editors make that a link.
+        """
+        return f"{where}{'' if self.line is None else f':{self.line}:{self.column}'}: {self.text}"
 
 
 class MapError(InputError):
@@ -52,6 +92,15 @@ class MapError(InputError):
     mistakes: tuple[Mistake, ...] = ()
     unlisted: int = 0
     where: str = ""
+
+    @classmethod
+    def of(cls, where: str, mistakes: Sequence[Mistake], unlisted: int = 0) -> MapError:
+        """Return the error of a document with at least one mistake, of which `MOST_LISTED` are kept."""
+        others = len(mistakes) - 1 + unlisted
+        error = cls(f"{mistakes[0].told(where)}{f' (and {others} more)' if others else ''}")
+        error.mistakes, error.where = tuple(mistakes[:MOST_LISTED]), where
+        error.unlisted = others + 1 - len(error.mistakes)
+        return error
 
     @property
     def line(self) -> int | None:
@@ -82,8 +131,47 @@ def shown(value: object, limit: int = 60) -> str:
     >>> shown("x" * 100, limit=12)
     "'xxxxxxxx..."
     """
-    text = " ".join(repr(value).split())
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return _cut(" ".join(repr(value).split()), limit)
+
+
+def shown_json(value: object, limit: int = 60) -> str:
+    """Return `value` as it is quoted in messages: as JSON, cut to `limit` characters.
+
+    >>> shown_json([True, None, "x"])
+    '[true, null, "x"]'
+    """
+    return _cut(json.dumps(value, default=repr), limit)
+
+
+def one_line(text: object) -> str:
+    """Return `text` as messages can hold it: without line breaks and other control characters."""
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in str(text))
+
+
+def reason(error: Exception) -> str:
+    """Return why the system refused something, on one line."""
+    return one_line((isinstance(error, OSError) and error.strerror) or error)
+
+
+def place(path: Sequence[str | int]) -> str:
+    """Return `path` as messages show it; very long keys are cut.
+
+    >>> place(("obstacles", 2, "vertices", 0))
+    'obstacles[2].vertices[0]'
+    >>> place(("starts", "the lobby", "radius"))
+    'starts["the lobby"].radius'
+    """
+    text = ""
+    for step in path:
+        if isinstance(step, int):
+            text += f"[{step}]"
+            continue
+        step = _cut(step, _LONGEST_NAME)
+        if step.replace("-", "_").replace("$", "_").isidentifier():
+            text += f".{step}" if text else step
+        else:
+            text += f"[{json.dumps(step)}]"
+    return text
 
 
 def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
@@ -135,10 +223,9 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(map(_told, names))})"
+    known_names = ", ".join(_cut(one_line(each), _LONGEST_NAME) for each in names)
+    return f"unknown {kind} {shown(name)}{hint} (known: {known_names})"
 
 
-def _told(name: str) -> str:
-    """Return a known name for people: on one line, and not too long."""
-    name = name if name.isprintable() else ascii(name)[1:-1]
-    return name if len(name) <= _LONGEST_KNOWN else f"{name[: _LONGEST_KNOWN - 3]}..."
+def _cut(text: str, limit: int) -> str:
+    return text if len(text) <= limit else f"{text[: limit - 3]}..."

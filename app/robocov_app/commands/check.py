@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from robocov.errors import InputError, MapError
-from robocov.files.mistakes import place, told
+from robocov.errors import InputError, MapError, place
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.map_reports import report_lines
@@ -86,7 +85,7 @@ class Outcome:
             yield str(self.error)
             return
         for mistake in sorted(self.error.mistakes, key=lambda each: (each.line or 0, each.column or 0)):
-            yield told(self.error.where, mistake)
+            yield mistake.told(self.error.where)
         if self.error.unlisted:
             yield f"{self.error.where}: and {self.error.unlisted} more mistakes"
 

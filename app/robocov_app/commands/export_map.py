@@ -10,9 +10,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from robocov.errors import InputError
+from robocov.errors import InputError, one_line
 from robocov.files.atomic import writable
-from robocov.files.strictjson import one_line
 from robocov.mapfile import load_map
 from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
 

@@ -10,9 +10,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from robocov.errors import InputError
+from robocov.errors import InputError, one_line
 from robocov.files.atomic import writable
-from robocov.files.strictjson import one_line
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map

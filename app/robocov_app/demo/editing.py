@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.errors import MapError
-from robocov.files.strictjson import place
+from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.environment.starts import DiscStart, PointsStart, UniformStart
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.demo.editing import SHORTEST, words_for
 from robocov_app.editor.document import Sketch

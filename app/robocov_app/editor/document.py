@@ -17,9 +17,9 @@ from shapely import GeometryCollection, LineString, Polygon
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.environment.starts import DiscStart, PointsStart
-from robocov.errors import MapError
+from robocov.errors import MapError, one_line
 from robocov.files.documents import check_header
-from robocov.files.strictjson import located, one_line, parse, require_json
+from robocov.files.strictjson import located, parse, require_json
 from robocov.mapfile import density_of, dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, FORMAT, LARGEST, VERSION
 from robocov_app.editor.annotations import annotated, taken_apart

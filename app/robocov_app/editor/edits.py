@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.environment.starts import DiscStart
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor import vertices
 from robocov_app.editor.adding import (

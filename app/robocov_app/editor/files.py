@@ -7,9 +7,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from robocov.errors import MapError, OutputError
+from robocov.errors import MapError, OutputError, one_line
 from robocov.files.atomic import writable, written
-from robocov.files.strictjson import one_line, read_bytes
+from robocov.files.strictjson import read_bytes
 from robocov_app.editor.document import Sketch, parse_sketch, sketch_text
 
 State: TypeAlias = Literal["same", "changed", "gone"]

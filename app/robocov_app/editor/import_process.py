@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocov.environment import Environment
-from robocov.files.strictjson import one_line
+from robocov.errors import one_line
 from robocov_app.importers import ForeignMap, ImportReport, ReadOptions, Shaping, read_map, shaped
 from robocov_app.importers.comparison import Comparison, compare
 from robocov_app.live.latest import Service

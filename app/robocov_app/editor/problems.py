@@ -18,8 +18,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.environment.starts import DiscStart, PointsStart, Start
 from robocov.environment.swept import in_the_way, swept_area
-from robocov.errors import MapError, StartError, counted, listed
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
 from robocov.mapfile.rules import check_rules
 from robocov.robots import DEFAULT_RADIUS

@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.environment.obstacle_path import REPEATS, ObstaclePath
 from robocov.environment.starts import DiscStart, PointsStart, UniformStart
-from robocov.errors import unknown_name
-from robocov.files.mistakes import Mistake, place, refusal
-from robocov.files.strictjson import shown_json
+from robocov.errors import MapError, Mistake, place, shown_json, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from robocov.environment import Obstacle, Point, Ring
     from robocov.environment.starts import StartSpec
-    from robocov.files.mistakes import Path
+    from robocov.errors import JsonPath
 
 _KEYS = {
     "polygon": ("kind", "name", "vertices", "holes", "path"),
@@ -45,18 +43,18 @@ class PartReader:
     def __init__(self, where: str) -> None:
         self._where = where
 
-    def refuse(self, path: Path, what: str, *, at_key: bool = False) -> NoReturn:
+    def refuse(self, path: JsonPath, what: str, *, at_key: bool = False) -> NoReturn:
         """Raise the error that something is wrong at a place."""
         at = f"{place(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
-        raise refusal(self._where, [Mistake(path, at + what, at_key)])
+        raise MapError.of(self._where, [Mistake(path, at + what, at_key)])
 
-    def object(self, value: Any, path: Path) -> Mapping[str, Any]:
+    def object(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         """Return an object."""
         if not isinstance(value, dict):
             self.refuse(path, f"{shown_json(value)}, but an object was wanted")
         return value
 
-    def members(self, value: Any, path: Path, known: Iterable[str]) -> Mapping[str, Any]:
+    def members(self, value: Any, path: JsonPath, known: Iterable[str]) -> Mapping[str, Any]:
         """Return an object that has known keys only."""
         known = list(known)
         for key in self.object(value, path):
@@ -64,25 +62,25 @@ class PartReader:
                 self.refuse((*path, key), unknown_name("key", str(key), known), at_key=True)
         return self.object(value, path)
 
-    def text(self, value: Any, path: Path) -> str:
+    def text(self, value: Any, path: JsonPath) -> str:
         """Return a text."""
         if not isinstance(value, str):
             self.refuse(path, f"{shown_json(value)}, but a text was wanted")
         return value
 
-    def number(self, value: Any, path: Path) -> float:
+    def number(self, value: Any, path: JsonPath) -> float:
         """Return a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             self.refuse(path, f"{shown_json(value)}, but a number was wanted")
         return float(value)
 
-    def items(self, value: Any, path: Path, what: str) -> list[Any]:
+    def items(self, value: Any, path: JsonPath, what: str) -> list[Any]:
         """Return a list of something."""
         if not isinstance(value, list):
             self.refuse(path, f"{shown_json(value)}, but a list of {what} was wanted")
         return value
 
-    def point(self, value: Any, path: Path) -> Point:
+    def point(self, value: Any, path: JsonPath) -> Point:
         """Return a point."""
         if not isinstance(value, list | tuple) or len(value) != 2:
             self.refuse(path, f"{shown_json(value)}, but a point [x, y] in metres was wanted")
@@ -92,12 +90,12 @@ class PartReader:
             return x, y
         return self.number(x, (*path, 0)), self.number(y, (*path, 1))
 
-    def ring(self, value: Any, path: Path) -> Ring:
+    def ring(self, value: Any, path: JsonPath) -> Ring:
         """Return points, any number of them."""
         points = self.items(value, path, "points [x, y]")
         return tuple([self.point(point, (*path, k)) for k, point in enumerate(points)])
 
-    def obstacle(self, value: Any, path: Path) -> Obstacle:
+    def obstacle(self, value: Any, path: JsonPath) -> Obstacle:
         """Return an obstacle."""
         kind = self._kind(value, path, ("polygon", "circle", "wall"))
         members = self.members(value, path, _KEYS[kind])
@@ -114,7 +112,7 @@ class PartReader:
             self._ring_at(members, path, "points"), self._number_at(members, path, "width"), name, way
         )
 
-    def way(self, value: Any, path: Path) -> ObstaclePath:
+    def way(self, value: Any, path: JsonPath) -> ObstaclePath:
         """Return the path of an obstacle that moves."""
         members = self.members(value, path, _KEYS["path"])
         repeat = members.get("repeat", "loop")
@@ -125,7 +123,7 @@ class PartReader:
         points, speed = self._ring_at(members, path, "points"), self._number_at(members, path, "speed")
         return ObstaclePath(points, speed, repeat)
 
-    def start(self, value: Any, path: Path) -> StartSpec:
+    def start(self, value: Any, path: JsonPath) -> StartSpec:
         """Return a start."""
         kind = self._kind(value, path, ("disc", "uniform", "points"))
         members = self.members(value, path, _KEYS[kind])
@@ -136,7 +134,7 @@ class PartReader:
             return PointsStart(self._ring_at(members, path, "positions"))
         return UniformStart()
 
-    def _kind(self, value: Any, path: Path, kinds: tuple[str, ...]) -> str:
+    def _kind(self, value: Any, path: JsonPath, kinds: tuple[str, ...]) -> str:
         wanted = f"one of {', '.join(kinds)}"
         if not isinstance(value, dict):
             self.refuse(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
@@ -145,13 +143,13 @@ class PartReader:
             self.refuse((*path, "kind"), f"{shown_json(kind)}, but {wanted} was wanted")
         return str(kind)
 
-    def _at(self, members: Mapping[str, Any], path: Path, key: str) -> Any:
+    def _at(self, members: Mapping[str, Any], path: JsonPath, key: str) -> Any:
         if key not in members:
             self.refuse((*path, key), "missing, but it was wanted")
         return members[key]
 
-    def _ring_at(self, members: Mapping[str, Any], path: Path, key: str) -> Ring:
+    def _ring_at(self, members: Mapping[str, Any], path: JsonPath, key: str) -> Ring:
         return self.ring(self._at(members, path, key), (*path, key))
 
-    def _number_at(self, members: Mapping[str, Any], path: Path, key: str) -> float:
+    def _number_at(self, members: Mapping[str, Any], path: JsonPath, key: str) -> float:
         return self.number(self._at(members, path, key), (*path, key))

@@ -12,8 +12,7 @@ import shapely
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.environment.starts import DiscStart, PointsStart
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov_app.demo.editing import words_for
 from robocov_app.editor.document import BOUNDARY, Item, Owner, Sketch
 from robocov_app.editor.plane import nearest_on

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.errors import ParameterError, counted, unknown_name
-from robocov.files.strictjson import one_line
+from robocov.errors import ParameterError, counted, one_line, unknown_name
 from robocov_app.exporters import geojson, movingai, picture, ros, svg, wkt
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 

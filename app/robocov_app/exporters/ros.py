@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from robocov.errors import OutputError, shown
+from robocov.errors import OutputError, one_line, shown
 from robocov.files.atomic import written
-from robocov.files.strictjson import one_line
 from robocov_app.exporters.cells import Grid, free_cells, grid_over, lost_passages, not_held
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.errors import MapError, ParameterError, unknown_name
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, ParameterError, one_line, unknown_name
 from robocov_app.importers import (
     argos,
     dxf,

@@ -14,8 +14,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.errors import shown
-from robocov.files.strictjson import one_line
+from robocov.errors import one_line, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions

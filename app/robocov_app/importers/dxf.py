@@ -7,9 +7,8 @@ import re
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from robocov.errors import MapError, RobocovError
+from robocov.errors import MapError, RobocovError, one_line
 from robocov.extras import extra
-from robocov.files.strictjson import one_line
 from robocov_app.importers import limits
 from robocov_app.importers.dxf_drawing import DxfDrawing
 from robocov_app.importers.enclosing import foreign_map

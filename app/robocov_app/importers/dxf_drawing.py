@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import MapError, RobocovError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, RobocovError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.curves import TOLERANCE
 from robocov_app.importers.dxf_curves import flat, polyline, spline

@@ -6,8 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from robocov.files.mistakes import place
-from robocov.files.strictjson import one_line
+from robocov.errors import one_line, place
 from robocov_app.importers.enclosing import BOUNDARY, foreign_map
 from robocov_app.importers.georeference import in_metres
 from robocov_app.importers.json_file import (
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from robocov.arrays import Array
-    from robocov.files.mistakes import Path as Steps
+    from robocov.errors import JsonPath as Steps
     from robocov_app.importers.foreign import ForeignMap
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}

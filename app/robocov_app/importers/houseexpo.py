@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from robocov.errors import MapError, counted
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, counted, one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.fills import Crossings, edges_of, enclosed
 from robocov_app.importers.foreign import ForeignMap

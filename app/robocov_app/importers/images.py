@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.errors import MapError, counted, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, counted, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits, plain_yaml
 from robocov_app.importers.enclosing import foreign_map

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import MapError
-from robocov.files.mistakes import Mistake, refusal
-from robocov.files.strictjson import located, one_line, parse, shown_json
+from robocov.errors import MapError, Mistake, one_line, shown_json
+from robocov.files.strictjson import located, parse
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from robocov.arrays import Array
-    from robocov.files.mistakes import Path as Steps
+    from robocov.errors import JsonPath as Steps
 
 _BEFORE = b"\xef\xbb\xbf \t\r\n"
 
@@ -91,4 +90,4 @@ def is_number(value: object) -> bool:
 
 def refused(where: str, at: Steps, value: object, wanted: str) -> MapError:
     """Return the error of a value at a place: what is there, what was wanted."""
-    return refusal(where, [Mistake.at(at, f"{shown_json(value)}, but {wanted}")])
+    return MapError.of(where, [Mistake.at(at, f"{shown_json(value)}, but {wanted}")])

@@ -6,8 +6,7 @@ import math
 import stat
 from typing import TYPE_CHECKING
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST, LARGEST
 
 if TYPE_CHECKING:

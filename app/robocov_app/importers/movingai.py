@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 from robocov_app.importers import limits
 from robocov_app.importers.raster import BLOCKED, FREE, foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions

@@ -11,8 +11,7 @@ from xml.parsers import expat
 import numpy as np
 import shapely
 
-from robocov.errors import MapError, counted
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, counted, one_line
 from robocov_app.importers import limits
 from robocov_app.importers.enclosing import BOUNDARY, foreign_map
 from robocov_app.importers.georeference import DEGREES, in_metres

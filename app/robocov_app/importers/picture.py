@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers.images import Brightness, is_picture, read_picture
 from robocov_app.importers.raster import BLOCKED, FREE, UNKNOWN, foreign_map

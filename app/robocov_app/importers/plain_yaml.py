@@ -10,8 +10,7 @@ from typing import TypeAlias
 
 import yaml
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"
 """Text as it is written, or a list or a mapping of values."""

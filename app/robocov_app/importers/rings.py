@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.files.strictjson import one_line
+from robocov.errors import one_line
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.json_file import located_errors, positions, read_json, refused
 from robocov_app.importers.limits import require_shapes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from robocov.arrays import Array
-    from robocov.files.mistakes import Path as Steps
+    from robocov.errors import JsonPath as Steps
     from robocov_app.importers.foreign import ForeignMap
 
 _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")

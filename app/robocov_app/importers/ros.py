@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.errors import MapError, ParameterError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, ParameterError, one_line, shown
 from robocov_app.importers import limits, plain_yaml
 from robocov_app.importers.images import Brightness, read_picture
 from robocov_app.importers.named_files import named_file

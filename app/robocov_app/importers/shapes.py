@@ -12,8 +12,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov.errors import MapError, ParameterError, counted, unknown_name
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
 from robocov.mapfile.models import FARTHEST, LONGEST_LABEL, SMALLEST
 from robocov_app.importers import limits
 from robocov_app.importers.fills import Crossings, Rule, edges_of, enclosed

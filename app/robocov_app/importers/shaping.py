@@ -12,8 +12,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.environment.starts import GAP, DiscStart, PointsStart, StartSpec, UniformStart
-from robocov.errors import MapError, ParameterError, counted, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, SMALLEST

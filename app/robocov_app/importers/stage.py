@@ -18,8 +18,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits
 from robocov_app.importers.enclosing import foreign_map, surrounding

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.reading import Importer, ReadOptions
 from robocov_app.importers.shapes import Shapes

@@ -5,8 +5,7 @@ from __future__ import annotations
 import codecs
 from typing import TYPE_CHECKING
 
-from robocov.errors import MapError
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line
 from robocov_app.importers import limits
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, counted, listed, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
 from robocov_app.importers import limits
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.named_files import named_file

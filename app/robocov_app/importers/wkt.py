@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from robocov.files.strictjson import one_line
+from robocov.errors import one_line
 from robocov_app.importers.enclosing import foreign_map
 from robocov_app.importers.georeference import in_metres
 from robocov_app.importers.reading import Importer, ReadOptions

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from robocov.errors import MapError, shown
-from robocov.files.jsontext import line_and_column
+from robocov.files.strictjson import line_and_column
 from robocov_app.importers.limits import MAX_DEPTH
 from robocov_app.importers.shapes import Figure
 

@@ -8,8 +8,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from robocov.errors import MapError, shown
-from robocov.files.strictjson import one_line
+from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.importers import limits
 

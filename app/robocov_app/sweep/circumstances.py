@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.conditions import QUANTITIES, Conditions, parsed_failure, parsed_join
 from robocov.conditions import UNITS as CONDITION_UNITS
-from robocov.errors import ParameterError, shown, unknown_name
-from robocov.files.strictjson import place
+from robocov.errors import ParameterError, place, shown, unknown_name
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov_app.sweep.gain_choices import NO_LIMIT, once
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from robocov.controllers import gain_values, gains_of
 from robocov.controllers.gains import Option, Value, with_gains
-from robocov.errors import ParameterError, shown, unknown_name
-from robocov.files.strictjson import place
+from robocov.errors import ParameterError, place, shown, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable

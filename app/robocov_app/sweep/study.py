@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from robocov.controllers import controller_kind
 from robocov.controllers.user_modules import Source, own_modules
-from robocov.errors import InputError, ParameterError, shown, unknown_name
-from robocov.files.strictjson import place
+from robocov.errors import InputError, ParameterError, place, shown, unknown_name
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team
 from robocov.robots.teamfile import team_of_groups

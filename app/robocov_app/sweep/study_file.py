@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
-from robocov.errors import InputError, shown, unknown_name
-from robocov.files.strictjson import one_line, place, read_bytes
+from robocov.errors import InputError, one_line, place, shown, unknown_name
+from robocov.files.strictjson import read_bytes
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep.gain_choices import NO_LIMIT, Method, Range, Sampling, Scale, once
 from robocov_app.sweep.study import ALL, MOST_RUNS, Study, StudyMap

@@ -5,7 +5,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from robocov.cost.arrivals import Ways, checked_speeds, first_there
 from robocov.cost.lattice import Lattice, Number, Sites
 from robocov.cost.site_paths import CornerViews, looked_for, site_paths
 from robocov.density.masses import means_over_squares
-from robocov.drawing import drawing_backend
+from robocov.drawing import Drawable
 from robocov.errors import InputError, checked, counted
 from robocov.geodesic import Geodesics
 from robocov.geodesic.corners import columns
@@ -34,7 +34,7 @@ _BLOCK = 64
 
 
 @dataclass(frozen=True, eq=False)
-class CoverageResult:
+class CoverageResult(Drawable):
     """The coverage cost of one set of positions, and what it is made of.
 
     Attributes
@@ -73,6 +73,8 @@ class CoverageResult:
     mean_time : float, s, or None
         Mean time, with `speeds`, until the first robot is at a site.
     """
+
+    _drawn_as = "result"
 
     mean_distance: float
     value: float
@@ -138,33 +140,6 @@ class CoverageResult:
         weight = self.value / (mean * total) if total and mean else 0.0
         slope = np.column_stack(pull) * -weight
         return np.asarray(slope if self.speeds is None else slope / self.speeds[:, None])
-
-    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot the distance of every place to its nearest robot, and the borders of the geodesic cells.
-
-        Parameters
-        ----------
-        axes : matplotlib Axes or None
-            Where to draw; the scale of colours stands to the right of them. None makes a page.
-        backend : str or None
-            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
-        theme : {"light", "dark"}
-        size : (width, height), px
-            Of the page.
-        radius : float or (n,), m
-            Of the robots.
-
-        Returns
-        -------
-        matplotlib Axes
-            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
-
-        Raises
-        ------
-        ParameterError
-            On axes or options that cannot be used.
-        """
-        return drawing_backend(backend).plot_result(self, axes, **options)
 
 
 class CoverageCost:

@@ -13,7 +13,7 @@ from shapely import LineString, MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, frozen
 from robocov.density.masses import masses_of_polygons
-from robocov.drawing import displaying_backend, drawing_backend
+from robocov.drawing import Drawable
 from robocov.environment.obstacle_path import ObstaclePath
 from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, counted, unknown_name
@@ -106,7 +106,7 @@ Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 
 
 @dataclass(frozen=True)
-class Environment:
+class Environment(Drawable):
     """A map: what is there, and where a team may start. Immutable; equal when the content is equal.
 
     Only the physics, the sensor and the evaluation know the obstacles. A controller gets
@@ -129,6 +129,8 @@ class Environment:
     density : Density or None
         φ, how much each place counts: part of the task, which robots know. None: every place the same.
     """
+
+    _drawn_as = "environment"
 
     name: str
     boundary: Ring
@@ -246,41 +248,6 @@ class Environment:
         if name not in starts:
             raise StartError(f"map {self.name!r}: {unknown_name('start', name, starts)}")
         return Start(name, starts[name], self.free)
-
-    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot the map: its free space, its obstacles and the convex region that the robots know.
-
-        Parameters
-        ----------
-        axes : matplotlib Axes or None
-            Where to draw. None makes a page with title, scale bar and legend.
-        backend : str or None
-            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
-        theme : {"light", "dark"}
-        size : (width, height), px
-            Of the page.
-
-        Returns
-        -------
-        matplotlib Axes
-            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
-
-        Raises
-        ------
-        ParameterError
-            On axes or options that cannot be used.
-        """
-        return drawing_backend(backend).plot_environment(self, axes, **options)
-
-    def _repr_html_(self) -> str | None:
-        """Show the map in notebooks."""
-        backend = displaying_backend()
-        return None if backend is None else backend.environment_html(self)
-
-    def _repr_png_(self) -> bytes | None:
-        """Show the map where there is no HTML."""
-        backend = displaying_backend()
-        return None if backend is None else backend.environment_png(self)
 
 
 def _moved(points: Ring, by: Array) -> Ring:

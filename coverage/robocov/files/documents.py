@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
-from robocov.files.mistakes import MOST_LISTED, Mistake, refusal
-from robocov.files.strictjson import parse, read_bytes, shown_json
-
-if TYPE_CHECKING:
-    from pathlib import Path
-    from typing import Any
-
-    from pydantic import ValidatorFunctionWrapHandler
-    from pydantic_core import ErrorDetails
+from robocov.errors import MOST_LISTED, MapError, Mistake, shown_json
+from robocov.files.strictjson import parse, read_bytes
 
 
 class Document(BaseModel):
@@ -39,7 +34,7 @@ _WANTED = {
 def wanted(words: str) -> WrapValidator:
     """Return what makes messages about a field of a model say that `words` were wanted."""
 
-    def checked(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+    def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
         try:
             return handler(value)
         except ValidationError:
@@ -49,14 +44,7 @@ def wanted(words: str) -> WrapValidator:
 
 
 def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind:
-    """Return the content of a JSON file that robocov wrote.
-
-    Parameters
-    ----------
-    path : Path
-    kind : type of Document
-    form, version : str, int
-        What its ``format`` and ``version`` are to be.
+    """Return the content of a JSON file that robocov wrote, of that ``format`` and ``version``.
 
     Raises
     ------
@@ -69,9 +57,7 @@ def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        details = error.errors(include_url=False, include_context=False)
-        listed = [_mistake(detail) for detail in details[:MOST_LISTED]]
-        raise refusal(where, listed, len(details) - len(listed)) from None
+        raise refused(error, where, _mistake) from None
 
 
 def check_header(document: object, where: str, form: str, version: int) -> None:
@@ -82,8 +68,8 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
     MapError
     """
     if not isinstance(document, dict):
-        what = f"{shown_json(document)}, but a JSON object with {_article(form)} was wanted"
-        raise refusal(where, [Mistake.at((), what)])
+        kind = f"a JSON object with a {form.removeprefix('robocov-')}"
+        raise MapError.of(where, [Mistake((), f"{shown_json(document)}, but {kind} was wanted")])
     for key, right in (("format", form), ("version", version)):
         found = document.get(key)
         if type(found) is type(right) and found == right:
@@ -91,15 +77,20 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
         state = shown_json(found) if key in document else "missing"
         newer = type(found) is int and key == "version" and found > version
         advice = "; it was written by a newer robocov" if newer else ""
-        raise refusal(where, [Mistake.at((key,), f"{state}, but {shown_json(right)} was wanted{advice}")])
+        what = f"{state}, but {shown_json(right)} was wanted{advice}"
+        raise MapError.of(where, [Mistake.at((key,), what)])
 
 
-def _article(form: str) -> str:
-    return f"a {form.removeprefix('robocov-')}"
+def refused(error: ValidationError, where: str, mistake: Callable[[ErrorDetails], Mistake]) -> MapError:
+    """Return the error of a document that is not like its model; `mistake` puts pydantic's in words."""
+    details = error.errors(include_url=False, include_context=False)
+    # a misspelt key is also a missing one: naming the key that is there helps more
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
+    listed = [mistake(detail) for detail in details[:MOST_LISTED]]
+    return MapError.of(where, listed, len(details) - len(listed))
 
 
 def _mistake(detail: ErrorDetails) -> Mistake:
-    """Return one structural error: place, value, what was wanted."""
     path = tuple(step for step in detail["loc"] if step != "[key]")
     if detail["type"] == "missing":
         return Mistake.at(path, "missing")

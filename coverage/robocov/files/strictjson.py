@@ -1,23 +1,22 @@
-"""JSON as files should be: UTF-8, finite numbers, no key twice, no absurd depth; errors name the place."""
+"""JSON as files should be: UTF-8, finite numbers, no key twice, no absurd depth; errors name the place.
+
+Parsing forgets where values were, so that valid files cost nothing; after an error the text is
+walked again along the path to the place, and what lies beside that path is skipped by the parser.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from codecs import BOM_UTF8
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from robocov.errors import MapError, shown
-from robocov.files.jsontext import depth_offset, line_and_column, offset_of
-from robocov.files.mistakes import Mistake, refusal
-from robocov.files.mistakes import place as place
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from robocov.files.mistakes import Path as Steps
+from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown
 
 MAX_BYTES = 50_000_000
 """Largest file that is read, in bytes."""
@@ -28,7 +27,15 @@ MAX_DEPTH = 32
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
 
-_SPACE = " \t\n\r"
+_MOST_BITS = 1023
+"""Of a whole number that a float can stand for."""
+
+_SPACE = re.compile(r"[ \t\n\r]*")
+_BREAK = re.compile(r"\r\n|\r|\n")
+_BRACKET = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
+
+# numbers may be of any length here: nobody asks for their values
+_skipping = json.JSONDecoder(parse_float=len, parse_int=len, parse_constant=len, strict=False)
 
 
 class _Object(dict[str, Any]):
@@ -61,10 +68,8 @@ def read_bytes(path: Path) -> bytes:
     except IsADirectoryError:
         raise MapError(f"{where}: is a folder, but a file was wanted") from None
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MapError(f"{where}: cannot be read: {one_line(reason)}") from None
-    if len(content) > MAX_BYTES:
-        raise MapError(f"{where}: larger than {MAX_BYTES // 1_000_000} MB, but a smaller file was wanted")
+        raise MapError(f"{where}: cannot be read: {reason(error)}") from None
+    _require_size(content, where)
     return content
 
 
@@ -85,8 +90,7 @@ def parse(text: str | bytes, where: str) -> Any:
         object, or lists nested deeper than `MAX_DEPTH`; with line and column.
     """
     where = one_line(where)
-    if len(text) > MAX_BYTES:
-        raise MapError(f"{where}: larger than {MAX_BYTES // 1_000_000} MB, but a smaller file was wanted")
+    _require_size(text, where)
     text = _decoded(text, where)
     if not text.strip():
         raise MapError(f"{where}: empty, but JSON was wanted")
@@ -94,10 +98,10 @@ def parse(text: str | bytes, where: str) -> Any:
         value = json.loads(text, object_pairs_hook=_Object.of_pairs, parse_int=_whole_number)
     except json.JSONDecodeError as error:
         at, what = _syntax(text, error)
-        raise refusal(where, [_placed(Mistake((), what), text, at)]) from None
+        raise MapError.of(where, [_placed(Mistake((), what), text, at)]) from None
     except RecursionError:
         too_deep = Mistake((), _too_deep(""))
-        raise refusal(where, [_placed(too_deep, text, depth_offset(text, MAX_DEPTH))]) from None
+        raise MapError.of(where, [_placed(too_deep, text, depth_offset(text, MAX_DEPTH))]) from None
     try:
         require_json(value, where)
     except MapError as error:
@@ -127,7 +131,7 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
         ]
     except RecursionError:  # beside the place, something is nested as deep as parsing goes
         return error
-    return refusal(one_line(where), found, error.unlisted)
+    return MapError.of(one_line(where), found, error.unlisted)
 
 
 def require_json(value: object, where: str) -> None:
@@ -138,79 +142,128 @@ def require_json(value: object, where: str) -> None:
     MapError
         On anything else; the message names the JSON path.
     """
-    mistake = _first_mistake(value)
+    mistake = _first_mistake(value, ())
     if mistake is not None:
-        raise refusal(where, [mistake])
+        raise MapError.of(where, [mistake])
 
 
-def _first_mistake(value: object) -> Mistake | None:
+def _first_mistake(value: Any, path: JsonPath) -> Mistake | None:
     if not isinstance(value, (dict, list, tuple)):
-        return _scalar_mistake(value, ())
-    stack: list[tuple[Any, Steps]] = [(value, ())]
-    while stack:
-        holder, path = stack.pop()
-        if len(path) >= MAX_DEPTH:
-            return Mistake(path, _too_deep(place(path[:4]) + "...: "))
-        if isinstance(holder, dict):
-            mistake = _key_mistake(holder, path)
+        what = _wrong(value)
+        return None if what is None else Mistake.at(path, what)
+    if len(path) >= MAX_DEPTH:
+        return Mistake(path, _too_deep(place(path[:4]) + "...: "))
+    if isinstance(value, dict):
+        for key in value:
+            if not isinstance(key, str) or not _is_text(key):
+                at = f"{place(path)}: " if path else ""
+                text = f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
+                return Mistake((*path, key), text, at_key=True)
+        if isinstance(value, _Object) and value.twice is not None:
+            return Mistake.at((*path, value.twice), "given twice, but once was wanted", at_key=True)
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        # most of a large file is numbers: no call, no path for each
+        if not (type(item) is float and math.isfinite(item)):
+            mistake = _first_mistake(item, (*path, key))
             if mistake is not None:
                 return mistake
-        inner = []
-        for key, item in holder.items() if isinstance(holder, dict) else enumerate(holder):
-            # most of a large file is numbers: no call, no path for each
-            if type(item) is float and math.isfinite(item):
-                continue
-            if isinstance(item, (dict, list, tuple)):
-                inner.append((item, (*path, key)))
-            else:
-                mistake = _scalar_mistake(item, (*path, key))
-                if mistake is not None:
-                    return mistake
-        stack += reversed(inner)
     return None
 
 
-def _scalar_mistake(item: object, path: Steps) -> Mistake | None:
+def _wrong(item: object) -> str | None:
+    """Return what is wrong with a number, a text, or what JSON has not."""
     if isinstance(item, float):
-        if not math.isfinite(item):
-            return Mistake.at(path, f"{item}, but a finite number was wanted")
-    elif isinstance(item, str):
-        if not _is_text(item):
-            return Mistake.at(path, f"{shown(item)}, but text that UTF-8 can hold was wanted")
-    elif isinstance(item, int):
-        if item.bit_length() > 1023:
-            return Mistake.at(path, f"{item.bit_length()} bits long, but a smaller number was wanted")
-    elif item is not None:
-        return Mistake.at(path, f"{type(item).__name__}, but a JSON value was wanted")
-    return None
+        return None if math.isfinite(item) else f"{item}, but a finite number was wanted"
+    if isinstance(item, str):
+        return None if _is_text(item) else f"{shown(item)}, but text that UTF-8 can hold was wanted"
+    if isinstance(item, int):
+        bits = item.bit_length()
+        return None if bits <= _MOST_BITS else f"{bits} bits long, but a smaller number was wanted"
+    return None if item is None else f"{type(item).__name__}, but a JSON value was wanted"
 
 
-def shown_json(value: object, limit: int = 60) -> str:
-    """Return `value` as it is quoted in messages: as JSON, cut to `limit` characters.
+def offset_of(text: str, path: Sequence[str | int], *, at_key: bool = False) -> int:
+    """Return where the value at `path` begins in valid JSON; of what is missing, where its holder does.
 
-    >>> shown_json([True, None, "x"])
-    '[true, null, "x"]'
+    Parameters
+    ----------
+    text : str
+    path : sequence of str and int
+    at_key : bool
+        Return where the last key of the path begins instead. Of a key that is given more than once
+        the last one counts, as in parsing.
+
+    Examples
+    --------
+    >>> offset_of('{"a": [1, 2]}', ("a", 1))
+    10
     """
-    text = json.dumps(value, default=repr)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    key_at = at = _after_space(text, 0)
+    for step in path:
+        holder, found = at, False
+        if text[holder] == ("{" if isinstance(step, str) else "["):
+            for key, begin, value_at in _members(text, holder):
+                if key == step:
+                    key_at, at, found = begin, value_at, True
+                    if isinstance(step, int):
+                        break
+        if not found:
+            return holder
+    return key_at if at_key else at
 
 
-def one_line(text: object) -> str:
-    """Return `text` as messages can hold it: without line breaks and other control characters."""
-    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in str(text))
+def _members(text: str, at: int) -> Iterator[tuple[str | int, int, int]]:
+    """Yield key or index of each member of an object or list, and where its key and its value begin."""
+    named, index = text[at] == "{", 0
+    at = _after_space(text, at + 1)
+    while text[at] not in "]}":
+        key: str | int = index
+        begin = at
+        if named:
+            key, at = _skipping.raw_decode(text, at)
+            at = _after_space(text, _after_space(text, at) + 1)
+        yield key, begin, at
+        at = _after_space(text, _skipping.raw_decode(text, at)[1])
+        if text[at] == ",":
+            at = _after_space(text, at + 1)
+        index += 1
 
 
-def _key_mistake(item: dict[Any, Any], path: Steps) -> Mistake | None:
-    """Return what is wrong with the keys of an object, if anything is."""
-    for key in item:
-        if not isinstance(key, str) or not _is_text(key):
-            at = f"{place(path)}: " if path else ""
-            text = f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
-            return Mistake((*path, key), text, at_key=True)
-    twice = item.twice if isinstance(item, _Object) else None
-    if twice is None:
-        return None
-    return replace(Mistake.at((*path, twice), "given twice, but once was wanted"), at_key=True)
+def line_and_column(text: str, offset: int) -> tuple[int, int]:
+    r"""Return the line and the column of an offset, counted from 1; a column is a character.
+
+    >>> line_and_column("one\r\ntwo", 6)
+    (2, 2)
+    """
+    line, begin = 1, 0
+    for end in _BREAK.finditer(text, 0, offset):
+        line, begin = line + 1, end.end()
+    return line, offset - begin + 1
+
+
+def depth_offset(text: str, deepest: int) -> int:
+    """Return where lists and objects are first nested deeper than `deepest`; the end where nowhere."""
+    depth = 0
+    for token in _BRACKET.finditer(text):
+        depth += {"[": 1, "{": 1, "]": -1, "}": -1}.get(token[0], 0)
+        if depth > deepest:
+            return token.start()
+    return len(text)
+
+
+def _after_space(text: str, at: int) -> int:
+    space = _SPACE.match(text, at)
+    return at if space is None else space.end()
+
+
+def _placed(mistake: Mistake, text: str, offset: int) -> Mistake:
+    line, column = line_and_column(text, offset)
+    return replace(mistake, line=line, column=column)
+
+
+def _require_size(content: str | bytes, where: str) -> None:
+    if len(content) > MAX_BYTES:
+        raise MapError(f"{where}: larger than {MAX_BYTES // 1_000_000} MB, but a smaller file was wanted")
 
 
 def _too_deep(prefix: str) -> str:
@@ -228,31 +281,26 @@ def _decoded(text: str | bytes, where: str) -> str:
         offset = error.start + len(text) - len(body)
         found = f"byte 0x{body[error.start]:02x} at offset {offset}"
         what = f"{found}: not UTF-8, but JSON in UTF-8 was wanted"
-        raise refusal(where, [_placed(Mistake((), what), before, len(before))]) from None
-
-
-def _placed(mistake: Mistake, text: str, offset: int) -> Mistake:
-    line, column = line_and_column(text, offset)
-    return replace(mistake, line=line, column=column)
+        raise MapError.of(where, [_placed(Mistake((), what), before, len(before))]) from None
 
 
 def _syntax(text: str, error: json.JSONDecodeError) -> tuple[int, str]:
     """Return where text is no JSON, and why, in words that are the same in every version of Python."""
     at = error.pos
-    before = text[:at].rstrip(_SPACE)
+    before = text[:at].rstrip(" \t\n\r")
     if text[at : at + 1] in ("}", "]") and before.endswith(","):
         at = len(before) - 1  # later versions complain about the comma itself
     rest = text[at : at + 12]
     found = shown(rest.splitlines()[0] or rest) if rest else "end of file"
-    if text[at : at + 1] == "," and text[at + 1 :].lstrip(_SPACE)[:1] in ("}", "]"):
-        reason = "a comma that nothing follows"
-    elif text[at : at + 2] in ("//", "/*") or text[at : at + 1] == "#":
-        reason = "JSON has no comments"
-    elif text[at : at + 1] == "'":
-        reason = "texts stand in double quotes"
+    if rest[:1] == "," and text[at + 1 :].lstrip(" \t\n\r")[:1] in ("}", "]"):
+        why = "a comma that nothing follows"
+    elif rest.startswith(("//", "/*", "#")):
+        why = "JSON has no comments"
+    elif rest.startswith("'"):
+        why = "texts stand in double quotes"
     else:
-        reason = error.msg[:1].lower() + error.msg[1:]
-    return at, f"{found}: not JSON: {reason}"
+        why = error.msg[:1].lower() + error.msg[1:]
+    return at, f"{found}: not JSON: {why}"
 
 
 def _is_text(text: str) -> bool:

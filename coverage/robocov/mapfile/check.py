@@ -13,8 +13,7 @@ from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.environment.starts import GAP, DiscStart, PointsStart
 from robocov.environment.swept import in_the_way, swept_area
-from robocov.errors import StartError, listed
-from robocov.files.strictjson import place
+from robocov.errors import StartError, listed, place
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:

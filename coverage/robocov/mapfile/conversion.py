@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov.environment import Environment, Ring
-from robocov.errors import MapError, unknown_name
+from robocov.errors import MapError, one_line, unknown_name
 from robocov.files.atomic import written
-from robocov.files.strictjson import located, one_line, parse, read_bytes, require_json
+from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.mapfile.density import density_document, density_from
 from robocov.mapfile.models import (
     FORMAT,

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.density import FINEST, Density, Raster
-from robocov.errors import MapError
-from robocov.files.mistakes import MOST_LISTED, Mistake, refusal
-from robocov.files.strictjson import one_line, shown_json
+from robocov.errors import MapError, Mistake, one_line, shown_json
 from robocov.mapfile.models import (
     LARGEST,
     LEAST_VARIANCE,
@@ -61,7 +59,7 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
     """
     found = list(_mistakes(model))
     if found:
-        raise refusal(where, found[:MOST_LISTED], len(found[MOST_LISTED:]))
+        raise MapError.of(where, found)
     if not isinstance(model, RasterDensityModel):
         density: Density = model.built()
         return density
@@ -73,7 +71,7 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
         low, high = model.black or 0.0, 1.0 if model.white is None else model.white
         values = np.round(low + (high - low) * _greys(str(model.picture), folder, where), _DIGITS)
         if not values.max() > 0.0:
-            raise refusal(where, [_nothing(("density", "picture"))])
+            raise MapError.of(where, [_nothing(("density", "picture"))])
     return Raster(values[::-1], (extent[0], extent[1], extent[2], extent[3]), model.interpolation)
 
 
@@ -156,7 +154,7 @@ def _greys(name: str, folder: Path | None, where: str) -> Array:
     at = ("density", "picture")
 
     def refused(what: str) -> MapError:
-        return refusal(where, [Mistake.at(at, f"{shown_json(name)}: {what}")])
+        return MapError.of(where, [Mistake.at(at, f"{shown_json(name)}: {what}")])
 
     if folder is None:
         raise refused("a map that is no file has no folder, but rows of numbers were wanted")

@@ -21,15 +21,12 @@ from robocov.density import (
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.environment.obstacle_path import ObstaclePath, Repeat
 from robocov.environment.starts import DiscStart, PointsStart, UniformStart
-from robocov.errors import unknown_name
-from robocov.files.documents import check_header
-from robocov.files.mistakes import MOST_LISTED, Mistake, place, refusal
-from robocov.files.strictjson import shown_json
+from robocov.errors import Mistake, place, shown_json, unknown_name
+from robocov.files.documents import check_header, refused
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-    from robocov.errors import MapError
 
 FORMAT = "robocov-map"
 VERSION = 1
@@ -406,7 +403,7 @@ def validate(document: object, where: str) -> MapModel:
     try:
         return MapModel.model_validate(document)
     except ValidationError as error:
-        raise _refusal(error, where) from None
+        raise refused(error, where, _mistake) from None
 
 
 def validate_density(value: object, where: str) -> DensityModel:
@@ -420,20 +417,11 @@ def validate_density(value: object, where: str) -> DensityModel:
     try:
         return _Weighed.model_validate({"density": value}).density
     except ValidationError as error:
-        raise _refusal(error, where) from None
+        raise refused(error, where, _mistake) from None
 
 
 class _Weighed(Model):
     density: DensityModel
-
-
-def _refusal(error: ValidationError, where: str) -> MapError:
-    """Return the error of a document with structural mistakes."""
-    details = error.errors(include_url=False, include_context=False)
-    # a misspelt key is also a missing one: naming the key that is there helps more
-    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
-    listed = [_mistake(detail) for detail in details[:MOST_LISTED]]
-    return refusal(where, listed, len(details) - len(listed))
 
 
 def _kinds(union: Any) -> dict[str, type[Model]]:

@@ -11,8 +11,7 @@ from shapely import Polygon
 from robocov.density import WeightedArea, WeightedPolygons
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.environment.starts import GAP, DiscStart, PointsStart, UniformStart
-from robocov.errors import StartError
-from robocov.files.mistakes import MOST_LISTED, Mistake, place, refusal
+from robocov.errors import MapError, Mistake, StartError, place
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.environment import Ring
     from robocov.environment.obstacle_path import ObstaclePath
-    from robocov.files.mistakes import Path
+    from robocov.errors import JsonPath
 
 _FLAT = 1e-9
 """A ring whose area is below this part of its bounding box squared is a line."""
@@ -53,10 +52,10 @@ def check_rules(environment: Environment, where: str) -> None:
     if not found:
         found = list(_space_mistakes(environment))
     if found:
-        raise refusal(where, found[:MOST_LISTED], len(found[MOST_LISTED:]))
+        raise MapError.of(where, found)
 
 
-def _ring_mistakes(at: Path, ring: Ring) -> Iterator[Mistake]:
+def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     """Yield what is wrong with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
@@ -89,7 +88,7 @@ def _wrong_size(extent: Array) -> str | None:
     return None
 
 
-def _crossing(at: Path, points: Array, polygon: Polygon) -> Mistake:
+def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
     """Return the mistake of a ring that crosses or touches itself, with the two edges."""
     reason = shapely.is_valid_reason(polygon)
     spot = np.array([float(value) for value in reason[reason.index("[") + 1 : -1].split()])
@@ -110,7 +109,7 @@ def _crossing(at: Path, points: Array, polygon: Polygon) -> Mistake:
 
 
 def _obstacle_mistakes(
-    at: Path, obstacle: PolygonObstacle | CircleObstacle | WallObstacle
+    at: JsonPath, obstacle: PolygonObstacle | CircleObstacle | WallObstacle
 ) -> Iterator[Mistake]:
     if isinstance(obstacle, PolygonObstacle):
         found = list(_ring_mistakes((*at, "vertices"), obstacle.vertices))
@@ -131,12 +130,12 @@ def _obstacle_mistakes(
             yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
 
 
-def _area_mistakes(at: Path, area: WeightedArea) -> Iterator[Mistake]:
+def _area_mistakes(at: JsonPath, area: WeightedArea) -> Iterator[Mistake]:
     """Yield what is wrong with the outline of a weighted area."""
     yield from _obstacle_mistakes(at, PolygonObstacle(area.vertices, area.holes))
 
 
-def _path_mistakes(at: Path, path: ObstaclePath) -> Iterator[Mistake]:
+def _path_mistakes(at: JsonPath, path: ObstaclePath) -> Iterator[Mistake]:
     """Yield what is wrong with the path of an obstacle."""
     extent = np.ptp(np.asarray(path.points, dtype=float), axis=0)
     if extent.max() > LARGEST:
@@ -147,7 +146,7 @@ def _path_mistakes(at: Path, path: ObstaclePath) -> Iterator[Mistake]:
         yield Mistake.at((*at, "points"), what)
 
 
-def _hole_mistakes(at: Path, obstacle: PolygonObstacle) -> Iterator[Mistake]:
+def _hole_mistakes(at: JsonPath, obstacle: PolygonObstacle) -> Iterator[Mistake]:
     """Yield what is wrong with the holes of a polygon whose rings are good one by one."""
     if obstacle.polygon.is_valid:
         return

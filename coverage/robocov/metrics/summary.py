@@ -11,7 +11,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.cost.momentary_cost import MomentaryCost
-from robocov.drawing import drawing_backend
+from robocov.drawing import Drawable
 from robocov.errors import counted
 from robocov.observation.neighbours import close_pairs
 from robocov.record import Record
@@ -48,7 +48,7 @@ STUCK_AWAY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class CostHistory:
+class CostHistory(Drawable):
     """The coverage cost (22) along a run.
 
     Attributes
@@ -62,6 +62,8 @@ class CostHistory:
         equally fast.
     """
 
+    _drawn_as = "history"
+
     time: Array
     mean_distance: Array
     cost: Array
@@ -72,35 +74,6 @@ class CostHistory:
         first, last = self.mean_distance[[0, -1]].tolist()
         moments = counted(len(self.time), "moment")
         return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
-
-    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot the mean distance against time.
-
-        Parameters
-        ----------
-        axes : matplotlib Axes or None
-            Where to draw; the curve's name stands to the right of them. None makes a page.
-        backend : str or None
-            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
-        label, controller : str
-            The curve's name, and whose it is: the paper's controllers have colours of their own.
-        theme : {"light", "dark"}
-        size : (width, height), px
-            Of the page.
-        title : str
-            Of the page.
-
-        Returns
-        -------
-        matplotlib Axes
-            The given ones, or those on the page, which is their ``figure``; notebooks show the page.
-
-        Raises
-        ------
-        ParameterError
-            On axes or options that cannot be used.
-        """
-        return drawing_backend(backend).plot_history(self, axes, **options)
 
 
 def cost_history(

@@ -16,7 +16,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions
 from robocov.controllers import short_name
-from robocov.drawing import displaying_backend, drawing_backend
+from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, shown
 from robocov.extras import extra
@@ -51,7 +51,7 @@ _LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Drawable):
     """A whole run.
 
     Attributes
@@ -83,6 +83,8 @@ class Record:
     conditions : Conditions or None
         Under which it went; None: ideal ones.
     """
+
+    _drawn_as = "record"
 
     environment: Environment
     team: Team
@@ -251,47 +253,6 @@ class Record:
             columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
         frame: DataFrame = pandas.DataFrame(columns)
         return frame
-
-    def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot the whole run: the map, where the robots began, went and ended, and the final Voronoi cells.
-
-        Parameters
-        ----------
-        axes : matplotlib Axes or None
-            Where to draw. None makes a page with title, scale bar and legend.
-        backend : str or None
-            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
-        theme : {"light", "dark"}
-        colours : {"paper", "robots"}
-            Green starts, red trajectories, blue final positions, or a hue for each robot.
-        size : (width, height), px
-            Of the page.
-        mean_distance : float, m
-            Of the final positions, for the page's title.
-        mean_time : float, s
-            The mean time until the first is there, likewise, where robots are not equally fast.
-
-        Returns
-        -------
-        matplotlib Axes
-            The given ones, or the map's on the page, which is their ``figure``; notebooks show the page.
-
-        Raises
-        ------
-        ParameterError
-            On axes or options that cannot be used.
-        """
-        return drawing_backend(backend).plot_record(self, axes, **options)
-
-    def _repr_html_(self) -> str | None:
-        """Show the run in notebooks: it can be played."""
-        backend = displaying_backend()
-        return None if backend is None else backend.record_html(self)
-
-    def _repr_png_(self) -> bytes | None:
-        """Show the run where there is no HTML."""
-        backend = displaying_backend()
-        return None if backend is None else backend.record_png(self)
 
     def to_json(
         self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import InputError, ParameterError, is_number, shown, unknown_name
-from robocov.files.strictjson import one_line, parse, place, read_bytes
+from robocov.errors import InputError, ParameterError, is_number, one_line, place, shown, unknown_name
+from robocov.files.strictjson import parse, read_bytes
 from robocov.robots.team import Team
 
 if TYPE_CHECKING:

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-from robocov.errors import MapError
-from robocov.files.mistakes import Mistake, place, refusal
+from robocov.errors import MapError, Mistake, place
 
 
 def test_one_is_told_and_the_others_are_counted() -> None:
     mistakes = [Mistake.at(("boundary", k), "3, but a point was wanted") for k in range(3)]
-    assert str(refusal("m.json", mistakes[:1])) == "m.json: boundary[0]: 3, but a point was wanted"
-    error = refusal("m.json", mistakes, 4)
+    assert str(MapError.of("m.json", mistakes[:1])) == "m.json: boundary[0]: 3, but a point was wanted"
+    error = MapError.of("m.json", mistakes, 4)
     assert isinstance(error, MapError)
     assert str(error) == "m.json: boundary[0]: 3, but a point was wanted (and 6 more)"
     assert error.mistakes == tuple(mistakes)
@@ -15,7 +14,7 @@ def test_one_is_told_and_the_others_are_counted() -> None:
 
 
 def test_with_a_line_it_begins_as_compilers_do() -> None:
-    error = refusal("m.json", [Mistake((), "empty", line=14, column=9)])
+    error = MapError.of("m.json", [Mistake((), "empty", line=14, column=9)])
     assert str(error) == "m.json:14:9: empty"
     assert (error.line, error.column) == (14, 9)
 

@@ -18,8 +18,7 @@ from example_map import DELETED, DOCUMENT, SCHEMA, changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.errors import MapError
-from robocov.files.mistakes import MOST_LISTED
+from robocov.errors import MOST_LISTED, MapError
 from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
 from robocov.mapfile.models import validate
 

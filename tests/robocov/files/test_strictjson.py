@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.files.jsontext import depth_offset, line_and_column, offset_of
+from robocov.files.strictjson import depth_offset, line_and_column, offset_of
 
 texts = st.text(st.characters(exclude_categories=("Cs",)), max_size=4) | st.sampled_from(
     ["[", '"', "{]", "\\"]
