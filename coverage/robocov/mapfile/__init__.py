@@ -1,20 +1,21 @@
-"""Map files: the map JSON, its structure and its rules, to and from `Environment`; the bundled maps."""
+"""Map files: the map JSON, version 1, to and from `Environment`; the bundled maps."""
 
 from __future__ import annotations
 
-from robocov.mapfile.conversion import (
-    bundled_maps,
-    density_of,
-    dump_document,
-    dump_map,
-    from_json,
-    load_map,
-    map_file,
-    map_schema,
-    parse_map,
-    save_map,
-    to_json,
-)
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from robocov.density import Density
+from robocov.environment import Environment, Ring
+from robocov.errors import MapError, one_line, unknown_name
+from robocov.files.atomic import written
+from robocov.files.strictjson import located, parse, read_bytes, require_json
+from robocov.mapfile.density import density_document, density_from
+from robocov.mapfile.models import FORMAT, VERSION, map_schema, plain, validate, validate_density
+from robocov.mapfile.rules import check_rules
 
 __all__ = [
     "bundled_maps",
@@ -29,3 +30,257 @@ __all__ = [
     "save_map",
     "to_json",
 ]
+
+_LINE = 100
+"""Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
+
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+_MEASURED = ("boundary", "obstacles", "starts", "density")
+"""Keys of numbers that `dump_map` writes short."""
+
+_DIGITS = 9
+"""Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
+
+_NOISE = 16
+"""What a few sums and a rotation miss a decimal by at most, in units of the last place (of 1 m at least)."""
+
+
+def load_map(source: str | Path) -> Environment:
+    """Return the map in a file, or the bundled map of that name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A path to a map JSON, or the name of a bundled map: a str without suffix and separator.
+
+    Raises
+    ------
+    MapError
+        One line: the file with line and column, the JSON path, the value and what was wanted; for an
+        unknown name the nearest one.
+
+    Examples
+    --------
+    >>> load_map("square").area
+    100.0
+    """
+    path = map_file(source)
+    return parse_map(read_bytes(path), str(path), path.parent)
+
+
+def map_file(source: str | Path) -> Path:
+    """Return the file of the map that `load_map` returns for the same source; it need not be there.
+
+    Raises
+    ------
+    MapError
+        For an unknown name.
+    """
+    if not isinstance(source, str) or any(char in source for char in "./\\\0"):
+        return Path(source)
+    known = bundled_maps()
+    if source in known:
+        return known[source]
+    try:
+        if Path(source).is_file():
+            return Path(source)
+    except OSError:  # as of a name that is longer than any file's
+        pass
+    raise MapError(unknown_name("map", source, known))
+
+
+def bundled_maps() -> dict[str, Path]:
+    """Return the files of the bundled maps by name, sorted.
+
+    An installed package holds them; in a checkout they are in the folder ``maps``.
+    """
+    here = Path(__file__).resolve()
+    for folder in (here.parents[1] / "maps", here.parents[3] / "maps"):
+        files = sorted(folder.glob("*.json"))
+        if files:
+            return {file.stem: file for file in files}
+    return {}
+
+
+def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
+    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    document = parse(text, where)
+    try:
+        return _environment(document, one_line(where), folder)
+    except MapError as error:
+        raise located(error, text, where) from None
+
+
+def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
+    """Return the map in a parsed JSON `document`; messages call it `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    where = one_line(where)
+    require_json(document, where)
+    return _environment(document, where, folder)
+
+
+def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
+    """Return the density that the JSON value at a map's ``density`` stands for.
+
+    A raster that does not say what it covers covers the bounding box of the boundary, [x, y] in m; messages
+    call the map `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    return density_from(validate_density(value, where), boundary, folder, where)
+
+
+def _environment(document: object, where: str, folder: Path | None) -> Environment:
+    model = validate(document, where)
+    boundary: Any = model.boundary
+    environment = Environment(
+        name=model.name,
+        boundary=boundary,
+        obstacles=tuple(obstacle.built() for obstacle in model.obstacles),
+        starts={name: start.built() for name, start in model.starts.items()},
+        description=model.description,
+        extra=json.loads(json.dumps(model.extra)),
+        schema=model.schema_,
+        density=None if model.density is None else density_from(model.density, boundary, folder, where),
+    )
+    check_rules(environment, where)
+    return environment
+
+
+def to_json(environment: Environment) -> dict[str, Any]:
+    """Return `environment` as a JSON document that `from_json` turns into an equal one.
+
+    Whole numbers are int, so that the text is short.
+    """
+    document: dict[str, Any] = {} if environment.schema is None else {"$schema": environment.schema}
+    document |= {"format": FORMAT, "version": VERSION, "name": environment.name}
+    if environment.description:
+        document["description"] = environment.description
+    document["boundary"] = plain(environment.boundary)
+    document["obstacles"] = plain(environment.obstacles)
+    document["starts"] = {name: plain(spec) for name, spec in environment.starts.items()}
+    if environment.density is not None:
+        document["density"] = density_document(environment.density)
+    if environment.extra:
+        document["extra"] = dict(environment.extra)
+    return document
+
+
+def save_map(environment: Environment, path: str | Path) -> None:
+    """Write `environment` to `path`, whole or not at all.
+
+    Raises
+    ------
+    MapError
+        When the map breaks a rule, so that it could not be loaded again.
+    OutputError
+        When the file cannot be written; a file that was there before is then untouched.
+    """
+    exact = to_json(environment)
+    document = _shortened(exact)
+    if document == exact and environment.density is None:
+        # what is written is the map itself, whose free space may be known already
+        require_json(document, str(path))
+        validate(document, str(path))
+        check_rules(environment, str(path))
+    else:
+        from_json(document, str(path))
+    with written(Path(path)) as part:
+        part.write_bytes(_dumped(document).encode())
+
+
+def dump_map(environment: Environment) -> str:
+    """Return the text of a map file: keys in a fixed order, one list of vertices on a line.
+
+    Numbers are the shortest that stand for the same place. What is the result of a sum, as
+    0.30000000000000004, is written as the decimal that it misses by rounding errors alone, 0.3. What was
+    written by hand stays as it is.
+    """
+    return dump_document(to_json(environment))
+
+
+def dump_document(document: dict[str, Any]) -> str:
+    """Return the text of a map file with this document, which may be a draft that no map can be made of.
+
+    How it is broken into lines does not depend on the lengths of its numbers: in the next version of a
+    file, a vertex that has moved changes one line.
+    """
+    return _dumped(_shortened(document))
+
+
+def _shortened(document: dict[str, Any]) -> dict[str, Any]:
+    return document | {key: _short(document[key]) for key in _MEASURED if key in document}
+
+
+def _short(value: Any) -> Any:
+    """Return a JSON value with numbers as `dump_map` writes them."""
+    if isinstance(value, float):
+        decimal = round(value, _DIGITS)
+        noise = _NOISE * math.ulp(max(abs(value), 1.0))
+        return plain(decimal if abs(decimal - value) <= noise else value)
+    if isinstance(value, list):
+        return [_short(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    return value
+
+
+def _dumped(document: dict[str, Any]) -> str:
+    lines = []
+    for key, value in document.items():
+        if key in ("obstacles", "starts"):
+            text = _expanded(value, "  ")
+        else:
+            text = _text(value, "  ", len(key) + 6)
+        lines.append(f"  {_compact(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _text(value: object, indent: str, used: int) -> str:
+    """Return `value` on one line where it fits or is a list of points, else one item on a line."""
+    line = _compact(value)
+    if used + len(_NUMBER.sub("00", line)) <= _LINE or not isinstance(value, (dict, list)):
+        return line
+    if isinstance(value, list) and all(isinstance(item, list) and not _is_ring(item) for item in value):
+        return line
+    return _expanded(value, indent)
+
+
+def _expanded(value: dict[str, Any] | list[Any], indent: str) -> str:
+    """Return a list or an object with one item on a line."""
+    inner = indent + "  "
+    if not value:
+        return _compact(value)
+    if isinstance(value, list):
+        items = [_text(item, inner, len(inner)) for item in value]
+        return "[\n" + ",\n".join(inner + item for item in items) + f"\n{indent}]"
+    items = []
+    for key, item in value.items():
+        head = f"{_compact(key)}: "
+        # the rows of a raster are no points: one on a line
+        rows = key == "rows" and isinstance(item, list) and len(item) > 1
+        items.append(head + (_expanded(item, inner) if rows else _text(item, inner, len(inner) + len(head))))
+    return "{\n" + ",\n".join(inner + item for item in items) + f"\n{indent}}}"
+
+
+def _is_ring(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
+
+
+def _compact(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -127,7 +127,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
 
     Examples
     --------
-    >>> from robocov.mapfile.conversion import load_map
+    >>> from robocov.mapfile import load_map
     >>> check_map(load_map("square")).components
     (100.0,)
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.density import FINEST, Density, Raster
-from robocov.errors import MapError, Mistake, one_line, shown_json
+from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, reason, shown_json
 from robocov.mapfile.models import (
     LARGEST,
     LEAST_VARIANCE,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from robocov.arrays import Array
+    from robocov.environment import Ring
 
 MOST_BYTES = 8_000_000
 """Largest picture of a density, in bytes."""
@@ -36,17 +37,15 @@ MOST_BYTES = 8_000_000
 _DIGITS = 6
 """Digits after the point of the weights that greys stand for: a map that is written again stays short."""
 
-Bounds = tuple[float, float, float, float]
 
-
-def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where: str) -> Density:
+def density_from(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
     """Return the density that a model stands for.
 
     Parameters
     ----------
     model : DensityModel
-    bounds : (x_min, y_min, x_max, y_max), m
-        Of the boundary: what a raster without an extent covers.
+    boundary : ring of [x, y], m
+        A raster without an extent covers its bounding box.
     folder : Path or None
         Where the map is, and a picture that it names; None when it came without a file.
     where : str
@@ -63,7 +62,6 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
     if not isinstance(model, RasterDensityModel):
         density: Density = model.built()
         return density
-    extent = bounds if model.extent is None else tuple(model.extent)
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
         values[values < LIGHTEST] = 0.0
@@ -72,7 +70,9 @@ def density_from(model: DensityModel, bounds: Bounds, folder: Path | None, where
         values = np.round(low + (high - low) * _greys(str(model.picture), folder, where), _DIGITS)
         if not values.max() > 0.0:
             raise MapError.of(where, [_nothing(("density", "picture"))])
-    return Raster(values[::-1], (extent[0], extent[1], extent[2], extent[3]), model.interpolation)
+    x, y = zip(*boundary, strict=True)
+    x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
+    return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 
 def density_document(density: Density) -> dict[str, Any]:
@@ -106,14 +106,21 @@ def _mistakes(model: DensityModel) -> Iterator[Mistake]:
         yield from _raster_mistakes(model)
 
 
-def _nothing(at: tuple[str | int, ...]) -> Mistake:
+def _nothing(at: JsonPath) -> Mistake:
     return Mistake.at(at, "all places count 0, but a weight above 0 was wanted")
 
 
-def _peak_mistakes(peak: PeakModel, at: tuple[str | int, ...]) -> Iterator[Mistake]:
-    if (peak.sigma is None) == (peak.covariance is None):
-        count = "neither" if peak.sigma is None else "both"
-        yield Mistake.at(at, f"{count} of sigma and covariance, but one of them was wanted")
+def _not_one_of(model: PeakModel | RasterDensityModel, one: str, other: str) -> str | None:
+    """Return what is wrong where not exactly one of two keys is given."""
+    given = [getattr(model, key) is not None for key in (one, other)]
+    if sum(given) == 1:
+        return None
+    return f"{'both' if all(given) else 'neither'} of {one} and {other}, but one of them was wanted"
+
+
+def _peak_mistakes(peak: PeakModel, at: JsonPath) -> Iterator[Mistake]:
+    if what := _not_one_of(peak, "sigma", "covariance"):
+        yield Mistake.at(at, what)
     elif peak.covariance is not None:
         (a, b), (c, d) = peak.covariance
         # the smaller eigenvalue
@@ -125,9 +132,8 @@ def _peak_mistakes(peak: PeakModel, at: tuple[str | int, ...]) -> Iterator[Mista
 
 def _raster_mistakes(model: RasterDensityModel) -> Iterator[Mistake]:
     at = ("density",)
-    if (model.rows is None) == (model.picture is None):
-        count = "neither" if model.rows is None else "both"
-        yield Mistake.at(at, f"{count} of rows and picture, but one of them was wanted")
+    if what := _not_one_of(model, "rows", "picture"):
+        yield Mistake.at(at, what)
         return
     if model.extent is not None:
         x_min, y_min, x_max, y_max = model.extent
@@ -151,27 +157,29 @@ def _raster_mistakes(model: RasterDensityModel) -> Iterator[Mistake]:
 
 def _greys(name: str, folder: Path | None, where: str) -> Array:
     """Return the greys of a picture from 0 (black) to 1 (white), (rows, columns), the top row first."""
-    at = ("density", "picture")
+    try:
+        return _decoded(_content(name, folder))
+    except InputError as error:
+        mistake = Mistake.at(("density", "picture"), f"{shown_json(name)}: {error}")
+        raise MapError.of(where, [mistake]) from None
 
-    def refused(what: str) -> MapError:
-        return MapError.of(where, [Mistake.at(at, f"{shown_json(name)}: {what}")])
 
+def _content(name: str, folder: Path | None) -> bytes:
     if folder is None:
-        raise refused("a map that is no file has no folder, but rows of numbers were wanted")
+        raise InputError("a map that is no file has no folder, but rows of numbers were wanted")
     path = _inside(name, folder)
     if path is None:
-        raise refused("leaves the folder of the map, but a file in it was wanted")
+        raise InputError("leaves the folder of the map, but a file in it was wanted")
     try:
         if not path.is_file():
-            raise refused("no such file")
+            raise InputError("no such file")
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise refused(f"cannot be read: {one_line(reason)}") from None
+        raise InputError(f"cannot be read: {reason(error)}") from None
     if len(content) > MOST_BYTES:
-        raise refused(f"larger than {MOST_BYTES / 1e6:g} MB, but a smaller file was wanted")
-    return _decoded(content, refused)
+        raise InputError(f"larger than {MOST_BYTES / 1e6:g} MB, but a smaller file was wanted")
+    return content
 
 
 def _inside(name: str, folder: Path) -> Path | None:
@@ -187,8 +195,7 @@ def _inside(name: str, folder: Path) -> Path | None:
     return path if path.is_relative_to(home) else None
 
 
-def _decoded(content: bytes, refused: Any) -> Array:
-    """Return the greys in the content of a picture file."""
+def _decoded(content: bytes) -> Array:
     from PIL import Image
 
     try:
@@ -196,12 +203,12 @@ def _decoded(content: bytes, refused: Any) -> Array:
             width, height = image.size
             if not 1 <= min(width, height) <= max(width, height) <= FINEST:
                 wanted = f"at most {FINEST} each way"
-                raise refused(f"{width} x {height} pixels, but {wanted} were wanted")
+                raise InputError(f"{width} x {height} pixels, but {wanted} were wanted")
             if image.mode.startswith("I"):  # 16 bits
                 return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
             return np.asarray(image.convert("L"), dtype=float) / 255.0
-    except MapError:
+    except InputError:
         raise
     except Exception as error:  # whatever a damaged picture makes of a decoder
-        reason = one_line(str(error)) or type(error).__name__
-        raise refused(f"cannot be read as PNG or PGM: {reason}") from None
+        why = one_line(error) or type(error).__name__
+        raise InputError(f"cannot be read as PNG or PGM: {why}") from None

@@ -67,6 +67,10 @@ LIGHTEST = 1e-9
 Entry: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=HEAVIEST)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
 Variance: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e8, le=1e8)]
+Matrix: TypeAlias = Annotated[
+    list[Annotated[list[Variance], Field(min_length=2, max_length=2)]], Field(min_length=2, max_length=2)
+]
+Speed: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SLOWEST, le=FASTEST)]
 
 LEAST_VARIANCE = SMALLEST**2
 """Smallest variance of a peak each way, in square metres."""
@@ -95,37 +99,39 @@ def _built(value: Any) -> Any:
     return tuple(map(_built, value)) if isinstance(value, list) else value
 
 
+def _field(description: str, example: Any, default: Any = ..., **limits: Any) -> Any:
+    return Field(default, description=description, examples=[example], **limits)
+
+
 def _kind(name: str) -> Any:
-    """Return the field that says which kind of obstacle, start or density an object is."""
-    return Field(description="Which kind it is; the other keys follow from it", examples=[name])
+    return _field("Which kind it is; the other keys follow from it", name)
+
+
+def _name(example: str) -> Any:
+    return _field("What it is, for people", example, None)
+
+
+_PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
+_CORNERS = [[1, 1], [2, 1], [2, 3]]
+_HOT_SPOT = {"center": [7.5, 3], "sigma": 1.5, "weight": 4}
 
 
 class PathModel(Model, title="path"):
     """The path of an obstacle that moves: it is shifted as its point goes along the line, and never turns."""
 
     stands_for = ObstaclePath
-    points: list[Vertex] = Field(
+    points: list[Vertex] = _field(
+        "The line; at time zero its point is at the first, and the obstacle where it is drawn",
+        _PATH["points"],
         min_length=2,
-        description="The line; at time zero its point is at the first, and the obstacle where it is drawn",
-        examples=[[[2, 1], [8, 1]]],
     )
-    speed: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SLOWEST, le=FASTEST)] = Field(
-        description="Metres a second", examples=[0.5]
-    )
-    repeat: Repeat = Field(
-        "loop",
-        description="From the last point straight to the first, or back the way it came",
-        examples=["back-and-forth"],
+    speed: Speed = _field("Metres a second", 0.5)
+    repeat: Repeat = _field(
+        "From the last point straight to the first, or back the way it came", "back-and-forth", "loop"
     )
 
 
-PathField: TypeAlias = Annotated[
-    PathModel | None,
-    Field(
-        description="How it moves; without it, it stands",
-        examples=[{"points": [[2, 1], [8, 1]], "speed": 0.5}],
-    ),
-]
+PathField: TypeAlias = Annotated[PathModel | None, _field("How it moves; without it, it stands", _PATH)]
 
 
 class PolygonModel(Model, title="polygon"):
@@ -133,15 +139,10 @@ class PolygonModel(Model, title="polygon"):
 
     stands_for = PolygonObstacle
     kind: Literal["polygon"] = _kind("polygon")
-    name: Label | None = Field(None, description="What it is, for people", examples=["desk"])
-    vertices: VertexRing = Field(
-        description="Corners in order, either way round, the first not repeated",
-        examples=[[[1, 1], [2, 1], [2, 3]]],
-    )
-    holes: list[VertexRing] = Field(
-        [],
-        description="Rings inside that are free, such as courtyards",
-        examples=[[[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]],
+    name: Label | None = _name("desk")
+    vertices: VertexRing = _field("Corners in order, either way round, the first not repeated", _CORNERS)
+    holes: list[VertexRing] = _field(
+        "Rings inside that are free, such as courtyards", [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]], []
     )
     path: PathField = None
 
@@ -151,9 +152,9 @@ class CircleModel(Model, title="circle"):
 
     stands_for = CircleObstacle
     kind: Literal["circle"] = _kind("circle")
-    name: Label | None = Field(None, description="What it is, for people", examples=["pillar"])
-    center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
-    radius: Size = Field(description="Its radius in metres", examples=[0.5])
+    name: Label | None = _name("pillar")
+    center: Vertex = _field("Its centre [x, y] in metres", [7.5, 3])
+    radius: Size = _field("Its radius in metres", 0.5)
     path: PathField = None
 
 
@@ -162,11 +163,9 @@ class WallModel(Model, title="wall"):
 
     stands_for = WallObstacle
     kind: Literal["wall"] = _kind("wall")
-    name: Label | None = Field(None, description="What it is, for people", examples=["west wall"])
-    points: list[Vertex] = Field(
-        min_length=2, description="The middle line, from end to end", examples=[[[5, 0], [5, 2.4]]]
-    )
-    width: Size = Field(description="Its width in metres", examples=[0.1])
+    name: Label | None = _name("west wall")
+    points: list[Vertex] = _field("The middle line, from end to end", [[5, 0], [5, 2.4]], min_length=2)
+    width: Size = _field("Its width in metres", 0.1)
     path: PathField = None
 
 
@@ -175,8 +174,8 @@ class DiscModel(Model, title="disc start"):
 
     stands_for = DiscStart
     kind: Literal["disc"] = _kind("disc")
-    center: Vertex = Field(description="The disc's centre [x, y] in metres", examples=[[1, 1]])
-    radius: Size = Field(description="The disc's radius in metres", examples=[0.8])
+    center: Vertex = _field("The disc's centre [x, y] in metres", [1, 1])
+    radius: Size = _field("The disc's radius in metres", 0.8)
 
 
 class UniformModel(Model, title="uniform start"):
@@ -191,9 +190,7 @@ class PointsModel(Model, title="points start"):
 
     stands_for = PointsStart
     kind: Literal["points"] = _kind("points")
-    positions: list[Vertex] = Field(
-        min_length=1, description="One [x, y] a robot, in metres", examples=[[[1, 1], [1.5, 1]]]
-    )
+    positions: list[Vertex] = _field("One [x, y] a robot, in metres", [[1, 1], [1.5, 1]], min_length=1)
 
 
 ObstacleModel: TypeAlias = Annotated[
@@ -209,29 +206,21 @@ class UniformDensityModel(Model, title="uniform density"):
 
     stands_for = Uniform
     kind: Literal["uniform"] = _kind("uniform")
-    weight: Weight = Field(1.0, description="What every place counts, above 0", examples=[1])
+    weight: Weight = _field("What every place counts, above 0", 1, 1.0)
 
 
 class PeakModel(Model, title="peak"):
     """A Gaussian hot spot."""
 
     stands_for = Gaussian
-    center: Vertex = Field(description="Its centre [x, y] in metres", examples=[[7.5, 3]])
-    sigma: Size | None = Field(
-        None, description="Its standard deviation in metres, where it is round", examples=[1.5]
-    )
-    covariance: (
-        Annotated[
-            list[Annotated[list[Variance], Field(min_length=2, max_length=2)]],
-            Field(min_length=2, max_length=2),
-        ]
-        | None
-    ) = Field(
+    center: Vertex = _field("Its centre [x, y] in metres", [7.5, 3])
+    sigma: Size | None = _field("Its standard deviation in metres, where it is round", 1.5, None)
+    covariance: Matrix | None = _field(
+        "Its covariance in square metres where it is not: symmetric, positive definite",
+        [[2, 0.5], [0.5, 1]],
         None,
-        description="Its covariance in square metres where it is not: symmetric, positive definite",
-        examples=[[[2, 0.5], [0.5, 1]]],
     )
-    weight: Weight = Field(description="What it adds at its centre", examples=[4])
+    weight: Weight = _field("What it adds at its centre", 4)
 
 
 class GaussianDensityModel(Model, title="Gaussian density"):
@@ -239,29 +228,20 @@ class GaussianDensityModel(Model, title="Gaussian density"):
 
     stands_for = Gaussians
     kind: Literal["gaussians"] = _kind("gaussians")
-    floor: Weight = Field(0.0, description="What every place counts without them", examples=[0.2])
-    peaks: list[PeakModel] = Field(
-        max_length=_MOST,
-        description="The hot spots, which add up",
-        examples=[[{"center": [7.5, 3], "sigma": 1.5, "weight": 4}]],
-    )
+    floor: Weight = _field("What every place counts without them", 0.2, 0.0)
+    peaks: list[PeakModel] = _field("The hot spots, which add up", [_HOT_SPOT], max_length=_MOST)
 
 
 class AreaModel(Model, title="weighted area"):
     """A polygon in which every place counts the same."""
 
     stands_for = WeightedArea
-    name: Label | None = Field(None, description="What it is, for people", examples=["treasury"])
-    vertices: VertexRing = Field(
-        description="Corners in order, either way round, the first not repeated",
-        examples=[[[1, 1], [2, 1], [2, 3]]],
+    name: Label | None = _name("treasury")
+    vertices: VertexRing = _field("Corners in order, either way round, the first not repeated", _CORNERS)
+    holes: list[VertexRing] = _field(
+        "Rings inside that are not part of it", [[[1.5, 1.2], [1.8, 1.2], [1.8, 1.8]]], []
     )
-    holes: list[VertexRing] = Field(
-        [],
-        description="Rings inside that are not part of it",
-        examples=[[[[1.5, 1.2], [1.8, 1.2], [1.8, 1.8]]]],
-    )
-    weight: Weight = Field(description="What a place in it counts", examples=[5])
+    weight: Weight = _field("What a place in it counts", 5)
 
 
 class PolygonDensityModel(Model, title="polygon density"):
@@ -269,11 +249,11 @@ class PolygonDensityModel(Model, title="polygon density"):
 
     stands_for = WeightedPolygons
     kind: Literal["polygons"] = _kind("polygons")
-    background: Weight = Field(1.0, description="What a place outside them all counts", examples=[1])
-    areas: list[AreaModel] = Field(
+    background: Weight = _field("What a place outside them all counts", 1, 1.0)
+    areas: list[AreaModel] = _field(
+        "The polygons, the later ones on top",
+        [{"name": "treasury", "vertices": _CORNERS, "weight": 5}],
         max_length=_MOST,
-        description="The polygons, the later ones on top",
-        examples=[[{"name": "treasury", "vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}]],
     )
 
 
@@ -281,30 +261,22 @@ class RasterDensityModel(Model, title="raster density"):
     """A picture of the density, in rows of numbers or in a file."""
 
     kind: Literal["raster"] = _kind("raster")
-    extent: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = Field(
+    extent: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = _field(
+        "What it covers, [x_min, y_min, x_max, y_max] in metres; the boundary's box by default",
+        [0, 0, 10, 6],
         None,
-        description="What it covers, [x_min, y_min, x_max, y_max] in metres; the boundary's box by default",
-        examples=[[0, 0, 10, 6]],
     )
-    interpolation: Interpolation = Field(
-        "bilinear",
-        description="bilinear between the cells' middles, or constant in each of the cells",
-        examples=["bilinear"],
+    interpolation: Interpolation = _field(
+        "bilinear between the cells' middles, or constant in each of the cells", "bilinear", "bilinear"
     )
-    rows: list[Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]] | None = Field(
-        None,
-        min_length=1,
-        max_length=FINEST,
-        description="Rows of numbers, the top one first",
-        examples=[[[1, 1, 2], [1, 4, 2]]],
+    rows: list[Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]] | None = _field(
+        "Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None, min_length=1, max_length=FINEST
     )
-    picture: Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_PATH)] | None = Field(
-        None,
-        description="In place of rows, a grey PNG or PGM, relative to the map and in its folder",
-        examples=["density.png"],
+    picture: Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_PATH)] | None = _field(
+        "In place of rows, a grey PNG or PGM, relative to the map and in its folder", "density.png", None
     )
-    black: Weight | None = Field(None, description="What black counts; 0 by default", examples=[0.1])
-    white: Weight | None = Field(None, description="What white counts; 1 by default", examples=[5])
+    black: Weight | None = _field("What black counts; 0 by default", 0.1, None)
+    white: Weight | None = _field("What white counts; 1 by default", 5, None)
 
 
 DensityModel: TypeAlias = Annotated[
@@ -316,39 +288,35 @@ DensityModel: TypeAlias = Annotated[
 class MapModel(Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
 
-    schema_: Annotated[str, Field(strict=True)] | None = Field(
-        None, alias="$schema", description="Where this schema is, for editors", examples=["./map.schema.json"]
+    schema_: Annotated[str, Field(strict=True)] | None = _field(
+        "Where this schema is, for editors", "./map.schema.json", None, alias="$schema"
     )
-    format: Literal["robocov-map"] = Field(description="Says what this file is", examples=[FORMAT])
-    version: Literal[1] = Field(description="Version of the format", examples=[VERSION])
-    name: Label = Field(description="The map's name, for people", examples=["Two rooms"])
-    description: Annotated[str, Field(strict=True, max_length=10_000)] = Field(
-        "", description="A sentence about it", examples=["A wall with one door."]
+    format: Literal["robocov-map"] = _field("Says what this file is", FORMAT)
+    version: Literal[1] = _field("Version of the format", VERSION)
+    name: Label = _field("The map's name, for people", "Two rooms")
+    description: Annotated[str, Field(strict=True, max_length=10_000)] = _field(
+        "A sentence about it", "A wall with one door.", ""
     )
-    boundary: VertexRing = Field(
-        description="The outer boundary, convex or not, either way round; the robots know its convex hull",
-        examples=[[[0, 0], [10, 0], [10, 6], [0, 6]]],
+    boundary: VertexRing = _field(
+        "The outer boundary, convex or not, either way round; the robots know its convex hull",
+        [[0, 0], [10, 0], [10, 6], [0, 6]],
     )
-    obstacles: list[ObstacleModel] = Field(
+    obstacles: list[ObstacleModel] = _field(
+        "They may overlap, touch, and stick out of the boundary",
+        [{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}],
         [],
-        description="They may overlap, touch, and stick out of the boundary",
-        examples=[[{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}]],
     )
-    starts: dict[Label, StartModel] = Field(
+    starts: dict[Label, StartModel] = _field(
+        "Named starts; the first is the default",
+        {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}},
         {},
-        description="Named starts; the first is the default",
-        examples=[{"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}],
     )
-    density: DensityModel | None = Field(
+    density: DensityModel | None = _field(
+        "How much each place counts; without it every place the same",
+        {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]},
         None,
-        description="How much each place counts; without it every place the same",
-        examples=[
-            {"kind": "gaussians", "floor": 0.2, "peaks": [{"center": [7.5, 3], "sigma": 1.5, "weight": 4}]}
-        ],
     )
-    extra: dict[str, Any] = Field(
-        {}, description="Free keys of yours; kept untouched", examples=[{"author": "Ada"}]
-    )
+    extra: dict[str, Any] = _field("Free keys of yours; kept untouched", {"author": "Ada"}, {})
 
 
 _MODELS: dict[type, type[Model]] = {
