@@ -1,7 +1,8 @@
-"""The k-median problem on a table of distances: k sources such that the targets are near to one of them.
+"""The k-median problem on a table of distances: k sources such that each target is near to one of them.
 
-Teitz and Bart's interchange, with the bookkeeping of Whitaker (1983) and of Schubert and Rousseeuw's
-FastPAM (2019): one pass over the table gives the cost after every possible swap.
+A table is (m, c), C-contiguous and finite: distances, weighted or not, from m targets to c possible sources.
+Teitz and Bart's interchange, with the bookkeeping of Whitaker (1983) and of Schubert and Rousseeuw's FastPAM
+(2019): one pass over the table gives the cost after every possible swap.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.arrays.grouping import beginnings
+from robocov.compiled import kernel
 
 _FALL = 1e-9
 """Part of the cost by which a step must lower it, far more than rounding: none is undone by the next."""
@@ -23,142 +24,165 @@ _PASSES = 60
 _HARDLY = 1e-4
 """Part of the sum that a round of `improved` must save."""
 
-_TAKEN = (2, 3)
+_REMOVED = (2, 3)
 """So many sources are taken away at once."""
 
 _TRIED = 4
 """So many ways to put them back are tried to the end."""
 
 
-def seeded(distance: Array, count: int, rng: np.random.Generator) -> IntArray:
-    """Return sources drawn as k-means++ does (Arthur and Vassilvitskii 2007), with distances for squares.
+def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
+    """Return (count,) sources as k-means++ draws them (Arthur and Vassilvitskii 2007), by distances.
 
     A target is drawn with a chance in proportion to its distance from the sources so far, and the source
     nearest to it is taken.
-
-    Parameters
-    ----------
-    distance : (c, m)
-        From every source to every target, finite.
-    count : int
-        How many, at most c.
-
-    Returns
-    -------
-    (count,)
     """
     chosen: list[int] = []
-    nearest = np.ones(distance.shape[1])
-    taken = np.zeros(len(distance), dtype=bool)
+    nearest = np.ones(len(table))
+    taken = np.zeros(table.shape[1], dtype=bool)
     for _ in range(count):
         chances = np.cumsum(nearest)
         # where the sources hold all targets already, any other is as good
         target = int(np.searchsorted(chances, rng.random() * chances[-1], side="right"))
         target = min(target, len(nearest) - 1)
-        source = int(np.where(taken, np.inf, distance[:, target]).argmin())
-        nearest = np.minimum(nearest, distance[source]) if chosen else distance[source].copy()
+        source = int(np.where(taken, np.inf, table[target]).argmin())
+        nearest = np.minimum(nearest, table[:, source]) if chosen else table[:, source].copy()
         taken[source] = True
         chosen.append(source)
     return np.array(chosen, dtype=np.intp)
 
 
 def lloyd_iterations(
-    table: Array, sources: IntArray, given: BoolArray | None = None, beat: Callable[[], None] | None = None
+    table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Callable[[], None] | None = None
 ) -> IntArray:
-    """Return the sources after Lloyd's iteration: targets go to the nearest, sources to the best for theirs.
+    """Return (k,) sources after Lloyd's iteration: targets go to the nearest, sources to the best for theirs.
 
-    Parameters
-    ----------
-    table : (c, m)
-        Distances, weighted or not, from every possible source to every target, finite.
-    sources : (k,)
-    given : (k,) or None
-        Which of these stay as they are; None for none.
-    beat : callable
-        Called once a pass. It may raise, to give up.
+    Those that are `fixed` stay. `beat` is called once a pass; it may raise, to give up.
     """
+    stay = np.zeros(len(sources), dtype=bool) if fixed is None else fixed
     former, total = sources, np.inf
     while True:
         if beat is not None:
             beat()
-        owner, nearest, _ = _nearest_two(table, sources)
-        lower = float(nearest.sum())
+        lower, after = _lloyd_step(table, sources, stay)
         if not lower < total * (1.0 - _FALL):
             return former
-        former, total = sources, lower
-        order, begin, holder = _clusters(owner)
-        sums = np.add.reduceat(table[:, order], begin, axis=1)
-        # a source that holds no target stays, and no two may become the same
-        stays = np.ones(len(sources), dtype=bool)
-        stays[holder] = False
-        if given is not None:
-            stays |= given
-        sums[sources[stays]] = np.inf
-        sources = sources.copy()
-        for place, column in zip(holder.tolist(), sums.T, strict=True):
-            if not stays[place]:
-                sources[place] = column.argmin()
-                sums[sources[place]] = np.inf
+        former, total, sources = sources, lower, after
 
 
-def best_swap(table: Array, sources: IntArray, given: BoolArray | None, threshold: float) -> IntArray:
+@kernel
+def _nearest_two(table: Array, sources: IntArray) -> tuple[IntArray, Array, Array]:
+    """Return which source is nearest to each target, how far, and how far the second nearest is."""
+    owner = np.zeros(len(table), dtype=np.intp)
+    nearest, second = np.full(len(table), np.inf), np.full(len(table), np.inf)
+    for t in range(len(table)):
+        for k in range(len(sources)):
+            distance = table[t, sources[k]]
+            if distance < nearest[t]:
+                owner[t], nearest[t], second[t] = k, distance, nearest[t]
+            elif distance < second[t]:
+                second[t] = distance
+    return owner, nearest, second
+
+
+@kernel
+def _lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, IntArray]:
+    """Return the sum for the sources, and the best sources for the targets of each."""
+    owner, nearest, _ = _nearest_two(table, sources)
+    total, holds = 0.0, np.zeros(len(sources), dtype=np.bool_)
+    sums = np.zeros((len(sources), table.shape[1]))
+    for t in range(len(table)):
+        total += nearest[t]
+        holds[owner[t]] = True
+        for s in range(table.shape[1]):
+            sums[owner[t], s] += table[t, s]
+    # a source that holds no target stays, and no two may become the same
+    taken = np.zeros(table.shape[1], dtype=np.bool_)
+    for k in range(len(sources)):
+        taken[sources[k]] |= fixed[k] or not holds[k]
+    after = sources.copy()
+    for k in range(len(sources)):
+        if holds[k] and not fixed[k]:
+            after[k] = _least(sums[k], taken)
+            taken[after[k]] = True
+    return total, after
+
+
+@kernel
+def _least(sums: Array, taken: BoolArray) -> int:
+    """Return where the least of the sums is that are not taken."""
+    best, least = -1, np.inf
+    for s in range(len(sums)):
+        if not taken[s] and (best < 0 or sums[s] < least):
+            best, least = s, sums[s]
+    return best
+
+
+def best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
     """Return the sources after the best swap; the same array where none lowers the sum by the threshold."""
-    owner, nearest, second = _nearest_two(table, sources)
-    order, begin, holder = _clusters(owner)
-    away = table[:, order]
-    kept = np.minimum(away, nearest[order])
-    after = np.repeat(kept.sum(axis=1)[:, None], len(sources), axis=1)
-    # without their own source targets go to the new one, or to their second nearest
-    after[:, holder] += np.add.reduceat(np.minimum(away, second[order]) - kept, begin, axis=1)
-    after[sources] = np.inf
-    if given is not None:
-        after[:, given] = np.inf
-    source, place = divmod(int(after.argmin()), len(sources))
-    if not after[source, place] < float(nearest.sum()) * (1.0 - threshold):
+    before, after, place, source = _best_swap(table, sources, fixed)
+    if not after < before * (1.0 - threshold):
         return sources
-    sources = sources.copy()
-    sources[place] = source
-    return sources
+    return np.concatenate([sources[:place], [source], sources[place + 1 :]])
+
+
+@kernel
+def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, int, int]:
+    """Return the sum, that after the best swap, which of the sources leaves for it, and which one comes."""
+    owner, nearest, second = _nearest_two(table, sources)
+    with_new = np.zeros(table.shape[1])
+    # without their own source targets go to the new one, or to their second nearest
+    without_own = np.zeros((len(sources), table.shape[1]))
+    total = 0.0
+    for t in range(len(table)):
+        k, near, next_near = owner[t], nearest[t], second[t]
+        total += near
+        for s in range(table.shape[1]):
+            distance = table[t, s]
+            kept = min(distance, near)
+            with_new[s] += kept
+            without_own[k, s] += min(distance, next_near) - kept
+    taken = np.zeros(table.shape[1], dtype=np.bool_)
+    for k in range(len(sources)):
+        taken[sources[k]] = True
+    least, place, source = np.inf, -1, -1
+    for s in range(table.shape[1]):
+        for k in range(len(sources)):
+            if not taken[s] and not fixed[k] and with_new[s] + without_own[k, s] < least:
+                least, place, source = with_new[s] + without_own[k, s], k, s
+    return total, least, place, source
 
 
 def best_swaps(table: Array, sources: IntArray, beat: Callable[[], None] | None = None) -> IntArray:
     """Return the sources after the best swaps, as long as these lower the cost; see `lloyd_iterations`."""
+    nobody = np.zeros(len(sources), dtype=bool)
     while True:
         if beat is not None:
             beat()
-        after = best_swap(table, sources, None, _FALL)
+        after = best_swap(table, sources, nobody, _FALL)
         if after is sources:
             return sources
         sources = after
 
 
-def improved(table: Array, sources: IntArray, given: BoolArray, threshold: float) -> IntArray:
-    """Return sources for which the sum over the targets of the nearest one's entries is low.
+def improved(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
+    """Return (k,) sources for which the sum over the targets of the distances to the nearest is low.
 
     Lloyd's iteration in turn with the best swap of one source for another, and, where no swap helps, with
-    taking away two or three and putting them back where each helps most. What all this saves must be more
-    than `threshold` of the sum after Lloyd's iteration alone; that one is returned else.
-
-    Parameters
-    ----------
-    table : (c, m)
-        Weighted distances from every possible source to every target, finite.
-    sources : (k,)
-        To begin with, all different.
-    given : (k,)
-        Which of these stay as they are.
-    threshold : float
+    taking away two or three and putting them back where each helps most. Those that are `fixed` stay. What
+    all this saves must be more than the part `threshold` of the sum after Lloyd's iteration alone; that one
+    is returned else.
     """
-    near = best = lloyd_iterations(table, sources, given)
+    near = best = lloyd_iterations(table, sources, fixed)
     if not threshold < 1.0:
         return near
     for _ in range(_PASSES):
-        after = best_swap(table, best, given, _HARDLY)
+        after = best_swap(table, best, fixed, _HARDLY)
         if after is best:
-            after = rebuilt(table, best, given, _HARDLY)
+            after = rebuilt(table, best, fixed, _HARDLY)
         if after is best:
             break
-        best = lloyd_iterations(table, after, given)
+        best = lloyd_iterations(table, after, fixed)
     return best if _total(table, best) < (1.0 - threshold) * _total(table, near) else near
 
 
@@ -168,65 +192,59 @@ def moved(table: Array, sources: IntArray, among: BoolArray, threshold: float) -
     What this saves must be more than `threshold` of the sum; the same array is returned else. Unlike Lloyd's
     iteration, it does not take the clusters for given.
     """
-    near = table[sources[1:]].min(axis=0, initial=np.inf)
-    sums = np.minimum(table, near).sum(axis=1)
-    before = sums[sources[0]]
-    sums[~among] = np.inf
-    best = int(sums.argmin())
-    if not sums[best] < before * (1.0 - threshold):
+    near = table[:, sources[1:]].min(axis=1, initial=np.inf)
+    sums = np.minimum(table, near[:, None]).sum(axis=0)
+    best = int(np.where(among, sums, np.inf).argmin())
+    if not (among[best] and sums[best] < sums[sources[0]] * (1.0 - threshold)):
         return sources
-    sources = sources.copy()
-    sources[0] = best
-    return sources
+    return np.concatenate([[best], sources[1:]])
 
 
-def rebuilt(table: Array, sources: IntArray, given: BoolArray, threshold: float) -> IntArray:
+def rebuilt(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
     """Return the sources after some were taken away at once, and put back one by one where each helps most.
 
     Of all pairs and triples the most promising few are tried to the end, with Lloyd's iteration. The same
     array is returned where none lowers the sum by the threshold.
     """
-    free = (~given).nonzero()[0].tolist()
-    far = 10.0 * float(table[sources].max())
-    found: list[tuple[float, IntArray]] = []
-    for away in (each for size in _TAKEN for each in combinations(free, size)):
-        kept = np.delete(sources, away)
-        near = table[kept].min(axis=0) if len(kept) else np.full(table.shape[1], far)
-        after = sources.copy()
-        put = kept
-        for place in away:
-            sums = np.minimum(table, near).sum(axis=1)
-            sums[put] = np.inf
-            after[place] = sums.argmin()
-            put = np.append(put, after[place])
-            near = np.minimum(near, table[after[place]])
-        found.append((float(near.sum()), after))
-    found.sort(key=lambda each: each[0])
+    free = np.flatnonzero(~fixed).tolist()
+    away = [np.array(some) for size in _REMOVED for some in combinations(free, size)]
+    found = sorted((_put_back(table, sources, some) for some in away), key=lambda each: each[0])
     least, chosen = _total(table, sources) * (1.0 - threshold), sources
     for _, after in found[:_TRIED]:
-        after = lloyd_iterations(table, after, given)
+        after = lloyd_iterations(table, after, fixed)
         total = _total(table, after)
         if total < least:
             least, chosen = total, after
     return chosen
 
 
+@kernel
+def _put_back(table: Array, sources: IntArray, away: IntArray) -> tuple[float, IntArray]:
+    """Return the sum, and the sources, after some of them were put back where each helps most."""
+    after, left = sources.copy(), np.ones(len(sources), dtype=np.bool_)
+    for k in away:
+        left[k] = False
+    taken, near = np.zeros(table.shape[1], dtype=np.bool_), np.full(len(table), np.inf)
+    for k in range(len(sources)):
+        if left[k]:
+            _add(table, sources[k], near, taken)
+    for k in away:
+        sums = np.zeros(table.shape[1])
+        for t in range(len(table)):
+            for s in range(table.shape[1]):
+                sums[s] += min(table[t, s], near[t])
+        after[k] = _least(sums, taken)
+        _add(table, after[k], near, taken)
+    return near.sum(), after
+
+
+@kernel
+def _add(table: Array, source: int, near: Array, taken: BoolArray) -> None:
+    """Take one source more: update the distances to the nearest, and which are taken."""
+    taken[source] = True
+    for t in range(len(table)):
+        near[t] = min(near[t], table[t, source])
+
+
 def _total(table: Array, sources: IntArray) -> float:
-    return float(table[sources].min(axis=0).sum())
-
-
-def _nearest_two(table: Array, sources: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return which of the sources is nearest to each target, how far, and how far the second nearest is."""
-    away = table[sources]
-    owner = away.argmin(axis=0)
-    column = np.arange(away.shape[1])
-    nearest = away[owner, column]
-    away[owner, column] = np.inf
-    return owner, nearest, np.asarray(away.min(axis=0))
-
-
-def _clusters(owner: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the targets ordered by owner, where each owner's begin, and these owners."""
-    order = np.argsort(owner, kind="stable")
-    begin = beginnings(owner[order])
-    return order, begin, owner[order[begin]]
+    return float(table[:, sources].min(axis=1).sum())

@@ -14,11 +14,11 @@ from robocov.k_median import best_swap, best_swaps, improved, lloyd_iterations, 
 def table(seed: int, sources: int = 12, targets: int = 30) -> np.ndarray:
     rng = np.random.default_rng(seed)
     places, goals = rng.uniform(0, 10, (sources, 2)), rng.uniform(0, 10, (targets, 2))
-    return np.hypot(*(places[:, None] - goals).T).T * rng.uniform(0.5, 2.0, targets)
+    return np.hypot(*(places - goals[:, None]).T).T * rng.uniform(0.5, 2.0, (targets, 1))
 
 
 def total(distance: np.ndarray, sources: np.ndarray) -> float:
-    return float(distance[list(sources)].min(axis=0).sum())
+    return float(distance[:, list(sources)].min(axis=1).sum())
 
 
 @settings(max_examples=40)
@@ -82,7 +82,7 @@ def test_two_or_three_at_once_help_where_no_swap_does(seed: int, monkeypatch: py
     distance, begin, free = table(seed), np.arange(4), np.zeros(4, dtype=bool)
     best = min(total(distance, np.array(some)) for some in combinations(range(12), 4))
     assert total(distance, improved(distance, begin, free, 0.0)) == pytest.approx(best)
-    monkeypatch.setattr(k_median, "rebuilt", lambda table, sources, given, threshold: sources)
+    monkeypatch.setattr(k_median, "rebuilt", lambda table, sources, fixed, threshold: sources)
     assert total(distance, improved(distance, begin, free, 0.0)) > 1.01 * best
 
 
@@ -127,12 +127,12 @@ def tables(draw):
     sources, targets = draw(st.integers(1, 14)), draw(st.integers(1, 30))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     if draw(st.booleans()):
-        one, other = rng.random((sources, 1, 2)), rng.random((targets, 2))
+        one, other = rng.random((targets, 1, 2)), rng.random((sources, 2))
         table = np.hypot(*np.moveaxis(one - other, -1, 0))
     else:
         # with many equal distances
-        table = rng.integers(0, 5, (sources, targets)).astype(float)
-    return table * rng.integers(1, 4, targets), draw(st.integers(1, sources)), rng
+        table = rng.integers(0, 5, (targets, sources)).astype(float)
+    return table * rng.integers(1, 4, (targets, 1)), draw(st.integers(1, sources)), rng
 
 
 @given(tables())
@@ -158,7 +158,7 @@ def test_seeds_are_far_from_each_other():
 @given(tables())
 def test_neither_iteration_ever_raises_the_cost(drawn):
     table, count, rng = drawn
-    start = rng.choice(len(table), count, replace=False)
+    start = rng.choice(table.shape[1], count, replace=False)
     given_ = start.copy()
     for iteration in (lloyd_iterations, best_swaps):
         end = iteration(table, start)
@@ -170,10 +170,10 @@ def test_neither_iteration_ever_raises_the_cost(drawn):
 @given(tables())
 def test_no_swap_is_left_that_would_lower_the_cost(drawn):
     table, count, rng = drawn
-    end = best_swaps(table, rng.choice(len(table), count, replace=False)).tolist()
+    end = best_swaps(table, rng.choice(table.shape[1], count, replace=False)).tolist()
     reached = total(table, end)
     for place in range(count):
-        for source in range(len(table)):
+        for source in range(table.shape[1]):
             swapped = [*end[:place], source, *end[place + 1 :]]
             assert total(table, swapped) >= reached * (1.0 - 1e-8)
 
@@ -181,11 +181,11 @@ def test_no_swap_is_left_that_would_lower_the_cost(drawn):
 @given(tables())
 def test_alternation_ends_where_each_source_is_the_best_of_its_own_targets(drawn):
     table, count, rng = drawn
-    end = lloyd_iterations(table, rng.choice(len(table), count, replace=False))
-    owner = table[end].argmin(axis=0)
+    end = lloyd_iterations(table, rng.choice(table.shape[1], count, replace=False))
+    owner = table[:, end].argmin(axis=1)
     fresh = []
     for place in range(count):
-        sums = table[:, owner == place].sum(axis=1)
+        sums = table[owner == place].sum(axis=0)
         sums[[source for other, source in enumerate(end) if other != place]] = np.inf
         fresh.append(int(sums.argmin()) if (owner == place).any() else int(end[place]))
     if len(set(fresh)) == count:
@@ -195,7 +195,7 @@ def test_alternation_ends_where_each_source_is_the_best_of_its_own_targets(drawn
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_interchange_from_some_starts_finds_the_best_of_all(count):
     rng = np.random.default_rng(count)
-    one, other = rng.random((12, 1, 2)), rng.random((40, 2))
+    one, other = rng.random((40, 1, 2)), rng.random((12, 2))
     table = np.hypot(*np.moveaxis(one - other, -1, 0))
     best = min(total(table, some) for some in combinations(range(12), count))
     found = [total(table, best_swaps(table, seeded(table, count, rng))) for _ in range(10)]
@@ -203,7 +203,7 @@ def test_interchange_from_some_starts_finds_the_best_of_all(count):
 
 
 def test_giving_up():
-    table = np.random.default_rng(0).random((20, 50))
+    table = np.random.default_rng(0).random((50, 20))
 
     def stop():
         raise KeyboardInterrupt

@@ -50,22 +50,11 @@ _STEPS = 300
 
 
 class Room:
-    """Where the centres of robots may be, by component of the free space.
+    """Where the centres of robots of some radius (m) may be.
 
-    Robots keep from walls, and from each other, the distance that starts leave as well: their radius
-    (their diameter), and `robocov.environment.starts.GAP` of it.
-
-    Parameters
-    ----------
-    free : MultiPolygon, m
-    radius : float, m
-
-    Attributes
-    ----------
-    clearance, spacing : float, m
-        Least distance of a centre from a wall, and from another centre.
-    parts : tuple of shapely geometries
-        One for each component, empty where no robot fits.
+    They keep from walls (`clearance`), and from each other (`spacing`, m), the distance that starts leave as
+    well: their radius (their diameter), and `robocov.environment.starts.GAP` of it. There is a part for each
+    component of the free space, empty where no robot fits.
     """
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
@@ -129,18 +118,8 @@ def descended(
     scaled by the curvature that Weiszfeld's iteration for the geometric median uses, from `Room.nearest`
     back into the room, halved until the cost falls enough (Armijo). The cost is only piecewise smooth,
     as sites change owners and ways, and a wall may stop a robot: where the learnt direction does not lead
-    down, the scaled slope alone is followed and the curvature learnt anew.
-
-    Parameters
-    ----------
-    cost : CoverageCost
-    room : Room
-    positions : (n, 2) m
-        In the room.
-    component : (n,)
-        Which component of the free space holds which robot; none leaves its own.
-    beat : callable
-        Called once a step. It may raise, to give up.
+    down, the scaled slope alone is followed and the curvature learnt anew. No robot leaves its `component`
+    of the free space. `beat` is called once a step; it may raise, to give up.
     """
     result = cost(positions)
     slope = _slope(result)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
+from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.cost import CoverageCost
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, checked, is_number, shown
 from robocov.k_median import best_swaps, lloyd_iterations, seeded
 from robocov.optimum.descent import Room, descended
 from robocov.robots import DEFAULT_RADIUS
@@ -36,10 +37,8 @@ MOST_ROBOTS = 500
 
 MOST_RESTARTS = 100_000
 
-_SOURCES = 600
+_SOURCES, _SOURCES_A_ROBOT = 600, 20
 """About so many places for robots are in the table, more for large teams."""
-
-_SOURCES_A_ROBOT = 20
 
 _TARGETS = 1000
 """At most about so many groups of sites are in the table."""
@@ -62,15 +61,10 @@ class Optimum:
     ----------
     positions : (n, 2) m
         From left to right. Each is in the free space, clear of walls and of the others.
-    mean_distance : float, m
+    mean_distance, value, uncovered_area : float, m, m³, m²
         The coverage cost (22) there, as `CoverageResult` has it.
-    value : float, m³
-    uncovered_area : float, m²
-        Area of the components of the free space without a robot.
-    costs : (r,) m
-        Mean distance that each restart ended with, in their order.
-    undescended : (r,) m
-        The same before the descent of the exact cost, after the interchange.
+    costs, undescended : (r,) m
+        Mean distance that each restart ended with, and that before the descent of the exact cost.
     restart : int
         The one that gave the positions, the first of equals.
     """
@@ -84,13 +78,7 @@ class Optimum:
     restart: int
 
     def agreement(self, within: float = 0.005) -> float:
-        """Return the share of the restarts whose mean distance is at most so much above the best.
-
-        Parameters
-        ----------
-        within : float
-            As a part of the best.
-        """
+        """Return the share of the restarts whose mean distance is at most that part above the best."""
         return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
 
     def gap(self, mean_distance: float) -> float:
@@ -117,35 +105,20 @@ def optimum(
 
     Each restart depends on the seed and its own number only: more of them never give a higher cost.
 
-    Parameters
-    ----------
-    environment : Environment
-    robots : int
-    radius : float, m
-        Of a robot.
-    lattice : int
-        As of `CoverageCost`, whose sites are what the mean is taken over.
-    restarts : int
-    seed : int
-    progress : callable
-        Called now and then with the part that is done. It may raise, to give up.
+    `radius` is in m, `lattice` that of `CoverageCost`, whose sites the mean is taken over; `progress` is called
+    now and then with the part that is done, and may raise, to give up. A ParameterError tells that a parameter
+    is out of range, or that the robots do not fit.
 
-    Raises
-    ------
-    ParameterError
-        When a parameter is out of range, or the robots do not fit.
-
-    Examples
-    --------
     >>> from robocov.environment import Environment
     >>> best = optimum(Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2))), 1, restarts=2)
     >>> best.positions.round(3)
     array([[1., 1.]])
     """
-    _check("robots", robots, 1, MOST_ROBOTS)
-    _check("restarts", restarts, 1, MOST_RESTARTS)
-    _check("seed", seed, 0, None)
-    if not (isinstance(radius, (int, float, np.floating)) and 0.0 < radius < math.inf):
+    checked("robots", robots, 1, MOST_ROBOTS, whole=True)
+    checked("restarts", restarts, 1, MOST_RESTARTS, whole=True)
+    if not (is_number(seed, Integral) and seed >= 0):
+        raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")
+    if not (is_number(radius) and 0.0 < radius < math.inf):
         raise ParameterError(f"radius: {shown(radius)} m, but a number above 0 was wanted")
     tell = progress or (lambda part: None)
     cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT * part))
@@ -188,24 +161,11 @@ def _rank(result: CoverageResult) -> tuple[float, float]:
     return result.uncovered_area, result.mean_distance
 
 
-def _check(name: str, value: object, least: int, most: int | None) -> None:
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
-        wanted = f"from {least} to {most}" if most is not None else f"of at least {least}"
-        raise ParameterError(f"{name}: {shown(value)}, but a whole number {wanted} was wanted")
-
-
 class _Search:
     """What the restarts have in common: the cost, the room for the robots and the table of distances.
 
-    Attributes
-    ----------
-    places : (c, 2) m
-        The sources of the table.
-    component : (c,)
-        Which component of the free space holds them.
-    table : (c, m) m
-        Sum of the geodesic distances from each to the sites of each target, by the weights of these.
+    The `table`, (m, c) m, holds the sums of the geodesic distances from the sites of each target, by their
+    weights, to each source; `places` are those of the sources, and `component` says in which they are.
     """
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
@@ -216,7 +176,9 @@ class _Search:
         fit = [k for k, part in enumerate(self.room.parts) if not part.is_empty and sites[k]]
         # components are in the order of their areas
         covered = fit[:robots]
-        spacing = self._spacing(covered)
+        area = sum(self.room.parts[k].area for k in covered)
+        wanted = max(_SOURCES, _SOURCES_A_ROBOT * robots)
+        spacing = max(math.sqrt(area / wanted), self.room.spacing)
         pieces = [_spread(self.room.parts[k], spacing) for k in covered]
         self.component = np.repeat(covered, [len(piece) for piece in pieces]).astype(np.intp)
         if len(self.component) < robots:
@@ -226,11 +188,6 @@ class _Search:
             )
         self.places = np.concatenate(pieces)
         self.table = self._distances(site_component, np.isin(site_component, covered))
-
-    def _spacing(self, covered: list[int]) -> float:
-        area = sum(self.room.parts[k].area for k in covered)
-        wanted = max(_SOURCES, _SOURCES_A_ROBOT * self.robots)
-        return max(math.sqrt(area / wanted), self.room.spacing)
 
     def _distances(self, site_component: IntArray, wanted: BoolArray) -> Array:
         """Return the table; its targets are one site for each square of some cells and component."""
@@ -247,7 +204,7 @@ class _Search:
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
         table = cost.geodesics.distances(self.places, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHED * cost.geodesics.size
-        return np.asarray(table * weight)
+        return np.ascontiguousarray((table * weight).T)
 
     def sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
         """Return the sources where one restart ends on the table, sorted, (n,).

@@ -227,7 +227,7 @@ def team_places(
         away[taken] = np.inf
         chosen[k] = away.argmin()
         taken[chosen[k]] = True
-    weighed = distance[:, target] * weights[target]
+    weighed = np.ascontiguousarray((distance[:, target] * weights[target]).T)
     # in an order that does not depend on who plans: of two equal plans all take the same
     order = np.lexsort(begin.T)
     chosen[order] = improved(weighed, chosen[order], given[order], threshold)

@@ -196,7 +196,7 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
 
     def all_in_the_small_one(table, count, rng):
         # what is far from most is there
-        return np.argsort(table.sum(axis=1))[::-1][:count]
+        return np.argsort(table.sum(axis=0))[::-1][:count]
 
     monkeypatch.setattr("robocov.optimum.search.seeded", all_in_the_small_one)
     search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
@@ -211,10 +211,10 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
 def test_the_table_holds_about_the_exact_sums_over_all_sites(name):
     where = load_map(name)
     search = _Search(where, CoverageCost(where, 64), 6, 0.1)
-    assert 300 < search.table.shape[1] < 1100 < len(search.cost.points)
+    assert 300 < len(search.table) < 1100 < len(search.cost.points)
     some = np.random.default_rng(0).choice(len(search.places), 40, replace=False)
     exact = [search.cost(search.places[k][None]).mean_distance for k in some]
-    means = search.table[some].sum(axis=1) / len(search.cost.points)
+    means = search.table[:, some].sum(axis=0) / len(search.cost.points)
     np.testing.assert_allclose(means, exact, rtol=0.01)
 
 
