@@ -105,8 +105,8 @@ def optimum(
 
     Each restart depends on the seed and its own number only: more of them never give a higher cost.
 
-    `radius` is in m, `lattice` that of `CoverageCost`, whose sites the mean is taken over; `progress` is called
-    now and then with the part that is done, and may raise, to give up. A ParameterError tells that a parameter
+    `radius` is in m, `lattice` that of `CoverageCost`, whose sites the mean is taken over; `progress` is
+    called now and then with the part that is done, and may raise, to give up. A ParameterError tells what
     is out of range, or that the robots do not fit.
 
     >>> from robocov.environment import Environment
