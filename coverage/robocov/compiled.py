@@ -8,6 +8,7 @@ With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
 import sys
@@ -29,6 +30,8 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 _FORMAT = 1
 """Version of the entries in the cache."""
+
+_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 on_compile: list[Callable[[str], None]] = []
 """Called with the name of each kernel that is about to be compiled, because the cache does not hold it."""
@@ -60,7 +63,7 @@ def inlined_kernel(function: _Function) -> _Function:
 
 
 def _as_kernel(function: _Function, **options: bool) -> _Function:
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    if not _COMPILED:
         return function
     return Kernel(function, options)  # type: ignore[return-value]
 
@@ -126,6 +129,42 @@ class Kernel:
                 parts.append(f"{name}={getattr(value, '_fields', None)}")
         parts += [self._callees[name]._identity for name in sorted(self._callees)]
         return ArrayCache.key(*parts)
+
+
+class _ForeignCall(Kernel):
+    """`call_c` as numba's own instruction."""
+
+    @cached_property
+    def _inner(self) -> Any:
+        numba = _numba()
+        from llvmlite import ir
+
+        def typed(_: Any, address: Any, arguments: Any) -> Any:
+            kinds = numba.types.Tuple([numba.types.unliteral(kind) for kind in arguments])
+
+            def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+                passed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
+                function = ir.FunctionType(ir.IntType(64), [value.type for value in passed])
+                return builder.call(builder.inttoptr(values[0], function.as_pointer()), passed)
+
+            return numba.types.intp(numba.types.intp, kinds), generate
+
+        return numba.extending.intrinsic(typed)
+
+
+def call_c(address: int, arguments: tuple[float, ...]) -> int:
+    """Call a C function by its address, also from kernels, and return the word that it returns.
+
+    Arguments are floats, and whole numbers of 64 bits, which stand for pointers as well. Kernels stay in the
+    cache, as an address is an argument of theirs and no part of them.
+    """
+    passed = [each if isinstance(each, float) else int(each) for each in arguments]
+    kinds = [ctypes.c_double if isinstance(each, float) else ctypes.c_ssize_t for each in passed]
+    return int(ctypes.CFUNCTYPE(ctypes.c_ssize_t, *kinds)(int(address))(*passed))
+
+
+if _COMPILED:
+    call_c = _ForeignCall(call_c, {})  # type: ignore[assignment]
 
 
 class _KernelCache:

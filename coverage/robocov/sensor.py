@@ -6,24 +6,27 @@ holds the solid pieces and nothing else, so robots neither hide obstacles nor ar
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import platform
+import sys
+from functools import cached_property
 
 import numpy as np
 import pymunk
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.compiled import call_c, kernel
 from robocov.observation.scans import headings
-
-if TYPE_CHECKING:
-    from robocov.world.solid import Mover
+from robocov.world.contacts import added_mover
+from robocov.world.engine import addresses_of, function
+from robocov.world.solid import Mover
 
 _FARTHEST = 1e6
 """An unlimited range, in metres, as the engine's bounding boxes can hold it."""
 
 _ALL = pymunk.ShapeFilter()
 
-_PROBED = (1e3, 731.0)
-"""Where a ray ends on which the binding is tried."""
+_IN_REGISTERS = sys.platform != "win32" and platform.machine() in ("x86_64", "aarch64", "arm64")
+"""Whether C takes a vector as two floats and a filter as two words, as kernels call it."""
 
 
 class RangeSensor:
@@ -38,14 +41,18 @@ class RangeSensor:
     """
 
     def __init__(self, pieces: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
+        self._pieces, self._movers = pieces, movers
         self._space = pymunk.Space()
         for ring in pieces:
             self._space.add(pymunk.Poly(self._space.static_body, ring.tolist()))
         # an empty step builds the static index; queries never change the space
         self._space.step(1e-9)
-        self._movers = [(added_mover(self._space, mover), mover.path) for mover in movers]
-        self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
-        self._direct = _DirectQueries.of(self._space)
+        self._bodies = [added_mover(self._space, mover) for mover in movers]
+        self._failed: dict[tuple[float, float, float], pymunk.Circle] = {}
+
+    def copy(self) -> RangeSensor:
+        """Return one of the same obstacles, at time zero."""
+        return RangeSensor(self._pieces, self._movers)
 
     def show(self, time: float, failed_robots: Array | None = None) -> None:
         """Let all that is asked from now on be of a time, s, with robots that failed among the obstacles.
@@ -56,18 +63,16 @@ class RangeSensor:
         failed_robots : (w, 3) m or None
             x, y and radius of each.
         """
-        for body, path in self._movers:
-            body.position = tuple(path.shift(time).tolist())
+        for body, mover in zip(self._bodies, self._movers, strict=True):
+            body.position = tuple(mover.path.shift(time).tolist())
             self._space.reindex_shapes_for_body(body)
-        wanted = {
-            (x, y, radius) for x, y, radius in ([] if failed_robots is None else failed_robots.tolist())
-        }
-        for gone in self._failed_robots.keys() - wanted:
-            self._space.remove(self._failed_robots.pop(gone))
-        for x, y, radius in sorted(wanted - self._failed_robots.keys()):
+        wanted = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
+        for gone in self._failed.keys() - wanted:
+            self._space.remove(self._failed.pop(gone))
+        for x, y, radius in sorted(wanted - self._failed.keys()):
             disc = pymunk.Circle(self._space.static_body, radius, (x, y))
             self._space.add(disc)
-            self._failed_robots[x, y, radius] = disc
+            self._failed[x, y, radius] = disc
 
     def nearest(self, positions: Array, ranges: Array) -> Array:
         """Return the closest solid point of each robot within its range.
@@ -82,14 +87,13 @@ class RangeSensor:
         (n, 2) m
             nan where nothing is in range.
         """
-        reach = np.minimum(ranges, _FARTHEST).tolist()
-        if self._direct is not None:
-            return self._direct.nearest(positions, reach)
-        points = np.full(positions.shape, np.nan)
-        for row, (place, limit) in enumerate(zip(positions.tolist(), reach, strict=True)):
-            found = self._space.point_query_nearest(tuple(place), limit, _ALL)
-            if found is not None:
-                points[row] = found.point
+        points = np.array(positions, dtype=float, order="C")
+        if self._addresses is not None:
+            _nearest(self._addresses, points, ranges, np.empty(6))
+            return points
+        for row, (place, reach) in enumerate(zip(points.tolist(), ranges.tolist(), strict=True)):
+            found = self._space.point_query_nearest(tuple(place), min(reach, _FARTHEST), _ALL)
+            points[row] = np.nan if found is None else found.point
         return points
 
     def scan(self, position: Array, rays: int, reach: float) -> tuple[Array, Array]:
@@ -129,10 +133,10 @@ class RangeSensor:
         """
         limit = np.minimum(ranges, _FARTHEST)
         ends = positions[:, None, :] + limit[:, None, None] * headings(rays)
-        if self._direct is not None:
-            fraction, hit = self._direct.first_along(positions, ends)
+        fraction, hit = np.ones(ends.shape[:2]), np.zeros(ends.shape[:2], dtype=bool)
+        if self._addresses is not None:
+            _first_met(self._addresses, np.array(positions), ends, fraction, hit, np.empty(6))
         else:
-            fraction, hit = np.ones(ends.shape[:2]), np.zeros(ends.shape[:2], dtype=bool)
             for row, (start, turn) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
                 for ray, end in enumerate(turn):
                     found = self._space.segment_query_first(tuple(start), tuple(end), 0.0, _ALL)
@@ -140,92 +144,38 @@ class RangeSensor:
                         fraction[row, ray], hit[row, ray] = found.alpha, True
         return limit[:, None] * fraction, hit
 
-
-def added_mover(space: pymunk.Space, mover: Mover) -> pymunk.Body:
-    """Add an obstacle that moves to a space, where it is at time zero; its position is its shift."""
-    body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-    shapes = [pymunk.Poly(body, ring.tolist()) for ring in mover.pieces]
-    for shape in shapes:
-        shape.friction = shape.elasticity = 0.0
-    space.add(body, *shapes)
-    return body
-
-
-class _DirectQueries:
-    """pymunk's own queries without the Python objects around each answer (nearest points 6 x faster).
-
-    They call the same library functions through pymunk's binding. The binding is not public, so
-    this is used only after it gave the same answer as the public method.
-    """
-
-    def __init__(self, space: pymunk.Space, ffi: Any, lib: Any) -> None:
-        self._ffi = ffi
-        self._query = lib.cpSpacePointQueryNearest
-        self._along = lib.cpSpaceSegmentQueryFirst
-        self._owner = space
-        self._space = space._space
-        self._filter = ffi.new("cpShapeFilter *", tuple(_ALL))[0]
-        self._size = self._rays = 0
-
-    @classmethod
-    def of(cls, space: pymunk.Space) -> _DirectQueries | None:
-        """Return direct queries on `space`, or None when this pymunk does not allow them."""
-        probe = np.array([[0.25, 0.5]])
-        try:
-            from pymunk._chipmunk_cffi import ffi, lib
-
-            direct = cls(space, ffi, lib)
-            answer = direct.nearest(probe, [_FARTHEST])
-            fraction, hit = direct.first_along(probe, np.array([[_PROBED]]))
-        except (ImportError, AttributeError, TypeError, ValueError):
+    @cached_property
+    def _addresses(self) -> IntArray | None:
+        """The space and its queries for kernels; None where these cannot call them."""
+        if not _IN_REGISTERS:
             return None
-        expected = space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
-        same = expected is None or (answer[0] == np.array(expected.point)).all()
-        met = space.segment_query_first((0.25, 0.5), _PROBED, 0.0, _ALL)
-        same &= bool(hit[0, 0]) == (met is not None) and (met is None or fraction[0, 0] == met.alpha)
-        return direct if same else None
+        queries = map(function, ("cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"))
+        addresses = addresses_of(self._space._space, *queries)
+        point = np.array([[0.25, 0.5]])
+        expected = self._space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
+        _nearest(addresses, point, frozen([_FARTHEST]), np.empty(6))
+        same = bool(np.isnan(point[0, 0])) if expected is None else tuple(point[0]) == expected.point
+        return addresses if same else None
 
-    def nearest(self, positions: Array, reach: list[float]) -> Array:
-        n = len(positions)
-        if self._size != n:
-            self._places = self._ffi.new("cpVect[]", n)
-            self._place_rows = [self._places[row] for row in range(n)]
-            self._place = np.frombuffer(self._ffi.buffer(self._places), dtype=np.float64).reshape(n, 2)
-            self._answers = self._ffi.new("cpPointQueryInfo[]", n)
-            self._rows = [self._answers + row for row in range(n)]
-            table = np.frombuffer(self._ffi.buffer(self._answers), dtype=np.float64).reshape(n, 6)
-            self._shape = table.view(np.int64)[:, 0]
-            self._point = table[:, 1:3]
-            self._size = n
-        self._place[:] = positions
-        query, space, anything = self._query, self._space, self._filter
-        for place, limit, answer in zip(self._place_rows, reach, self._rows, strict=True):
-            query(space, place, limit, anything, answer)
-        points = self._point.copy()
-        points[self._shape == 0] = np.nan
-        return points
 
-    def first_along(self, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
-        """Return the part of the way from (n, 2) to (n, rays, 2) to what is met, or 1, and whether it is."""
-        rays = ends.shape[1]
-        if self._rays != rays:
-            self._ends = self._ffi.new("cpVect[]", rays)
-            self._end_rows = [self._ends[ray] for ray in range(rays)]
-            self._end = np.frombuffer(self._ffi.buffer(self._ends), dtype=np.float64).reshape(rays, 2)
-            self._met = self._ffi.new("cpSegmentQueryInfo[]", rays)
-            self._met_rows = [self._met + ray for ray in range(rays)]
-            # shape, point x, y, normal x, y, alpha
-            self._meeting = np.frombuffer(self._ffi.buffer(self._met), dtype=np.float64).reshape(rays, 6)
-            self._start = self._ffi.new("cpVect *")
-            self._rays = rays
-        fraction, hit = np.empty(ends.shape[:2]), np.empty(ends.shape[:2], dtype=bool)
-        query, space, anything, start = self._along, self._space, self._filter, self._start
-        for row, place in enumerate(positions.tolist()):
-            start.x, start.y = place
-            begin = start[0]
-            self._end[:] = ends[row]
-            for end, answer in zip(self._end_rows, self._met_rows, strict=True):
-                query(space, begin, end, 0.0, anything, answer)
-            fraction[row] = self._meeting[:, 5]
-            hit[row] = self._meeting.view(np.int64)[:, 0] != 0
-        return fraction, hit
+@kernel
+def _nearest(addresses: IntArray, points: Array, ranges: Array, answer: Array) -> None:
+    """Replace points by the nearest solid ones; `answer` is a cpPointQueryInfo: shape, point, ..."""
+    for i in range(len(points)):
+        reach = min(ranges[i], _FARTHEST)
+        asked = (addresses[0], points[i, 0], points[i, 1], reach, 0, -1, answer.ctypes.data)
+        found = call_c(addresses[1], asked)
+        points[i, 0], points[i, 1] = (answer[1], answer[2]) if found else (np.nan, np.nan)
+
+
+@kernel
+def _first_met(
+    addresses: IntArray, positions: Array, ends: Array, fraction: Array, hit: BoolArray, answer: Array
+) -> None:
+    """Set where segments meet something first; `answer` is a cpSegmentQueryInfo, which ends with the part."""
+    for i in range(len(positions)):
+        for k in range(ends.shape[1]):
+            x, y = ends[i, k, 0], ends[i, k, 1]
+            start = (addresses[0], positions[i, 0], positions[i, 1])
+            if call_c(addresses[2], (*start, x, y, 0.0, 0, -1, answer.ctypes.data)):
+                fraction[i, k], hit[i, k] = answer[5], True

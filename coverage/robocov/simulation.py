@@ -72,6 +72,9 @@ class Simulation:
     (2, 2)
     """
 
+    _observation: tuple[Observations, Inbox | None] | None
+    _snapshot: Snapshot | None
+
     def __init__(
         self,
         environment: Environment,
@@ -116,6 +119,7 @@ class Simulation:
         self.dt = dt
         self._conditions = conditions
         walls, moving = solid_pieces(environment), movers(environment)
+        self._moving = bool(moving)
         self._sensor = RangeSensor(walls, moving)
         self._world: World | ChangingWorld
         if conditions is not None and conditions.team_changes:
@@ -126,17 +130,20 @@ class Simulation:
             self._world = World(walls, self.team, positions, velocities, movers=moving)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
         self._inbox = None if self._perception is None else self._perception.begin()
+        self._everybody = (
+            Neighbours(len(positions)) if np.isinf(self.team.communication_range).all() else None
+        )
         self._began = time
         self._steps = 0
-        self._law = self._asked(lambda: informed(controller, environment.static))
-        self._memory = self._asked(lambda: self._law.begin(environment.region, self.team))
-        self._scanning: Scanning | None = self._asked(lambda: getattr(controller, "scanning", None))
+        self._law = self._asked(informed, controller, environment.static)
+        self._memory = self._asked(self._law.begin, environment.region, self.team)
+        self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
         if not isinstance(self._scanning, Scanning | None):
             raise ParameterError(
                 f"controller {controller.name!r}: scanning: {shown(self._scanning)}, "
                 f"but a Scanning was wanted"
             )
-        self._snapshot: Snapshot | None = None
+        self._begin_step()
 
     def __repr__(self) -> str:
         where = f"{self.controller.name} on {self.environment.name}"
@@ -160,8 +167,6 @@ class Simulation:
     @property
     def sensor(self) -> RangeSensor:
         """The range sensor of the robots, for ray scans of the present."""
-        failed_robots = self._world.failed_robots if isinstance(self._world, ChangingWorld) else None
-        self._sensor.show(self.time, failed_robots)
         return self._sensor
 
     @property
@@ -186,31 +191,83 @@ class Simulation:
         """What the controller remembers; not to be changed."""
         return self._memory
 
+    def observe(self) -> Observations:
+        """Return what each robot knows now."""
+        return self._observed()[0]
+
     @property
     def snapshot(self) -> Snapshot:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
-            seen, self._received = self._perceived()
-            decision = self._decide(seen)
+            seen, inbox = self._observed()
+            decision = self._decided(seen)
             if self._perception is None:
                 self._snapshot = Snapshot(seen, decision)
             else:
                 working = self.working
-                self._snapshot = Snapshot(seen, of_working(decision, working), self.positions, working)
+                decision = of_working(decision, working)
+                self._snapshot = Snapshot(seen, decision, self.positions, working, inbox)
         return self._snapshot
 
-    def _decide(self, seen: Observations) -> Decision:
+    def _begin_step(self) -> None:
+        """Turn to the present: nothing is observed or decided yet, and the sensor's obstacles move on."""
+        self._observation = self._snapshot = None
+        if isinstance(self._world, ChangingWorld):
+            self._sensor.show(self.time, self._world.failed_robots)
+        elif self._moving:
+            self._sensor.show(self.time)
+
+    def _observed(self) -> tuple[Observations, Inbox | None]:
+        """Return what each robot knows now, and the messages that it then has."""
+        if self._observation is None:
+            seen = self._sensed()
+            if self._perception is None:
+                self._observation = seen, None
+            else:
+                self._observation = self._perception.known(seen, self._inbox, self.working)
+        return self._observation
+
+    def _sensed(self) -> Observations:
+        """Return what each robot would know now if nothing went wrong."""
+        team, environment, positions = self.team, self.environment, self._world.positions
+        points = self._sensor.nearest(positions, team.sensing_range)
+        points.setflags(write=False)
+        neighbours = self._everybody
+        if neighbours is None:
+            neighbours = Neighbours.within(positions, team.communication_range)
+        return Observations(
+            positions=positions,
+            velocities=self._world.velocities,
+            neighbours=neighbours,
+            obstacle_points=points,
+            region=environment.region,
+            time=self.time,
+            max_speeds=team.max_speed,
+            density=environment.density,
+            scans=None if self._scanning is None else self._scanned(positions, self._scanning),
+        )
+
+    def _scanned(self, positions: Array, scanning: Scanning) -> Scans | None:
+        """Return a scan of each robot, in the steps in which the controller wants one."""
+        if self._steps % scanning.every(self.dt):
+            return None
+        distances, hit = self._sensor.scans(positions, scanning.rays, self.team.sensing_range)
+        distances.setflags(write=False)
+        hit.setflags(write=False)
+        return Scans(distances, hit)
+
+    def _decided(self, seen: Observations) -> Decision:
         # a user's controller may change what it is given, and use again what it gave
         ours = self._built_in or not remembers(self.controller)
         memory = self._memory if ours else _copied(self._memory)
-        made = self._asked(lambda: self._law.decide(seen, memory))
+        made = self._asked(self._law.decide, seen, memory)
         decision = checked_decision(made, len(self.team), self.controller.name, seen.time)
         return decision if self._built_in else detached(decision, self.controller.name)
 
-    def _asked(self, question: Callable[[], Any]) -> Any:
+    def _asked(self, question: Callable[..., Any], *args: Any) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
         try:
-            return question()
+            return question(*args)
         except RobocovError:
             raise
         except (Exception, SystemExit) as error:
@@ -218,44 +275,6 @@ class Simulation:
                 raise
             where, when = f"controller {self.controller.name!r}", f" at {self.time:.3f} s"
             raise fault_of(where, error, when) from error
-
-    def observe(self) -> Observations:
-        """Return what each robot knows now."""
-        return self._perceived()[0]
-
-    def _perceived(self) -> tuple[Observations, Inbox | None]:
-        """Return what each robot knows now, and the messages that it then has."""
-        seen = self._seen()
-        if self._perception is None:
-            return seen, None
-        return self._perception.known(seen, self._inbox, self.working)
-
-    def _seen(self) -> Observations:
-        """Return what each robot would know now if nothing went wrong."""
-        positions = self._world.positions
-        points = self.sensor.nearest(positions, self.team.sensing_range)
-        points.setflags(write=False)
-        return Observations(
-            positions=positions,
-            velocities=self._world.velocities,
-            neighbours=Neighbours.within(positions, self.team.communication_range),
-            obstacle_points=points,
-            region=self.environment.region,
-            time=self.time,
-            max_speeds=self.team.max_speed,
-            density=self.environment.density,
-            scans=self._scanned(positions),
-        )
-
-    def _scanned(self, positions: Array) -> Scans | None:
-        """Return a scan of each robot, in the steps in which the controller wants one."""
-        scanning = self._scanning
-        if scanning is None or self._steps % scanning.every(self.dt):
-            return None
-        distances, hit = self._sensor.scans(positions, scanning.rays, self.team.sensing_range)
-        distances.setflags(write=False)
-        hit.setflags(write=False)
-        return Scans(distances, hit)
 
     def step(self, external_forces: Array | None = None, *, forces: Array | None = None) -> None:
         """Make one control step.
@@ -274,17 +293,15 @@ class Simulation:
             When the controller returns anything but finite forces of shape (n, 2), or the external
             forces are not.
         """
-        count = len(self.team)
-        external_forces, forces = (
-            given_forces(external_forces, count, "external_forces"),
-            given_forces(forces, count, "forces"),
+        decision, inbox = self.snapshot.decision, self.snapshot.inbox
+        external_forces = given_forces(external_forces, len(self.team), "external_forces")
+        forces = given_forces(forces, len(self.team), "forces")
+        self._world.step(
+            decision.forces if forces is None else forces, self.dt, external_forces, time=self.time
         )
-        decision = self.snapshot.decision
-        forces = decision.forces if forces is None else forces
-        self._world.step(forces, self.dt, external_forces, time=self.time)
-        self._memory, self._inbox = decision.memory, self._received
+        self._memory, self._inbox = decision.memory, inbox
         self._steps += 1
-        self._snapshot = None
+        self._begin_step()
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
         """Yield the present snapshot and one after every step, until `duration` seconds have passed."""
@@ -334,7 +351,9 @@ class Simulation:
         twin.__dict__.update(self.__dict__)
         twin._world = self._world.copy()
         twin._memory = deepcopy(self._memory)
-        twin._snapshot = None  # it holds the memory that the step after it will hand on
+        if self._moving or isinstance(self._world, ChangingWorld):
+            twin._sensor = self._sensor.copy()
+        twin._begin_step()  # a snapshot holds the memory that the step after it will hand on
         return twin
 
     def with_density(self, environment: Environment) -> Simulation:
@@ -347,7 +366,8 @@ class Simulation:
         """
         twin = self.copy()
         twin.environment = environment
-        twin._law = twin._asked(lambda: informed(twin.controller, environment.static))
+        twin._law = twin._asked(informed, twin.controller, environment.static)
+        twin._begin_step()
         return twin
 
     def remembering(self, memory: Any, inbox: Inbox | None = None) -> Simulation:

@@ -132,12 +132,15 @@ class Snapshot:
         Where the robots are, if that is not where they believe themselves to be, ``seen.positions``.
     working : (n,) bool or None
         Which robots are there and have not failed; None: all.
+    inbox : robocov.conditions.communication.Inbox or None
+        The messages that the robots then have; None where they know the others as they are.
     """
 
     seen: Observations
     decision: Decision
     truth: Array | None = None
     working: BoolArray | None = None
+    inbox: Any = None
 
     def __repr__(self) -> str:
         return f"<Snapshot at {self.time:.2f} s, {counted(len(self.positions), 'robot')}>"

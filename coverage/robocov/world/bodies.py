@@ -1,7 +1,7 @@
 """The physical world: robots as pymunk bodies among static polygons.
 
-Each step the controller's forces, the viscous term of (28) and the kinematic limits are combined,
-for all robots at once, into the net force that pymunk integrates; contacts are pymunk's.
+Each step the controller's forces, the viscous term of (28) and the kinematic limits are combined into the net
+force that pymunk integrates; contacts are pymunk's.
 
 A step depends on positions and velocities alone. pymunk keeps more than that between steps (cached
 contact impulses, a pending push out of an overlap, the shape of its search tree), all of which
@@ -14,17 +14,18 @@ a copy of a running world go on identically, bit for bit, and what keeps a conta
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pymunk import batch
 
 from robocov.arrays import Array, IntArray
+from robocov.compiled import call_c, inner_kernel, kernel
 from robocov.errors import ParameterError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
 from robocov.world.contacts import ContactSolver, obstacle_space, robot_body
-from robocov.world.moving_bodies import motion
+from robocov.world.engine import FORCES, GET_BODY, SET_BODY, SPACE, STATES, STEP, Engine, transfer
 
 if TYPE_CHECKING:
     from robocov.world.solid import Mover
@@ -35,8 +36,7 @@ LONGEST_SUBSTEP = 0.02
 MAX_MASS_RATIO = 1000.0
 """Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
 
-_STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
-_BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
+_NONE = np.zeros((0, 2))
 
 
 class World:
@@ -50,7 +50,7 @@ class World:
     positions : (n, 2) m
     velocities : (n, 2) m/s, at rest by default
     movers : tuple of Mover
-        Obstacles that move, as kinematic bodies; see `robocov.world.moving_bodies`.
+        Obstacles that move, as kinematic bodies; see `robocov.world.contacts`.
     failed_robots : (w, 3) m or None
         x, y and radius of robots that have failed, and stand in the way.
 
@@ -59,6 +59,9 @@ class World:
     ParameterError
         When a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
     """
+
+    _positions: Array
+    _velocities: Array
 
     def __init__(
         self,
@@ -76,44 +79,18 @@ class World:
         if heavy > MAX_MASS_RATIO * light:
             most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
             raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
-        # this space only tells who touches: nothing is pushed out of an overlap, nothing is remembered
-        self._space = obstacle_space(pieces, movers, failed_robots)
-        self._space.iterations = self._space.collision_persistence = 1
-        self._space.collision_bias = 1.0
-        self._contacts: ContactSolver | None = None
-        self._positions = np.array(positions, dtype=float)
-        self._row: dict[int, int] = {}
-        for (x, y), mass, radius in zip(
-            self._positions.tolist(), team.mass.tolist(), team.radius.tolist(), strict=True
-        ):
-            body, disc = robot_body(mass, radius)
-            # before it enters the space, which keeps a pair for any two discs that enter in one place
-            body.position = x, y
-            self._space.add(body, disc)
-            self._row[body.id] = len(self._row)
-        self._moving = motion(movers, 0.0, 1.0)
-        self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
-
-        # pymunk.batch goes through the obstacles that move, the robots, both in the order in which they
-        # were added, and the static body: hence some rows more
-        self._rows = slice(len(movers), len(movers) + len(team))
-        rows = len(team) + len(movers) + 1
-        self._force = np.zeros((rows, 2))
-        self._force_buffer = batch.Buffer()
-        self._force_buffer.set_float_buf(self._force)
-        self._state = np.zeros((rows, 4))
-        self._state_buffer = batch.Buffer()
-        self._state_buffer.set_float_buf(self._state)
-        self._read_buffer, self._arbiters = batch.Buffer(), batch.Buffer()
-        self._velocities = np.zeros_like(self._positions)
+        state = np.zeros((2, len(team), 2))
+        state[0] = positions
         if velocities is not None:
-            self._velocities[:] = velocities
-        self._protect()
-        self._write_state()
-
-        self._thrown = bool((np.hypot(*self._velocities.T) > team.max_speed).any())
-        self._response: dict[float, tuple[Array, Array, Array, Array]] = {}
-        self._fastest = float(team.max_speed.max())
+            state[1] = velocities
+        self._set_state(state)
+        self._fast = self._anybody_fast()
+        self._moving = motion(movers, 0.0, 1.0)
+        self._row: dict[int, int] = {}
+        self._contacts: ContactSolver | None = None
+        self._dt = math.nan
+        self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
+        self._max_speed = float(team.max_speed.max())
         self._smallest, self._largest = float(team.radius.min()), float(team.radius.max())
 
     @property
@@ -128,14 +105,11 @@ class World:
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
-        return World(
-            self._pieces,
-            self.team,
-            self._positions,
-            self._velocities,
-            movers=self._movers,
-            failed_robots=self._failed_robots,
-        )
+        twin = object.__new__(World)
+        # the engine, made anew when it is needed, is all that is changed in place
+        twin.__dict__.update({name: value for name, value in vars(self).items() if name != "_engine"})
+        twin._contacts = None
+        return twin
 
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
@@ -149,124 +123,195 @@ class World:
         forces : (n, 2) N
         dt : float, s
         external_forces : (n, 2) N or None
-            From outside, as by a hand. They know no limits; a robot that they have made faster than it
-            can be brakes as hard as it can.
+            As by a hand. They know no limits; a robot that they have made faster than it can be by itself
+            brakes as hard as it can.
         """
-        fastest = self._fastest
-        if external_forces is not None or self._thrown:
-            speed = np.hypot(*self._velocities.T)
-            gain = 0.0 if external_forces is None else np.hypot(*external_forces.T) / self.team.mass * dt
-            fastest = max(fastest, float((speed + gain).max()))
+        if external_forces is not None:
+            external_forces = np.array(external_forces, dtype=float)
+        fastest = self._max_speed
+        if external_forces is not None or self._fast:
+            fastest = max(fastest, float((self._speeds() + self._gain(external_forces, dt)).max()))
         fastest += self._fastest_mover
         # a robot must not cross a thin wall within one substep
         parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(fastest * dt / self._smallest))
         for part in range(parts):
             if self._movers:
                 self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
-                self._write_state()
+                self._write_state(self._engine)
             self._substep(forces, dt / parts, external_forces)
 
+    def _speeds(self) -> Array:
+        return np.asarray(np.hypot(self._velocities[:, 0], self._velocities[:, 1]))
+
+    def _gain(self, external_forces: Array | None, dt: float) -> Array | float:
+        """Return how much faster external forces may make each robot, m/s."""
+        return 0.0 if external_forces is None else np.hypot(*external_forces.T) / self.team.mass * dt
+
+    def _anybody_fast(self) -> bool:
+        """Whether a robot is faster than it can be by itself."""
+        return bool((self._speeds() > self.team.max_speed).any())
+
+    @cached_property
+    def _engine(self) -> Engine:
+        """The space that tells who touches: nothing is pushed out of an overlap, nothing is remembered."""
+        space = obstacle_space(self._pieces, self._movers, self._failed_robots)
+        space.iterations = space.collision_persistence = 1
+        space.collision_bias = 1.0
+        self._row = {}
+        columns = self._positions.tolist(), self.team.mass.tolist(), self.team.radius.tolist()
+        for row, (place, mass, radius) in enumerate(zip(*columns, strict=True)):
+            body, disc = robot_body(mass, radius)
+            # before it enters the space, which keeps a pair for any two discs that enter in one place
+            body.position = tuple(place)
+            space.add(body, disc)
+            self._row[body.id] = row
+        engine = Engine(space, len(self._movers) + len(self.team) + 1)
+        self._write_state(engine)
+        return engine
+
+    def _write_state(self, engine: Engine) -> None:
+        begin = len(self._movers)
+        engine.states[:begin] = self._moving
+        engine.states[begin:-1, :2], engine.states[begin:-1, 2:] = self._positions, self._velocities
+        engine.write(STATES)
+
     def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
-        limit = self._speed_limit(dt)
-        net = self._net_force(forces, dt, limit)
+        engine = self._engine
+        if dt != self._dt:
+            self._dt, self._response = dt, response(self.team, dt)
+        answer, limit = self._response, self.team.max_speed
+        if self._fast:
+            # who is faster than it can be by itself brakes
+            limit = np.maximum(limit, self._speeds() - self.team.max_acceleration * dt)
+            answer = answer.copy()
+            answer[:, 4] = limit
         if external_forces is not None:
-            net = net + external_forces
-            limit = np.maximum(
-                limit, np.hypot(*self._velocities.T) + np.hypot(*external_forces.T) / self.team.mass * dt
-            )
-        before = self._positions, self._velocities
-        self._force[self._rows] = net
-        batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._force_buffer)
-        self._space.step(dt)
-        self._read_state()
+            limit = np.maximum(limit, self._speeds() + self._gain(external_forces, dt))
+        state = np.empty((2, len(forces), 2))
+        engine.forces[len(self._movers) : -1] = forces
+        external = _NONE if external_forces is None else external_forces
+        _free_substep(
+            engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
+        )
         touching = self._touching()
         if touching:
-            self._resolve_contacts(np.array(touching), np.hstack(before), net, dt, limit)
-        if external_forces is not None or self._thrown:
-            self._thrown = bool((np.hypot(*self._velocities.T) > self.team.max_speed).any())
-
-    def _speed_limit(self, dt: float) -> Array:
-        """Return how fast each robot may be after one substep, (n,) m/s: what was thrown brakes."""
-        if not self._thrown:
-            return self.team.max_speed
-        braked = np.hypot(*self._velocities.T) - self.team.max_acceleration * dt
-        return np.asarray(np.maximum(self.team.max_speed, braked))
-
-    def _net_force(self, forces: Array, dt: float, limit: Array) -> Array:
-        """Return the constant net force, (n, 2) N, that makes one substep obey (28) and the limits.
-
-        The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is
-        stable at any dt; then acceleration and speed are limited, in this order. Limiting the
-        speed cannot break the limit of the acceleration: the old velocity lies within the limit,
-        and projecting onto a disc does not move a point away from a point of the disc.
-        """
-        if dt not in self._response:
-            rate = self.team.viscosity / self.team.mass
-            decay = -np.expm1(-rate * dt)
-            drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / self.team.mass
-            inertia, most = self.team.mass / dt, self.team.max_acceleration * dt
-            self._response = {dt: (decay[:, None], drive[:, None], inertia[:, None], most)}
-        decay, drive, inertia, most = self._response[dt]
-        velocities = self._velocities
-        change = _limited(drive * forces - decay * velocities, most)
-        reached = _limited(velocities + change, limit)
-        return np.asarray((reached - velocities) * inertia)
+            self._resolve_contacts(np.array(touching), state, dt, limit)
+        self._set_state(state)
+        if touching:
+            self._write_state(engine)
+        if external_forces is not None or self._fast:
+            self._fast = self._anybody_fast()
 
     def _touching(self) -> list[int]:
-        """Return the robots that touched something after the last free substep."""
-        self._arbiters.clear()
-        batch.get_space_arbiters(self._space, _BODIES, self._arbiters)
-        found = np.frombuffer(self._arbiters.int_buf(), dtype=np.uintp).tolist()
-        return sorted({self._row[body] for body in found if body in self._row})
+        """Return the robots that touched something in the last free substep."""
+        return sorted({self._row[body] for body in self._engine.touching() if body in self._row})
 
-    def _resolve_contacts(self, rows: IntArray, before: Array, net: Array, dt: float, limit: Array) -> None:
-        """Move robots again that touch something, and with them whoever they are moved against."""
-        if self._contacts is None:
-            self._contacts = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
-        radius, free = self.team.radius, np.hstack([self._positions, self._velocities])
+    def _set_state(self, state: Array) -> None:
+        # whoever gets it, a controller or a record, must not change it
+        state.setflags(write=False)
+        self._positions, self._velocities = state
+
+    def _resolve_contacts(self, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
+        """Move robots again that touch something, and with them whoever they are moved against.
+
+        `free`, (2, n, 2) m and m/s, is how all moved as if nobody touched anything, and is corrected.
+        """
+        solver = self._contacts
+        self._contacts = None  # it is of no use once it was interrupted
+        if solver is None:
+            solver = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
+        begin, radius = len(self._movers), self.team.radius
+        before = np.hstack([self._positions, self._velocities])
+        net = self._engine.forces[begin:]
         while True:
+            moved = solver.moved(rows, before[rows], net[rows], self._moving, dt)
             state = free.copy()
-            state[rows] = self._contacts.moved(rows, before[rows], net[rows], self._moving, dt)
-            resolved = np.zeros(len(state), dtype=bool)
+            state[0, rows] = moved[:, :2]
+            resolved = np.zeros(len(before), dtype=bool)
             resolved[rows] = True
-            first, second, distance = close_pairs(state[:, :2], 2.0 * self._largest)
+            first, second, distance = close_pairs(state[0], 2.0 * self._largest)
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
             if not reached.any():
                 break
             resolved[second[reached]] = True
             rows = np.flatnonzero(resolved)
         # impulses of a contact may exceed what a robot can do by itself
-        state[rows, 2:] = _limited(state[rows, 2:], limit[rows])
-        self._positions, self._velocities = state[:, :2].copy(), state[:, 2:].copy()
-        self._protect()
-        self._write_state()
-
-    def _write_state(self) -> None:
-        self._state[: len(self._moving)] = self._moving
-        self._state[self._rows, :2] = self._positions
-        self._state[self._rows, 2:] = self._velocities
-        batch.set_space_bodies(self._space, _STATE, self._state_buffer)
-
-    def _protect(self) -> None:
-        """Keep whoever gets the state (a controller, a record) from changing it."""
-        self._positions.setflags(write=False)
-        self._velocities.setflags(write=False)
-
-    def _read_state(self) -> None:
-        self._read_buffer.clear()
-        batch.get_space_bodies(self._space, _STATE, self._read_buffer)
-        state = np.frombuffer(self._read_buffer.float_buf(), dtype=np.float64).reshape(-1, 4)
-        self._positions = state[self._rows, :2].copy()
-        self._velocities = state[self._rows, 2:].copy()
-        self._protect()
+        free[0, rows], free[1, rows] = moved[:, :2], scale_to_limits(moved[:, 2:], limit[rows])
+        self._contacts = solver
 
 
-def _limited(vectors: Array, limit: Array) -> Array:
-    """Return (n, 2) vectors shortened to at most `limit` (n,); the same array when none is longer."""
+def response(team: Team, dt: float) -> Array:
+    """Return how robots answer to forces for `dt` seconds, (n, 5): see `_free_substep`.
+
+    The columns: part of the velocity that viscosity takes (28), velocity by force in m/s/N, force by change
+    of velocity in N/(m/s), most change of velocity and most speed in m/s.
+    """
+    rate = team.viscosity / team.mass
+    decay = -np.expm1(-rate * dt)
+    drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / team.mass
+    return np.column_stack([decay, drive, team.mass / dt, team.max_acceleration * dt, team.max_speed])
+
+
+@inner_kernel
+def _scale(x: float, y: float, limit: float) -> float:
+    """Return by what to multiply a vector so that it is no longer than `limit`."""
+    square = x * x + y * y
+    return limit / math.sqrt(square) if square > limit * limit else 1.0
+
+
+@kernel
+def _free_substep(
+    addresses: IntArray,
+    filled: IntArray,
+    forces: Array,
+    states: Array,
+    answer: Array,
+    external: Array,
+    moved: Array,
+    dt: float,
+) -> None:
+    """Move all bodies by one substep as if nothing touched; make net forces of the controllers'.
+
+    The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
+    dt; then acceleration and speed are limited, in this order. Limiting the speed cannot break the limit of
+    the acceleration: the old velocity lies within the limit, and projecting onto a disc does not move a point
+    away from a point of the disc.
+    """
+    begin = len(states) - 1 - len(answer)
+    for i in range(len(answer)):
+        vx, vy = states[begin + i, 2], states[begin + i, 3]
+        decay, drive = answer[i, 0], answer[i, 1]
+        dx, dy = drive * forces[begin + i, 0] - decay * vx, drive * forces[begin + i, 1] - decay * vy
+        scale = _scale(dx, dy, answer[i, 3])
+        ux, uy = vx + dx * scale, vy + dy * scale
+        scale = _scale(ux, uy, answer[i, 4])
+        forces[begin + i, 0] = (ux * scale - vx) * answer[i, 2]
+        forces[begin + i, 1] = (uy * scale - vy) * answer[i, 2]
+        if len(external):
+            forces[begin + i, 0] += external[i, 0]
+            forces[begin + i, 1] += external[i, 1]
+    transfer(addresses, filled, SET_BODY, FORCES)
+    call_c(addresses[STEP], (addresses[SPACE], dt))
+    transfer(addresses, filled, GET_BODY, STATES)
+    for i in range(len(answer)):
+        for k in range(2):
+            moved[0, i, k] = states[begin + i, k]
+            moved[1, i, k] = states[begin + i, 2 + k]
+
+
+def scale_to_limits(vectors: Array, limit: Array) -> Array:
+    """Return (n, 2) vectors shortened to at most `limit` (n,)."""
     square = vectors[:, 0] ** 2 + vectors[:, 1] ** 2
     excess = square > limit * limit
-    if not excess.any():
-        return vectors
     scale = np.ones(len(vectors))
     scale[excess] = limit[excess] / np.sqrt(square[excess])
     return vectors * scale[:, None]
+
+
+def motion(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
+    """Return where moving obstacles are at a time, and how fast for `dt` seconds, (m, 4) m and m/s."""
+    state = np.empty((len(movers), 4))
+    for row, mover in enumerate(movers):
+        here = mover.path.shift(time)
+        state[row] = *here, *((mover.path.shift(time + dt) - here) / dt)
+    return state

@@ -1,4 +1,10 @@
-"""Robots in contact: moved on by fine substeps, in a space that holds them, the obstacles and nobody else."""
+"""Robots in contact: moved on by fine substeps, in a space that holds them, the obstacles and nobody else.
+
+Obstacles that move go their way whatever is in it. What they meet they push, and what pushes is stronger
+than any robot. Walls are stronger still: where a robot has no room left between a moving obstacle and a wall,
+it stays in front of the wall, and the obstacle goes over it; it is pushed out again, where that is nearest,
+once there is room. No robot gets into a wall or through one that way.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
-from pymunk import batch
+from pymunk._chipmunk_cffi import lib
 
-from robocov.sensor import added_mover
-from robocov.world.moving_bodies import NO_WALL, keep_before_walls
+from robocov.world.engine import STATES, Engine, substeps
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
@@ -21,7 +26,15 @@ MAX_PENETRATION = 1e-3
 """Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
 
 _MOST_SUBSTEPS = 64
-_STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
+
+_SLOP = 1e-4
+"""Metres that a robot may lean into a wall."""
+
+_WALLS = pymunk.ShapeFilter(mask=0b1)
+"""Of queries for walls alone."""
+
+_NO_WALL = pymunk.ShapeFilter(categories=pymunk.ShapeFilter.ALL_CATEGORIES() & ~0b1)
+"""Of robots and of obstacles that move."""
 
 
 class ContactSolver:
@@ -42,14 +55,14 @@ class ContactSolver:
         self._space = obstacle_space(pieces, movers, failed_robots)
         # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
         self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
-        self._space.collision_slop = 1e-4
+        self._space.collision_slop = _SLOP
         # the part of an overlap that is left after a second: none after a substep; only what a moving
         # obstacle has run over is deep, and comes out of it gradually
         self._space.collision_bias = 1e-9 if movers else 0.0
+        self._engine = Engine(self._space, len(movers) + len(team) + 1)
         self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
         self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
         self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}
-        self._sent, self._read = batch.Buffer(), batch.Buffer()
 
     def moved(self, rows: IntArray, state: Array, forces: Array, motion: Array, dt: float) -> Array:
         """Return the positions and velocities of some robots after `dt` seconds, (k, 4) m and m/s.
@@ -71,50 +84,57 @@ class ContactSolver:
         fastest = math.sqrt(square) + self._fastest_mover
         parts = min(_MOST_SUBSTEPS, max(1, math.ceil(fastest * dt / self._travel)))
 
-        # pymunk.batch goes through obstacles that move, robots as they were added, and the static body
+        engine, space = self._engine, self._space._space
         mine = slice(len(motion), len(motion) + len(rows))
-        values = np.zeros((mine.stop + 1, 4))
-        values[: mine.start], values[mine] = motion, state
-        bodies, discs = zip(*map(self._robot, rows.tolist()), strict=True)
-        self._space.add(*bodies)
-        self._sent.set_float_buf(values)
-        batch.set_space_bodies(self._space, _STATE, self._sent)
-        self._space.add(*discs)
-        values = np.zeros((mine.stop + 1, 2))
-        values[mine] = forces
-        self._sent.set_float_buf(values)
-        for _ in range(parts):
-            batch.set_space_bodies(self._space, batch.BodyFields.FORCE, self._sent)
-            self._step(discs, dt / parts)
-        self._space.remove(*discs)
-        velocities = self._state()[mine, 2:]
+        robots = [self._robot(row) for row in rows.tolist()]
+        # in C, as Python's `Space.add` and `remove` cost more than all else
+        for body, _ in robots:
+            lib.cpSpaceAddBody(space, body._body)
+        engine.states[: mine.start], engine.states[mine], engine.states[mine.stop] = motion, state, 0.0
+        engine.write(STATES)
+        for _, disc in robots:
+            lib.cpSpaceAddShape(space, disc._shape)
+        engine.forces[:] = 0.0
+        engine.forces[mine] = forces
+        self._substeps(robots, parts, dt / parts)
+        for _, disc in robots:
+            lib.cpSpaceRemoveShape(space, disc._shape)
+        engine.read()
+        velocities = engine.states[mine, 2:].copy()
         # what is left is the push out of an overlap that pymunk has decided but not yet applied
-        values[mine] = 0.0
-        batch.set_space_bodies(self._space, batch.BodyFields.VELOCITY, self._sent)
-        self._step(discs, dt / parts)
-        settled = self._state()[mine]
-        settled[:, 2:] = velocities
-        self._space.remove(*bodies)
-        return settled
+        engine.states[: mine.stop, 2:] = engine.forces[:] = 0.0
+        engine.write(STATES)
+        self._substeps(robots, 1, dt / parts)
+        engine.read()
+        for body, _ in robots:
+            lib.cpSpaceRemoveBody(space, body._body)
+        return np.hstack([engine.states[mine, :2], velocities])
 
     def _robot(self, row: int) -> tuple[pymunk.Body, pymunk.Circle]:
         if row not in self._robots:
             self._robots[row] = robot_body(float(self._team.mass[row]), float(self._team.radius[row]))
         return self._robots[row]
 
-    def _step(self, discs: tuple[pymunk.Circle, ...], dt: float) -> None:
+    def _substeps(self, robots: list[tuple[pymunk.Body, pymunk.Circle]], count: int, dt: float) -> None:
         if not self._movers:
-            self._space.step(dt)
+            substeps(self._engine.addresses, self._engine.filled, count, dt)
             return
-        places = [disc.body.position for disc in discs if disc.body is not None]
-        self._space.step(dt)
-        for disc, place in zip(discs, places, strict=True):
-            keep_before_walls(self._space, disc, place)
+        for _ in range(count):
+            before = [body.position for body, _ in robots]
+            substeps(self._engine.addresses, self._engine.filled, 1, dt)
+            for (body, disc), place in zip(robots, before, strict=True):
+                self._keep_before_walls(body, disc.radius, place)
 
-    def _state(self) -> Array:
-        self._read.clear()
-        batch.get_space_bodies(self._space, _STATE, self._read)
-        return np.frombuffer(self._read.float_buf(), dtype=np.float64).reshape(-1, 4).copy()
+    def _keep_before_walls(self, body: pymunk.Body, radius: float, before: pymunk.Vec2d) -> None:
+        """Leave a robot that was pushed into a wall, from some place, in front of the wall."""
+        if self._space.segment_query_first(before, body.position, 0.0, _WALLS) is not None:
+            body.position = before
+        for _ in range(3):  # out of one wall may be into another, in a corner
+            wall = self._space.point_query_nearest(body.position, radius, _WALLS)
+            if wall is None or wall.distance >= radius - _SLOP or wall.distance <= 0.0:
+                return
+            away = body.position - wall.point
+            body.position = wall.point + away * (radius / math.hypot(*away))
 
 
 def obstacle_space(
@@ -130,8 +150,18 @@ def obstacle_space(
     space.add(*walls)
     for mover in movers:
         for shape in added_mover(space, mover).shapes:
-            shape.filter = NO_WALL
+            shape.filter = _NO_WALL
     return space
+
+
+def added_mover(space: pymunk.Space, mover: Mover) -> pymunk.Body:
+    """Add an obstacle that moves to a space, where it is at time zero; its position is its shift."""
+    body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    shapes = [pymunk.Poly(body, ring.tolist()) for ring in mover.pieces]
+    for shape in shapes:
+        shape.friction = shape.elasticity = 0.0
+    space.add(body, *shapes)
+    return body
 
 
 def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
@@ -139,5 +169,5 @@ def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
     body = pymunk.Body(mass, math.inf)
     disc = pymunk.Circle(body, radius)
     disc.friction = disc.elasticity = 0.0
-    disc.filter = NO_WALL
+    disc.filter = _NO_WALL
     return body, disc

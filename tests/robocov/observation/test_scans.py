@@ -58,8 +58,8 @@ def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None
 
 def test_the_direct_ray_queries_are_the_public_ones(cluttered: Environment) -> None:
     sensor, public = (RangeSensor(solid_pieces(cluttered)) for _ in range(2))
-    assert sensor._direct is not None
-    public._direct = None
+    assert sensor._addresses is not None
+    public._addresses = None
     places = np.random.default_rng(0).uniform(0.2, 4.8, size=(20, 2))
     for one, other in zip(
         *(each.scans(places, 30, np.full(20, 2.0)) for each in (sensor, public)), strict=True
