@@ -16,8 +16,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from robocov.environment.obstacle_path import in_the_way, swept_area
 from robocov.environment.starts import DiscStart, PointsStart, Start
-from robocov.environment.swept import in_the_way, swept_area
 from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
 from robocov.mapfile.rules import check_rules

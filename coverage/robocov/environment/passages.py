@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.environment.geometry import GRID, SAGITTA
+from robocov.environment import GRID, SAGITTA
 from robocov.robots import DEFAULT_RADIUS
 
 if TYPE_CHECKING:

@@ -51,22 +51,14 @@ StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A named start of one environment, ready to draw positions from.
-
-    Attributes
-    ----------
-    name : str
-    spec : StartSpec
-    free : shapely geometry
-        The free space of the environment.
-    """
+    """A named start of one environment, with its free space, ready to draw positions from."""
 
     name: str
     spec: StartSpec
     free: BaseGeometry
 
     def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
-        """Draw positions of the centres of `n` discs that touch neither walls nor each other.
+        """Draw positions of the centres of `n` discs that touch neither walls nor each other, (n, 2) m.
 
         Parameters
         ----------
@@ -76,10 +68,6 @@ class Start:
         radius : float, m
             Radius of a robot.
 
-        Returns
-        -------
-        (n, 2) m
-
         Raises
         ------
         StartError
@@ -87,66 +75,59 @@ class Start:
         """
         for name, value in (("robots", n), ("seed", seed)):
             if not is_number(value, Integral) or value < (name == "robots"):
-                raise StartError(f"start {self.name!r}: {name}: {value!r}, but a whole number was wanted")
+                raise self._error(f"{name}: {value!r}, but a whole number was wanted")
         if not 0.0 < radius < math.inf:
-            raise StartError(f"start {self.name!r}: radius: {radius!r} m, but a number above 0 was wanted")
-        spacing = 2.0 * radius * (1.0 + GAP)
-        room = self._room(radius * (1.0 + GAP))
-        where = f"start {self.name!r}"
+            raise self._error(f"radius: {radius!r} m, but a number above 0 was wanted")
         if isinstance(self.spec, PointsStart):
-            return self._given(n, radius, self.spec)
-        if room.is_empty:
-            raise StartError(f"{where}: no room for a robot of radius {radius:g} m; a wider start was wanted")
-        rng = np.random.default_rng([seed, n])
-        # no packing of equal discs is denser than the hexagonal one
-        most = 1 + math.floor(room.buffer(spacing / 2).area / (spacing**2 * math.sqrt(3) / 2))
-        if n > most:
-            raise self._too_many(n, radius, most)
-        points = _darts(rng, room, n, spacing)
-        if len(points) < n:
-            points = _hexagonal(rng, room, n, spacing)
-        if len(points) < n:
-            raise self._too_many(n, radius, len(points))
-        return points
-
-    def _too_many(self, n: int, radius: float, room_for: int) -> StartError:
-        return StartError(
-            f"start {self.name!r}: room for about {room_for} robots of radius {radius:g} m, "
-            f"but {n} were asked for; fewer robots or a wider start was wanted"
-        )
-
-    def _room(self, clearance: float) -> BaseGeometry:
-        """Return where a robot's centre may be."""
-        room = self.free.buffer(-clearance)
+            return self._given(n, radius, self.spec.positions)
+        spacing = 2.0 * radius * (1.0 + GAP)
+        room = self.free.buffer(-radius * (1.0 + GAP))
         if isinstance(self.spec, DiscStart):
             # the disc holds the centres; robots may stick out of it by their radius
             room = room.intersection(shapely.Point(self.spec.center).buffer(self.spec.radius, quad_segs=64))
-        return room
-
-    def _given(self, n: int, radius: float, spec: PointsStart) -> Array:
-        where = f"start {self.name!r}"
-        if n > len(spec.positions):
-            raise StartError(
-                f"{where}: has {len(spec.positions)} positions, but {n} robots were asked for; "
-                f"at most {len(spec.positions)} robots or another start was wanted"
+        if room.is_empty:
+            raise self._error(f"no room for a robot of radius {radius:g} m; a wider start was wanted")
+        rng = np.random.default_rng([seed, n])
+        # no packing of equal discs is denser than the hexagonal one
+        most = 1 + math.floor(room.buffer(spacing / 2).area / (spacing**2 * math.sqrt(3) / 2))
+        points = np.empty((0, 2))
+        if n <= most:
+            points = _darts(rng, room, n, spacing)
+            if len(points) < n:
+                points = _hexagonal(rng, room, n, spacing)
+            most = len(points)
+        if len(points) < n:
+            raise self._error(
+                f"room for about {most} robots of radius {radius:g} m, but {n} were asked for; "
+                f"fewer robots or a wider start was wanted"
             )
-        points = np.array(spec.positions[:n], dtype=float)
+        return points
+
+    def _error(self, what: str) -> StartError:
+        return StartError(f"start {self.name!r}: {what}")
+
+    def _given(self, n: int, radius: float, positions: tuple[tuple[float, float], ...]) -> Array:
+        if n > len(positions):
+            raise self._error(
+                f"has {len(positions)} positions, but {n} robots were asked for; "
+                f"at most {len(positions)} robots or another start was wanted"
+            )
+        points = np.array(positions[:n], dtype=float)
         distance = shapely.distance(shapely.points(points), self.free.boundary)
         inside = shapely.contains_properly(self.free, shapely.points(points))
         for k in range(n):
-            place = f"{where}: positions[{k}] = [{points[k, 0]:g}, {points[k, 1]:g}]"
+            place = f"positions[{k}] = [{points[k, 0]:g}, {points[k, 1]:g}]"
             if not inside[k]:
-                raise StartError(f"{place} is inside an obstacle or outside the boundary")
+                raise self._error(f"{place} is inside an obstacle or outside the boundary")
             if distance[k] < radius:
-                raise StartError(
-                    f"{place} is {distance[k]:.3g} m from a wall, but a robot of radius {radius:g} m must fit"
-                )
+                away = f"{distance[k]:.3g} m from a wall"
+                raise self._error(f"{place} is {away}, but a robot of radius {radius:g} m must fit")
         gaps = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
         gaps[np.arange(n), np.arange(n)] = np.inf
         if n > 1 and gaps.min() < 2 * radius:
             i, j = np.unravel_index(int(gaps.argmin()), gaps.shape)
-            raise StartError(
-                f"{where}: positions[{min(i, j)}] and positions[{max(i, j)}] are {gaps.min():.3g} m apart, "
+            raise self._error(
+                f"positions[{min(i, j)}] and positions[{max(i, j)}] are {gaps.min():.3g} m apart, "
                 f"but at least {2 * radius:g} m, a robot's diameter, was wanted"
             )
         return points

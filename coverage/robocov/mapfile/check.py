@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.environment.obstacle_path import in_the_way, swept_area
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.environment.starts import GAP, DiscStart, PointsStart
-from robocov.environment.swept import in_the_way, swept_area
 from robocov.errors import StartError, listed, place
 from robocov.robots import DEFAULT_RADIUS
 

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.obstacle_path import ObstaclePath
-from robocov.environment.swept import in_the_way, swept_area
+from robocov.environment.obstacle_path import ObstaclePath, in_the_way, swept_area
 
 FRAME = PolygonObstacle(
     ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)), (((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),)
