@@ -8,8 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
-from robocov.controllers.atlas_memory import AtlasMemory, PlannerState, RestTracker
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information
 from robocov.controllers.driving import approach, drive, limit_approach_speed, offsets_from_neighbours
 from robocov.controllers.gains import gain, validate_gains
@@ -34,8 +33,8 @@ MAX_PLANNING_GROUP = 8
 """A robot plans for itself and up to so many less one that it hears. Where it hears more it only considers
 the nearest of them, as they are, and looks for its own place."""
 
-STILL_FOR = 3.0
-"""Seconds without getting away (see `atlas_memory.RestTracker`) after which a robot rests."""
+STILL_FOR, STILL_WITHIN = 3.0, 0.1
+"""A robot that does not get so many metres away for so many seconds rests."""
 
 _HARDLY = 0.1
 """Part of the spacing of the nodes that others may move before a plan is made anew."""
@@ -76,7 +75,102 @@ _STAGGERED = 0.5
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
-class Moving(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RestTracker:
+    """Since when (s) each of some (k,) robots has been at (k, 2) m, to within `STILL_WITHIN`."""
+
+    robots: IntArray
+    places: Array
+    since: Array
+
+    def updated(self, robots: IntArray, places: Array, time: float) -> RestTracker:
+        """Return the tracker after one more look."""
+        at, since = places.copy(), np.full(len(robots), time)
+        _, here, there = np.intersect1d(robots, self.robots, assume_unique=True, return_indices=True)
+        still = np.sqrt(((places[here] - self.places[there]) ** 2).sum(axis=1)) < STILL_WITHIN
+        here, there = here[still], there[still]
+        at[here], since[here] = self.places[there], self.since[there]
+        return RestTracker(robots, at, since)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannerState:
+    """What one robot remembers. Immutable.
+
+    Attributes
+    ----------
+    known : DiscoveredMap
+    due, since : float, s
+        When it plans next; when it began, or the robots that it hears became others.
+    tracker : RestTracker
+    planned, ways, table : DiscoveredMap, Ways and Table, or None
+        The map when the last plan was made, and what was computed of it.
+    situation, crew : (k, 2) m and (k,), or None
+        Where the robots were at the last plan, this one first, and who they were.
+    quiet : bool
+        Whether all others rested then.
+    places : (k, 3) or None
+        Where they were to be: number, x, y.
+    own, node : (2,) m or None, int
+        Its own place in the plan, and the node there.
+    look, former, looked : (2,) m or None, places, float in s
+        Where it goes first, to look around; from where it has; for how long.
+    idle : bool
+        Whether the next plan may be left out where nothing has changed.
+    """
+
+    known: DiscoveredMap
+    due: float
+    tracker: RestTracker
+    since: float = 0.0
+    ways: Ways | None = None
+    table: Table | None = None
+    planned: DiscoveredMap | None = None
+    situation: Array | None = None
+    crew: IntArray | None = None
+    quiet: bool = False
+    places: Array | None = None
+    own: Array | None = None
+    node: int = -1
+    look: Array | None = None
+    former: tuple[Array, ...] = ()
+    looked: float = 0.0
+    idle: bool = False
+
+    def __deepcopy__(self, memo: object) -> PlannerState:
+        return self
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AtlasMemory:
+    """What the robots remember.
+
+    Attributes
+    ----------
+    team : Team
+        A robot knows its own limits.
+    states : tuple of PlannerState, one for each robot
+    routes : tuple of (w, 2) m
+        The way-points, the last one the goal.
+    legs : (n,)
+        The way-point that is headed for.
+    returns : (n, rays, 2) m or None
+        What the last scan of each met.
+    """
+
+    team: Team
+    states: tuple[PlannerState, ...]
+    routes: tuple[Array, ...]
+    legs: IntArray
+    returns: Array | None = None
+
+    @property
+    def maps(self) -> tuple[DiscoveredMap, ...]:
+        """The map that each robot has discovered."""
+        return tuple(state.known for state in self.states)
+
+
+class Relocation(NamedTuple):
     """When a robot relocates: parts of the cost that it must save, and whether among what is known alone."""
 
     threshold: float
@@ -164,11 +258,8 @@ class Atlas:
                 state.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
                 for i, state in enumerate(states)
             ]
-            maps = self._told(maps, seen)
-            states = [
-                state if known is state.known else replace(state, known=known)
-                for state, known in zip(states, maps, strict=True)
-            ]
+            maps = self._exchanged(maps, seen)
+            states = [replace(state, known=known) for state, known in zip(states, maps, strict=True)]
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
             if seen.time >= state.due - 1e-9:
@@ -181,7 +272,7 @@ class Atlas:
         returns = last_returns(seen, memory.returns)
         return self._driven(seen, AtlasMemory(memory.team, tuple(states), tuple(routes), legs, returns))
 
-    def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
+    def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         """Return the maps after the robots have told each other of theirs, which they do not here."""
         return maps
 
@@ -191,7 +282,7 @@ class Atlas:
         """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
         place = seen.positions[i]
         others, at = seen.neighbours.of(i), seen.neighbour_positions(i)
-        watch = state.watch.goes_on(others, at, seen.time)
+        tracker = state.tracker.updated(others, at, seen.time)
         crowd = len(others) >= MAX_PLANNING_GROUP
         if crowd:
             near = np.sort(
@@ -207,9 +298,12 @@ class Atlas:
         first = state.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         # a team that has changed may have much to do again
-        since = state.since if np.array_equal(state.watch.robots, watch.robots) and not first else seen.time
-        state = replace(state, due=due, watch=watch, since=since)
-        still = seen.time - watch.since >= STILL_FOR
+        same = np.array_equal(state.tracker.robots, tracker.robots)
+        since = state.since if same and not first else seen.time
+            state.since if np.array_equal(state.tracker.robots, tracker.robots) and not first else seen.time
+        )
+        state = replace(state, due=due, tracker=tracker, since=since)
+        still = seen.time - tracker.since >= STILL_FOR
         situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
         if (
             state.idle
@@ -238,7 +332,7 @@ class Atlas:
                 threshold = threshold if still.all() else 1.0
                 still[:] = True
             # who is there already does not leave for what may not be there
-            moving = Moving(threshold, min(1.0, self.nearby * settling), sure=not together)
+            moving = Relocation(threshold, min(1.0, self.nearby * settling), sure=not together)
             state, begin, elsewhere = self._plan_for_all(state, seen, still, at, moving)
         if begin < 0:
             return replace(state, own=place, idle=False), place
@@ -262,7 +356,7 @@ class Atlas:
         )
 
     def _plan_for_all(
-        self, state: PlannerState, seen: Observations, still: BoolArray, at: Array, moving: Moving
+        self, state: PlannerState, seen: Observations, still: BoolArray, at: Array, moving: Relocation
     ) -> tuple[PlannerState, int, Array]:
         """Return the state with a plan for the team, the node of the own place, and those of the others."""
         known, ways, situation, crew = state.known, state.ways, state.situation, state.crew
@@ -273,14 +367,14 @@ class Atlas:
             blocked = window.cut(known.blocked, True)
             table = Table.of(Ways(known.raster, window, blocked, ways.clearance))
         weights = CoverageDemand(known, table.ways.window, seen.density, moving.sure).weights
-        given = np.concatenate([[False], still])
+        fixed = np.concatenate([[False], still])
         begin = situation.copy()
         if state.places is not None:
             robots, places = state.places[:, 0].astype(np.intp), state.places[:, 1:]
             _, here, there = np.intersect1d(crew, robots, return_indices=True)
-            free = ~given[here]
+            free = ~fixed[here]
             begin[here[free]] = places[there[free]]
-        places = team_places(table, weights, situation, begin, given, moving.threshold, moving.nearby)
+        places = team_places(table, weights, situation, begin, fixed, moving.threshold, moving.nearby)
         state = replace(state, table=table, places=np.column_stack([crew, places]))
         near = ((ways.nodes - places[0]) ** 2).sum(axis=1)
         near[~ways.roomy] = np.inf
@@ -368,5 +462,5 @@ class AtlasShared(Atlas):
     summary: ClassVar[str] = "as Atlas, with the maps merged among the robots that hear each other"
     information: ClassVar[Information] = "shared map"
 
-    def _told(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
+    def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         return [known.merged(maps[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(maps)]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.scans import headings
 
 if TYPE_CHECKING:
@@ -42,14 +43,7 @@ _CORE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """The cells that cover the bounding box of a region.
-
-    Attributes
-    ----------
-    region : Region
-    cell : float, m
-        Side of a cell.
-    """
+    """The square cells, of a side in m, that cover the bounding box of a region."""
 
     region: Region
     cell: float
@@ -69,9 +63,7 @@ class Raster:
     @cached_property
     def outside(self) -> BoolArray:
         """The cells whose middle is outside the region, (rows, columns)."""
-        rows, columns = self.shape
-        row, column = np.mgrid[:rows, :columns]
-        return np.asarray(~self.region.contains(self.middles(row, column)))
+        return np.asarray(~self.region.contains(self.middles(*np.indices(self.shape))))
 
     def middles(self, row: IntArray, column: IntArray) -> Array:
         """Return the middles of cells, (..., 2) m."""
@@ -80,35 +72,28 @@ class Raster:
 
     def cells(self, points: Array) -> tuple[IntArray, IntArray]:
         """Return row and column of the cells that hold (..., 2) points, the nearest for points beside."""
-        return self.rows(points[..., 1]), self.columns(points[..., 0])
-
-    def rows(self, y: Array) -> IntArray:
-        """Return the rows of cells at some heights, m, the nearest for those beside."""
-        return _numbers(y, self.origin[1], self.cell, self.shape[0])
-
-    def columns(self, x: Array) -> IntArray:
-        """Return the columns of cells, m, as `rows`."""
-        return _numbers(x, self.origin[0], self.cell, self.shape[1])
+        number = np.floor((points - self.origin) * (1.0 / self.cell)).astype(np.intp)
+        number = np.minimum(np.maximum(number, 0), (self.shape[1] - 1, self.shape[0] - 1))
+        return number[..., 1], number[..., 0]
 
 
 @dataclass(frozen=True, eq=False)
 class DiscoveredMap:
-    """What a robot knows of the obstacles. Immutable: whatever adds to it gives another map.
+    """What a robot knows of the obstacles: `UNKNOWN`, `FREE`, `PRESUMED` or `WALL` for each cell of a raster.
 
-    Attributes
-    ----------
-    raster : Raster
-    state : (rows, columns), whole numbers
-        `UNKNOWN`, `FREE`, `PRESUMED` or `WALL`, the lowest row first; read-only.
+    The state is (rows, columns), the lowest row first. Immutable: whatever adds to it gives another map.
     """
 
     raster: Raster
     state: NDArray[np.uint8]
 
+    def __post_init__(self) -> None:
+        self.state.setflags(write=False)
+
     @classmethod
     def nothing(cls, raster: Raster) -> DiscoveredMap:
         """Return the map of who has not seen anything yet."""
-        return cls(raster, _fixed(np.zeros(raster.shape, dtype=np.uint8)))
+        return cls(raster, np.zeros(raster.shape, dtype=np.uint8))
 
     def __deepcopy__(self, memo: object) -> DiscoveredMap:
         return self
@@ -121,60 +106,14 @@ class DiscoveredMap:
     def scanned(self, position: Array, distances: Array, hit: BoolArray) -> DiscoveredMap:
         """Return the map with one scan more; the same one where the scan tells nothing new.
 
-        Parameters
-        ----------
-        position : (2,) m
-        distances : (rays,) m
-        hit : (rays,)
-            As in `robocov.observation.scans.Scans`.
+        It was taken at a position (2,) m; its (rays,) distances and hits are as in `Scans`.
         """
-        raster, cell = self.raster, self.raster.cell
-        heading = headings(len(distances))
         state = self.state.copy()
-        flat = state.reshape(-1)
-        columns = raster.shape[1]
-
         # beyond the region there is nothing to know
-        longest = min(float(distances.max()), raster.region.diameter)
-        along = (np.arange(math.ceil(longest / (_STRIDE * cell))) + 0.5) * (_STRIDE * cell)
-        free = along < distances[:, None] - _STRIDE * cell
-        # places on all rays as far as the longest goes: quicker than on each as far as it does
-        x, y = ((position[k] + along * heading[:, k, None])[free] for k in (0, 1))
-        row, column = raster.rows(y), raster.columns(x)
-        place = row * columns + column
-        was = flat[place]
-        flat[place[was == UNKNOWN]] = FREE
-        doubtful = (was == PRESUMED).nonzero()[0]
-        if len(doubtful):
-            middle = raster.middles(row[doubtful], column[doubtful])
-            off = np.maximum(np.abs(x[doubtful] - middle[:, 0]), np.abs(y[doubtful] - middle[:, 1]))
-            flat[place[doubtful[off < _CORE * cell]]] = FREE
-
-        ends = position + (distances + _INTO * cell)[:, None] * heading
-        following = np.roll(ends, -1, axis=0)
-        gap = np.sqrt(((following - ends) ** 2).sum(axis=1))
-        joined = (hit & np.roll(hit, -1) & (gap < BRIDGE) & (gap > 0.5 * cell)).nonzero()[0]
-        if len(joined):
-            part = np.linspace(0.0, 1.0, math.ceil(gap[joined].max() / (0.5 * cell)) + 1)
-            between = ends[joined, None] + (following - ends)[joined, None] * part[:, None]
-            row, column = raster.cells(between.reshape(-1, 2))
-            place = row * columns + column
-            flat[place[flat[place] == UNKNOWN]] = PRESUMED
-        row, column = raster.cells(ends[hit])
-        flat[row * columns + column] = WALL
-        if np.array_equal(state, self.state):
-            return self
-        return DiscoveredMap(raster, _fixed(state))
-
-    def visited(self, places: Array) -> DiscoveredMap:
-        """Return the map of who knows that robots have been at (k, 2) places: their cells are free."""
-        row, column = self.raster.cells(places)
-        fresh = self.state[row, column] == UNKNOWN
-        if not fresh.any():
-            return self
-        state = self.state.copy()
-        state[row[fresh], column[fresh]] = FREE
-        return DiscoveredMap(self.raster, _fixed(state))
+        far = np.minimum(distances, self.raster.region.diameter)
+        grid = np.array([*self.raster.origin, self.raster.cell])
+        _enter_scan(state, grid, position, headings(len(distances)), far, hit)
+        return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
 
     def merged(self, others: Iterable[DiscoveredMap]) -> DiscoveredMap:
         """Return the map with what others know as well; the same one where they know nothing more."""
@@ -184,34 +123,67 @@ class DiscoveredMap:
             theirs = np.where((other.state == PRESUMED) & (state == FREE), FREE, other.state)
             mine = np.where((state == PRESUMED) & (other.state == FREE), FREE, state)
             state = np.maximum(mine, theirs)
-        if np.array_equal(state, self.state):
-            return self
-        return DiscoveredMap(self.raster, _fixed(state))
+        return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
 
 
-def grown(blocked: BoolArray, reach: float) -> BoolArray:
-    """Return the cells whose middle is at most `reach` sides from that of a blocked cell, or of one beside.
+@inlined_kernel
+def _cell_of(at: float, low: float, side: float, count: int) -> int:
+    return min(max(math.floor((at - low) / side), 0), count - 1)
 
-    >>> grown(np.eye(3, dtype=bool), 0.5).sum()
-    np.int64(3)
-    """
-    margin = int(reach)
-    padded = np.pad(blocked, margin, constant_values=True)
+
+@kernel
+def _enter_scan(
+    state: NDArray[np.uint8], grid: Array, position: Array, headings: Array, distances: Array, hit: BoolArray
+) -> None:
+    """Enter what rays from a position show: free cells, presumed walls between their ends, walls."""
+    low_x, low_y, side = grid
+    rows, columns = state.shape
+    for k in range(len(distances)):
+        along = 0.5 * _STRIDE * side
+        while along < distances[k] - _STRIDE * side:
+            x, y = position[0] + along * headings[k, 0], position[1] + along * headings[k, 1]
+            r, c = _cell_of(y, low_y, side, rows), _cell_of(x, low_x, side, columns)
+            if state[r, c] == UNKNOWN:
+                state[r, c] = FREE
+            elif state[r, c] == PRESUMED:
+                off_x, off_y = (x - low_x) / side - c - 0.5, (y - low_y) / side - r - 0.5
+                if max(abs(off_x), abs(off_y)) < _CORE:
+                    state[r, c] = FREE
+            along += _STRIDE * side
+    ends = np.empty(headings.shape)
+    for k in range(len(distances)):
+        far = distances[k] + _INTO * side
+        ends[k, 0], ends[k, 1] = position[0] + far * headings[k, 0], position[1] + far * headings[k, 1]
+    for k in range(len(distances)):
+        following = (k + 1) % len(distances)
+        dx, dy = ends[following, 0] - ends[k, 0], ends[following, 1] - ends[k, 1]
+        gap = math.sqrt(dx * dx + dy * dy)
+        if hit[k] and hit[following] and 0.5 * side < gap < BRIDGE:
+            steps = math.ceil(BRIDGE / (0.5 * side))
+            for step in range(1, steps):
+                x, y = ends[k, 0] + dx * step / steps, ends[k, 1] + dy * step / steps
+                r, c = _cell_of(y, low_y, side, rows), _cell_of(x, low_x, side, columns)
+                if state[r, c] == UNKNOWN:
+                    state[r, c] = PRESUMED
+    for k in range(len(distances)):
+        if hit[k]:
+            r, c = _cell_of(ends[k, 1], low_y, side, rows), _cell_of(ends[k, 0], low_x, side, columns)
+            state[r, c] = WALL
+
+
+@kernel
+def dilate(blocked: BoolArray, reach: float) -> BoolArray:
+    """Return the cells whose middle is at most `reach` sides from that of a blocked, or outer, cell."""
     rows, columns = blocked.shape
+    margin = int(reach)
     result = blocked.copy()
-    for up in range(-margin, margin + 1):
-        for right in range(-margin, margin + 1):
-            if 0 < up * up + right * right <= reach * reach:
-                result |= padded[margin + up : margin + up + rows, margin + right : margin + right + columns]
+    for r in range(-margin, rows + margin):
+        for c in range(-margin, columns + margin):
+            if 0 <= r < rows and 0 <= c < columns and not blocked[r, c]:
+                continue
+            for up in range(-margin, margin + 1):
+                for right in range(-margin, margin + 1):
+                    inside = 0 <= r + up < rows and 0 <= c + right < columns
+                    if inside and up * up + right * right <= reach * reach:
+                        result[r + up, c + right] = True
     return result
-
-
-def _numbers(at: Array, origin: float, cell: float, count: int) -> IntArray:
-    number = np.floor((at - origin) * (1.0 / cell)).astype(np.intp)
-    # as clip does, which looks up the limits of the type each time
-    return np.asarray(np.minimum(np.maximum(number, 0), count - 1))
-
-
-def _fixed(state: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    state.setflags(write=False)
-    return state

@@ -15,15 +15,12 @@ It is solved on blocks of cells: a block is one unknown, joined to its neighbour
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.linalg import splu
 
 from robocov.arrays import Array, BoolArray
-from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN
+from robocov.compiled import kernel
+from robocov.planning.discovered import FREE, UNKNOWN
 
 PRIOR = 0.8
 """Openness of what is far from all that is known."""
@@ -34,21 +31,18 @@ LONG = 30.0
 BLOCKS = 1000
 """Blocks that a map is divided into, at most."""
 
+_OVER = 1.9
+"""Relaxation factor; the best for walks that end after `LONG` blocks."""
+
+_SWEEPS, _EXACT = 1000, 1e-11
+
 
 def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS) -> Array:
     """Return how open each unknown cell is, from 0 to 1; 0 for all other cells, (rows, columns).
 
-    Parameters
-    ----------
-    state : (rows, columns)
-        As in `DiscoveredMap`.
-    outside : (rows, columns)
-        Cells beyond the region; they do not count at all.
-    blocks : int
-        So many at most.
+    The state is that of a `DiscoveredMap`; cells `outside` of the region do not count at all. There are
+    `blocks` at most.
 
-    Examples
-    --------
     >>> state = np.array([[3, 3, 3, 3], [3, 0, 1, 1], [3, 3, 3, 3]], dtype=np.uint8)
     >>> openness(state, np.zeros((3, 4), dtype=bool)).round(2)[1]
     array([0.  , 0.25, 0.  , 0.  ])
@@ -57,67 +51,57 @@ def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS)
     side = 1
     while -(-rows // side) * -(-columns // side) > blocks:
         side += 1
+    return _relaxed(np.where(outside, 255, state).astype(np.uint8), side)
+
+
+@kernel
+def _relaxed(state: NDArray[np.uint8], side: int) -> Array:
+    """Solve Laplace's equation on blocks by successive over-relaxation; 255 marks cells that do not count."""
+    rows, columns = state.shape
     high, wide = -(-rows // side), -(-columns // side)
-    missing = ((0, high * side - rows), (0, wide * side - columns))
-    outside = np.pad(outside, missing, constant_values=True)
-    whole = np.pad(state, missing)
-    unknown = (whole == UNKNOWN) & ~outside
-    open_to = _sums(_beside((whole == FREE) & ~outside) * unknown, side)
-    closed_to = _sums(_beside((whole >= PRESUMED) & ~outside) * unknown, side)
-    count = _sums(unknown, side)
-    some = (count > 0).ravel()
-    if not some.any():
-        return np.zeros(state.shape)
-
-    # how many cells of a block meet some of the next one
-    above = _pairs(unknown, side)
-    right = _pairs(unknown.T, side).T
-    # the middles of two blocks are one side apart, and a block's border is half a side from its middle
-    across, border = 1.0, 2.0
-    lost = side * (count / side**2) / LONG**2
-    diagonal = border * (open_to + closed_to) + lost
-    diagonal[:-1] += across * above
-    diagonal[1:] += across * above
-    diagonal[:, :-1] += across * right
-    diagonal[:, 1:] += across * right
-
-    number = (np.cumsum(some) - 1).reshape(high, wide)
-    begin = np.concatenate([number[:-1][above > 0], number[:, :-1][right > 0]])
-    end = np.concatenate([number[1:][above > 0], number[:, 1:][right > 0]])
-    flow = -across * np.concatenate([above[above > 0], right[right > 0]])
-    own = np.arange(int(some.sum()))
-    parts = np.concatenate([diagonal.ravel()[some], flow, flow])
-    where = np.concatenate([own, begin, end]), np.concatenate([own, end, begin])
-    matrix = coo_array((parts, where), shape=(len(own), len(own))).tocsc()
-    # the matrix is symmetric
-    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    result = np.zeros(high * wide)
-    result[some] = factors.solve((border * open_to + lost * PRIOR).ravel()[some])
-    of_cells = result.clip(0.0, 1.0).reshape(high, wide).repeat(side, axis=0).repeat(side, axis=1)
-    return np.asarray((of_cells * unknown)[:rows, :columns])
-
-
-def _beside(cells: BoolArray) -> NDArray[np.uint8]:
-    """Return how many of the four cells beside each are some."""
-    one = cells.astype(np.uint8)
-    result = np.zeros_like(one)
-    result[1:] += one[:-1]
-    result[:-1] += one[1:]
-    result[:, 1:] += one[:, :-1]
-    result[:, :-1] += one[:, 1:]
+    # of each block: unknown cells, those beside that are free, walls, or unknown in the next blocks
+    count, open_to, closed_to = np.zeros((high, wide)), np.zeros((high, wide)), np.zeros((high, wide))
+    above, right = np.zeros((high + 1, wide + 1)), np.zeros((high + 1, wide + 1))
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] != UNKNOWN:
+                continue
+            i, j = r // side, c // side
+            count[i, j] += 1.0
+            for a, b in ((r + 1, c), (r, c + 1), (r - 1, c), (r, c - 1)):
+                if not (0 <= a < rows and 0 <= b < columns) or state[a, b] == 255:
+                    continue
+                if state[a, b] == FREE:
+                    open_to[i, j] += 1.0
+                elif state[a, b] != UNKNOWN:
+                    closed_to[i, j] += 1.0
+                elif a // side > i:
+                    above[i, j] += 1.0
+                elif b // side > j:
+                    right[i, j] += 1.0
+    u = np.full((high + 1, wide + 1), PRIOR)
+    for _ in range(_SWEEPS):
+        change = 0.0
+        for i in range(high):
+            for j in range(wide):
+                if count[i, j] == 0.0:
+                    continue
+                # the middles of two blocks are one side apart, a block's border is half a side from its own
+                lost = count[i, j] / (side * LONG**2)
+                flow = 2.0 * open_to[i, j] + lost * PRIOR
+                links = 2.0 * (open_to[i, j] + closed_to[i, j]) + lost
+                # row and column -1 are the spare ones, without links
+                flow += above[i, j] * u[i + 1, j] + above[i - 1, j] * u[i - 1, j]
+                flow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
+                links += above[i, j] + above[i - 1, j] + right[i, j] + right[i, j - 1]
+                step = _OVER * (flow / links - u[i, j])
+                u[i, j] += step
+                change = max(change, abs(step))
+        if change < _EXACT:
+            break
+    result = np.zeros((rows, columns))
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] == UNKNOWN:
+                result[r, c] = min(max(u[r // side, c // side], 0.0), 1.0)
     return result
-
-
-def _sums(cells: NDArray[Any], side: int) -> Array:
-    """Return the sum over each block."""
-    rows, columns = cells.shape
-    # rows are added as a whole first, which is much quicker than block by block
-    strips = cells.reshape(rows // side, side, columns).sum(axis=1, dtype=np.int32)
-    blocks = strips.reshape(rows // side, columns // side, side)
-    return np.asarray(blocks.sum(axis=2).astype(np.float64))
-
-
-def _pairs(cells: BoolArray, side: int) -> Array:
-    """Return how many cells of each block meet some of the next one above."""
-    meet = cells[side - 1 : -1 : side] & cells[side::side]
-    return np.asarray(meet.reshape(len(meet), cells.shape[1] // side, side).sum(axis=2, dtype=np.float64))

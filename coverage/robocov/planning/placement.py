@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from itertools import count
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
 from robocov.k_median import improved, moved
 from robocov.planning.discovered import FREE, UNKNOWN
 from robocov.planning.openness import BLOCKS, openness
@@ -42,16 +44,7 @@ _SEEN_ENOUGH = 0.6
 
 @dataclass(frozen=True, eq=False)
 class CoverageDemand:
-    """What there is to be covered in a window of a discovered map.
-
-    Attributes
-    ----------
-    known : DiscoveredMap
-    window : Window
-    density : Density or None
-    sure : bool
-        Whether only what is known to be free counts.
-    """
+    """What is to be covered in a window of a discovered map; if `sure`, only what is known to be free."""
 
     known: DiscoveredMap
     window: Window
@@ -63,7 +56,7 @@ class CoverageDemand:
 
     @cached_property
     def _state(self) -> NDArray[np.uint8]:
-        return self.window.cut(self.known.state, np.uint8(UNKNOWN))
+        return np.ascontiguousarray(self.window.cut(self.known.state, np.uint8(UNKNOWN)))
 
     @cached_property
     def _outside(self) -> BoolArray:
@@ -99,10 +92,8 @@ class CoverageDemand:
 
         Parameters
         ----------
-        mine : (m,) m
-            Distance of each node of the robot's own cell from its goal, 0 for others.
-        home : (m,) m
-            Distance of each node from where it is.
+        mine, home : (m,) m
+            Distances of the nodes of its own cell from its goal, 0 for others; of all from where it is.
         tight : (h, w)
             Cells where it cannot be.
         least : float, m
@@ -115,45 +106,53 @@ class CoverageDemand:
         (2,) m, or None
             When there is nothing to look at.
         """
-        state = self._state
-        patch, _ = ndimage.label((state == UNKNOWN) & ~self._outside)
+        window, raster = self.window, self.known.raster
+        patch, _ = ndimage.label((self._state == UNKNOWN) & ~self._outside)
         row, column = patch.nonzero()
-        label = patch[row, column]
-        node = row // self.window.stride * self.window.columns + column // self.window.stride
-        stake = np.bincount(label, mine[node] * self._openness[row, column])
-        good = stake[label] > least
-        row, column, label = row[good], column[good], label[good]
-        if not len(label):
-            return None
-        high, wide = state.shape
-        best, chosen = 0.0, None
-        for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-            beside, along = (row + down).clip(0, high - 1), (column + right).clip(0, wide - 1)
-            there = (state[beside, along] == FREE) & ~tight[beside, along]
-            beside, along, which = beside[there], along[there], label[there]
-            if not len(which):
+        node = row // window.stride * window.columns + column // window.stride
+        hoped = mine[node] * self._openness[row, column]
+        stake = np.asarray(np.bincount(patch[row, column], hoped, minlength=1), dtype=np.float64)
+        first = np.array(raster.origin) + (np.array([window.column, window.row]) + 0.5) * raster.cell
+        looked = (np.array(former).reshape(-1, 2) - first) / raster.cell
+        near = _SEEN_ENOUGH / raster.cell
+        at, along = _best_view(self._state, tight, patch, stake, home, window.stride, least, looked, near)
+        return None if at < 0 else first + np.array([along, at]) * raster.cell
+
+
+@kernel
+def _best_view(
+    state: NDArray[np.uint8],
+    tight: BoolArray,
+    patch: NDArray[Any],
+    stake: Array,
+    home: Array,
+    stride: int,
+    least: float,
+    looked: Array,
+    near: float,
+) -> tuple[int, int]:
+    """Return the free cell beside a patch with the highest stake by the way; -1 for none."""
+    rows, columns = state.shape
+    best, row, column = 0.0, -1, -1
+    for r in range(rows):
+        for c in range(columns):
+            if patch[r, c] == 0 or stake[patch[r, c]] <= least:
                 continue
-            node = beside // self.window.stride * self.window.columns + along // self.window.stride
-            place = self.known.raster.middles(beside + self.window.row, along + self.window.column)
-            worth = stake[which] / (1.0 + home[node])
-            for spot in former:
-                worth[((place - spot) ** 2).sum(axis=1) < _SEEN_ENOUGH**2] = 0.0
-            k = int(worth.argmax())
-            if worth[k] > best:
-                best, chosen = float(worth[k]), place[k]
-        return chosen
+            for a, b in ((r, c + 1), (r + 1, c), (r, c - 1), (r - 1, c)):
+                if not (0 <= a < rows and 0 <= b < columns) or state[a, b] != FREE or tight[a, b]:
+                    continue
+                worth = stake[patch[r, c]] / (1.0 + home[a // stride * (columns // stride) + b // stride])
+                for x, y in looked:
+                    if (x - b) ** 2 + (y - a) ** 2 < near * near:
+                        worth = 0.0
+                if worth > best:
+                    best, row, column = worth, a, b
+    return row, column
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Distances from some nodes, among which a plan for a team chooses, to all.
-
-    Attributes
-    ----------
-    ways : Ways
-    sources : (c,)
-    distance : (c, m) m
-    """
+    """Distances from some nodes, (c,), among which a plan for a team chooses, to all, (c, m) m."""
 
     ways: Ways
     sources: IntArray
@@ -166,13 +165,10 @@ class Table:
     def of(cls, ways: Ways) -> Table:
         """Return the table of every k-th node in both directions, as many as are allowed."""
         row, column = np.divmod(np.arange(len(ways.nodes)), ways.window.columns)
-        k = 1
-        while True:
-            chosen = ways.roomy & (row % k == k // 2) & (column % k == k // 2)
-            if np.count_nonzero(chosen) <= MOST_SOURCES:
+        for k in count(1):
+            sources = np.flatnonzero(ways.roomy & (row % k == k // 2) & (column % k == k // 2))
+            if len(sources) <= MOST_SOURCES:
                 break
-            k += 1
-        sources = chosen.nonzero()[0]
         return cls(ways, sources, ways.table(sources))
 
 
@@ -181,14 +177,14 @@ def team_places(
     weights: Array,
     now: Array,
     begin: Array,
-    given: BoolArray,
+    fixed: BoolArray,
     threshold: float,
     nearby: float,
 ) -> Array:
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
-    From `begin` on, Lloyd's iteration in turn with interchange (see `medians.improved`); where all others are
-    given, who plans then goes to the best place of its own cell. Who goes to which of the places is such that
+    From `begin` on, Lloyd's iteration in turn with interchange (`k_median.improved`); where all others are
+    fixed, who plans then goes to the best place of its own cell. Who goes to which of the places is such that
     the sum of the squared ways is least: then the choice stays the same while the robots are on their way,
     and their ways do not cross.
 
@@ -196,16 +192,12 @@ def team_places(
     ----------
     table : Table
     weights : (m,)
-    now : (k, 2) m
-        Where the robots are. The first one plans; it is never given.
-    begin : (k, 2) m
-        Where the plan begins: the former one.
-    given : (k,)
-        Who stays where `begin` says.
-    threshold : float
-        Part of the cost that a relocation must save.
-    nearby : float
-        Part of the cost that one in the own cell must save.
+    now, begin : (k, 2) m
+        Where the robots are, and where the plan begins: the former one. The first robot plans.
+    fixed : (k,)
+        Who stays where `begin` says; never the first.
+    threshold, nearby : float
+        Parts of the cost that a relocation must save, and one in the own cell.
     """
     ways = table.ways
     home = ways.standing(now[0])
@@ -221,44 +213,33 @@ def team_places(
     nodes = ways.nodes[sources]
 
     chosen = np.full(len(now), -1, dtype=np.intp)
-    taken = np.zeros(len(sources), dtype=bool)
-    for k in np.argsort(~given, kind="stable").tolist():
+    for k in np.argsort(~fixed, kind="stable").tolist():
         away = ((nodes - begin[k]) ** 2).sum(axis=1)
-        away[taken] = np.inf
+        away[chosen[chosen >= 0]] = np.inf
         chosen[k] = away.argmin()
-        taken[chosen[k]] = True
-    weighed = np.ascontiguousarray((distance[:, target] * weights[target]).T)
+    weighted = np.ascontiguousarray((distance[:, target] * weights[target]).T)
     # in an order that does not depend on who plans: of two equal plans all take the same
     order = np.lexsort(begin.T)
-    chosen[order] = improved(weighed, chosen[order], given[order], threshold)
-
-    if given[1:].all():
+    chosen[order] = improved(weighted, chosen[order], fixed[order], threshold)
+    if fixed[1:].all():
         own = distance[:, sources[chosen]].argmin(axis=1) == 0
-        chosen = moved(weighed, chosen, own, nearby)
+        chosen = moved(weighted, chosen, own, nearby)
 
-    places = nodes[chosen]
-    mobile = (~given).nonzero()[0]
-    entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile.tolist()]
+    mobile = np.flatnonzero(~fixed)
+    entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile]
     square = np.minimum(distance[entry][:, sources[chosen[mobile]]] ** 2, _FAR)
     _, column = linear_sum_assignment(square)
-    result = np.where(given[:, None], begin, places)
-    result[mobile] = places[mobile[column]]
-    return np.asarray(result)
+    places = begin.copy()
+    places[mobile] = nodes[chosen[mobile[column]]]
+    return places
 
 
 @dataclass(frozen=True, eq=False)
 class OwnPlace:
     """The best place for one robot, the others being where they are.
 
-    Attributes
-    ----------
-    goal : (2,) m
-    node : int
-        The node nearest to it.
-    mine : (m,) m
-        The distance of each node that is nearer to this node than to any other robot; 0 for the others.
-    cost : float, cells times metres
-        J with the robot there.
+    The goal is (2,) m, the node is nearest to it; `mine`, (m,) m, holds the distances from there to the nodes
+    that are nearer to it than to any other robot, 0 for the others. The cost J is in cells times metres.
     """
 
     goal: Array
@@ -276,18 +257,8 @@ def own_place(
     in y, through the costs of the node and those beside it. The former goal is kept where the new one is
     better by less than a part `rest` of what its own cell costs.
 
-    Parameters
-    ----------
-    ways : Ways
-    weights : (m,)
-    others : (k, 2) m
-    begin : int
-        A node.
-    former : (2,) m
-        nan for none.
-    rest : float
-    steps : int
-        Nodes that the place may move on.
+    The others are at (k, 2) m, the former goal is (2,) m, nan for none; from the node `begin` the place moves
+    on by `steps` nodes at most.
     """
     first = ways.distances(begin)
     target = (np.isfinite(first) & (weights > 0.0)).nonzero()[0]

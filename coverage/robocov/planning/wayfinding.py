@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.planning.discovered import grown
+from robocov.planning.discovered import dilate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +131,7 @@ class Ways:
     @cached_property
     def tight(self) -> BoolArray:
         """The cells that are too close to walls, (h, w)."""
-        return grown(self.blocked, self.clearance / self.raster.cell)
+        return dilate(np.ascontiguousarray(self.blocked), self.clearance / self.raster.cell)
 
     @cached_property
     def roomy(self) -> BoolArray:

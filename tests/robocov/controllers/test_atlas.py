@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,7 @@ import pytest
 
 from robocov.conditions import Conditions
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
-from robocov.controllers.atlas import MAX_PLANNING_GROUP
-from robocov.controllers.atlas_memory import AtlasMemory
+from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, RestTracker
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
@@ -189,9 +189,9 @@ def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
     asked: list[tuple[float, float, float, float]] = []
     plan, place = atlas.team_places, atlas.own_place
 
-    def planned(table, weights, situation, begin, given, threshold, nearby):
+    def planned(table, weights, situation, begin, fixed, threshold, nearby):
         asked.append((some.time, threshold, nearby, math.nan))
-        return plan(table, weights, situation, begin, given, threshold, nearby)
+        return plan(table, weights, situation, begin, fixed, threshold, nearby)
 
     def placed(ways, weights, elsewhere, begin, former, rest, steps):
         asked[-1] = (*asked[-1][:3], rest)
@@ -233,3 +233,20 @@ def test_robots_that_meet_pass_on_the_left() -> None:
             sideways = some.positions[:, 1] - 4.0
     assert sideways[0] > 0.0 > sideways[1]
     np.testing.assert_allclose(some.positions, goals[:, 0], atol=0.2)
+
+
+def test_who_stays_is_noticed() -> None:
+    tracker = RestTracker(np.array([1, 4]), np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.0, 0.5]))
+    later = tracker.updated(np.array([1, 2, 4]), np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]]), 2.0)
+    assert later.since.tolist() == [0.0, 2.0, 2.0]
+    # creeping away is noticed as well
+    np.testing.assert_array_equal(later.places, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
+
+
+def test_copies_share_what_never_changes() -> None:
+    memory = Atlas().begin(ROOMS.region, Team.homogeneous(3))
+    twin = deepcopy(memory)
+    assert len(memory.maps) == 3
+    assert all(one is other for one, other in zip(memory.states, twin.states, strict=True))
+    assert twin.legs is not memory.legs
+    assert all((known.state == 0).all() for known in memory.maps)

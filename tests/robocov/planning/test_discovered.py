@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment
-from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, grown
+from robocov.planning.discovered import FREE, PRESUMED, UNKNOWN, WALL, DiscoveredMap, Raster, dilate
 from robocov.sensor import RangeSensor
 from robocov.world.solid import solid_pieces
 
@@ -92,11 +92,11 @@ def test_maps_are_merged(cluttered: Environment, sensor: RangeSensor) -> None:
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 1000), reach=st.floats(0.0, 4.0))
-def test_grown_cells_are_those_near_blocked_ones(seed: int, reach: float) -> None:
+def test_dilated_cells_are_those_near_blocked_ones(seed: int, reach: float) -> None:
     cells = np.random.default_rng(seed).random((14, 11)) < 0.05
     row, column = np.mgrid[:14, :11]
     expected = np.zeros_like(cells)
     padded = np.pad(cells, 5, constant_values=True)
     for r, c in zip(*np.nonzero(padded), strict=True):
         expected |= (row - (r - 5)) ** 2 + (column - (c - 5)) ** 2 <= reach * reach
-    assert np.array_equal(grown(cells, reach), expected)
+    assert np.array_equal(dilate(cells, reach), expected)
