@@ -300,8 +300,6 @@ class Atlas:
         # a team that has changed may have much to do again
         same = np.array_equal(state.tracker.robots, tracker.robots)
         since = state.since if same and not first else seen.time
-            state.since if np.array_equal(state.tracker.robots, tracker.robots) and not first else seen.time
-        )
         state = replace(state, due=due, tracker=tracker, since=since)
         still = seen.time - tracker.since >= STILL_FOR
         situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
