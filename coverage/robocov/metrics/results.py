@@ -13,7 +13,7 @@ import numpy as np
 
 from robocov.errors import InputError, counted, shown, unknown_name
 from robocov.extras import extra
-from robocov.metrics.summary import CostHistory
+from robocov.metrics import CostHistory
 from robocov.record import Record
 
 if TYPE_CHECKING:
@@ -39,17 +39,12 @@ _SHOWN_ROWS = 10
 class Results:
     """The table of a sweep, one row a run, and the folders of the runs; all is read when it is asked for.
 
-    Parameters
+    Attributes
     ----------
     folder : Path
         Of the sweep.
     dataset : pyarrow Dataset
         The table.
-
-    Attributes
-    ----------
-    folder : Path
-    dataset : pyarrow Dataset
     columns : tuple of str
         Where a run stands (``map``, ``controller``, ``robots``, ``start``, ``seed``), gains and whatever else
         was varied; figures with their units; ``run``, the name of its folder, and ``error``.
@@ -74,19 +69,12 @@ class Results:
 
     @property
     def study(self) -> dict[str, Any]:
-        """The content of ``study.json``: what was to be run.
-
-        Raises
-        ------
-        InputError
-            When it cannot be read.
-        """
+        """The content of ``study.json``: what was to be run; an InputError where it cannot be read."""
         path = self.folder / "study.json"
         try:
-            content = json.loads(path.read_bytes())
+            return dict(json.loads(path.read_bytes()))
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from error
-        return dict(content)
 
     def to_table(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> pa.Table:  # noqa: A002 - as pyarrow calls it
         """Return the rows as a pyarrow Table.
@@ -106,15 +94,7 @@ class Results:
         return self.dataset.to_table(columns=self._known(columns), filter=filter)
 
     def to_pandas(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> DataFrame:  # noqa: A002 - as pyarrow calls it
-        """Return the rows as a data frame; the parameters are those of `to_table`.
-
-        Raises
-        ------
-        RobocovError
-            When pandas is not installed: it comes with ``robocov[pandas]``.
-        InputError
-            As `to_table`.
-        """
+        """Return the rows as a data frame, as `to_table`; pandas comes with ``robocov[pandas]``."""
         extra("pandas", "pandas")
         frame: DataFrame = self.to_table(columns, filter).to_pandas()
         return frame
@@ -150,13 +130,7 @@ class Results:
         return Record.load(self._folder_of(run))
 
     def history(self, run: str | int | Mapping[str, Any]) -> CostHistory:
-        """Return the coverage cost along a run, which is named as in `record`.
-
-        Raises
-        ------
-        InputError
-            When there is no such run, or it failed.
-        """
+        """Return the coverage cost along a run, which is named as in `record`; it raises the same."""
         return read_history(self._folder_of(run) / "cost.csv")
 
     def _known(self, columns: Sequence[str] | None) -> list[str] | None:
@@ -227,13 +201,7 @@ def read_results(folder: Path | str) -> Results:
 
 
 def read_history(path: Path) -> CostHistory:
-    """Return what is in a file ``cost.csv``.
-
-    Raises
-    ------
-    InputError
-        When it is not there, or is none; the message names the line.
-    """
+    """Return what is in a file ``cost.csv``; the InputError where it is none names the line."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
@@ -248,9 +216,8 @@ def read_history(path: Path) -> CostHistory:
             # a single number would do for all columns
             rows[k] = [float(cells[column]) for column in range(max(len(cells), len(names)))]
         except (ValueError, IndexError):
-            raise InputError(
-                f"{path}: line {k + 2}: {shown(line)}, but {len(names)} numbers were wanted"
-            ) from None
+            wanted = f"{len(names)} numbers were wanted"
+            raise InputError(f"{path}: line {k + 2}: {shown(line)}, but {wanted}") from None
     return CostHistory(*rows.T)
 
 

@@ -6,18 +6,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, counted, shown
+from robocov.metrics import clearances, robot_gaps
 from robocov.metrics.sight import Covered, Walls, covered
-from robocov.metrics.summary import clearances
 from robocov.observation.neighbours import Neighbours
 from robocov.record.moments import nearest_moments
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from robocov.metrics.summary import CostHistory
+    from robocov.metrics import CostHistory
     from robocov.record import Record
 
 RATE = 2.0
@@ -25,9 +26,6 @@ RATE = 2.0
 
 NEAR_FINAL = 0.05
 """A cost counts as that of the end when it is within this part of it."""
-
-_PAIRS = 1 << 18
-"""Pairs of robots looked at at once, over some moments, which bounds the memory."""
 
 COLUMNS = {
     "time": "time_s",
@@ -70,10 +68,9 @@ class RunMetrics:
     algebraic_connectivity : (K,)
         Second smallest eigenvalue of the Laplacian of the graph of who hears whom: 0 where it falls apart,
         n where all n robots hear each other.
-    wall_clearance : (K,) m
-        Smallest gap between a robot's rim and a wall since the moment before, inf where there is none.
-    robot_clearance : (K,) m
-        Smallest gap between the rims of two robots since the moment before, inf where there are no two.
+    wall_clearance, robot_clearance : (K,) m
+        Smallest gap between a robot's rim and a wall, or the rims of two robots, since the moment before;
+        inf where there is none.
     free_area : float, m²
         Of which the areas are parts.
     """
@@ -92,11 +89,8 @@ class RunMetrics:
     free_area: float
 
     def __repr__(self) -> str:
-        share = self.sensed_area[-1] / self.free_area
-        moments = counted(len(self.time), "moment")
-        return (
-            f"<RunMetrics {moments}, {self.time[-1]:.1f} s, {share:.0%} of the free area sensed at the end>"
-        )
+        share = f"{self.sensed_area[-1] / self.free_area:.0%} of the free area sensed at the end"
+        return f"<RunMetrics {counted(len(self.time), 'moment')}, {self.time[-1]:.1f} s, {share}>"
 
     def rows(self) -> list[tuple[float, ...]]:
         """Return the rows of ``metrics.csv``, under `COLUMNS`."""
@@ -109,11 +103,10 @@ class RunMetrics:
         """
         found: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
-            if name == "time":
-                continue
-            values = getattr(self, name)
-            value = float(values.min() if name.endswith("clearance") else values[-1])
-            found[column] = value if np.isfinite(value) else None
+            if name != "time":
+                values = getattr(self, name)
+                value = float(values.min() if name.endswith("clearance") else values[-1])
+                found[column] = value if np.isfinite(value) else None
         return found
 
 
@@ -141,7 +134,7 @@ def run_metrics(
     moments = nearest_moments(record.time, rate)
     team, working = record.team, record.working
     since = np.concatenate([[0], moments[:-1] + 1])
-    work, effort, way = _integrals(record, working)
+    work, effort, way = _integrals(record)
     areas, parts, connectivity = [], [], []
     walls: Walls | None = None
     for k in moments.tolist():
@@ -167,7 +160,7 @@ def run_metrics(
         components=np.array(parts, dtype=np.intp),
         algebraic_connectivity=np.array(connectivity),
         wall_clearance=np.minimum.reduceat(clearances(record).min(axis=1), since),
-        robot_clearance=np.minimum.reduceat(_closest(record, working), since),
+        robot_clearance=np.minimum.reduceat(robot_gaps(record)[0], since),
         free_area=float(record.environment.free_area),
     )
 
@@ -193,7 +186,7 @@ def connections(places: Array, ranges: Array) -> tuple[int, float]:
     laplacian = np.zeros((n, n))
     laplacian[one, other] = -1.0
     laplacian[np.arange(n), np.arange(n)] = -laplacian.sum(axis=1)
-    parts = _components(n, one, other)
+    parts = int(connected_components(laplacian, directed=False)[0])
     if n == 1 or parts > 1:
         return parts, 0.0
     # whole numbers in the matrix: what is less than this is rounding
@@ -215,46 +208,14 @@ def figures_of(record: Record, history: CostHistory) -> Mapping[str, float | Non
     return {**run_metrics(record, 0.0).final(), "near_final_s": time_near_final(history)}
 
 
-def _integrals(record: Record, working: BoolArray) -> tuple[Array, Array, Array]:
+def _integrals(record: Record) -> tuple[Array, Array, Array]:
     """Return work, effort and mean way from the first moment to each one, (T,)."""
-    forces = np.where(working[:, :, None], record.forces, 0.0)
+    forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     square = (forces**2).sum(axis=(1, 2))
     step = np.diff(record.time)
     moved = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1)).mean(axis=1)
     # the force holds until the next moment; what it does meanwhile, by the trapezoidal rule
-    return (
-        _running(0.5 * (power[1:] + power[:-1]) * step),
-        _running(square[:-1] * step),
-        _running(moved),
-    )
-
-
-def _running(parts: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(parts)])
-
-
-def _components(n: int, one: IntArray, other: IntArray) -> int:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(n, n))
-    count, _ = connected_components(graph, directed=False)
-    return int(count)
-
-
-def _closest(record: Record, working: BoolArray) -> Array:
-    """Return the smallest gap between the rims of two robots at each moment, (T,) m; inf without two."""
-    radius = record.team.radius
-    one, other = np.triu_indices(len(radius), 1)
-    found = np.full(len(record), np.inf)
-    if not len(one):
-        return found
-    both = radius[one] + radius[other]
-    size = max(1, _PAIRS // len(one))
-    for k in range(0, len(record), size):
-        part = slice(k, k + size)
-        x, y = np.moveaxis(np.where(working[part, :, None], record.positions[part], np.nan), -1, 0)
-        gap = np.sqrt((x[:, one] - x[:, other]) ** 2 + (y[:, one] - y[:, other]) ** 2) - both
-        found[part] = np.where(np.isnan(gap), np.inf, gap).min(axis=1)
-    return found
+    parts = 0.5 * (power[1:] + power[:-1]) * step, square[:-1] * step, moved
+    work, effort, way = (np.concatenate([[0.0], np.cumsum(part)]) for part in parts)
+    return work, effort, way
