@@ -111,7 +111,7 @@ class Kernel:
 
     @cached_property
     def _dispatcher(self) -> Any:
-        dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True)
+        dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True, **self._options)
         dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
         return dispatcher
 

@@ -101,7 +101,7 @@ class _Places:
         self._rng = np.random.default_rng(1)
         self._start = cost.points[self._rng.choice(len(cost.points), robots, replace=False)]
         self._step = cost.spacing / 4.0
-        self._walls = cost.geodesics.walls
+        self._geodesics = cost.geodesics
         self.now = self._start
         blocked = np.ones(cost.lattice**2, dtype=bool)
         blocked[cost.cells] = False
@@ -110,7 +110,7 @@ class _Places:
     def move(self) -> None:
         """Go to other free positions, (n, 2) m."""
         places = self._start + self._rng.uniform(-self._step, self._step, self._start.shape)
-        free = shapely.intersects_xy(self._walls.free, *self._walls.grid.snap(places).T)
+        free = shapely.intersects_xy(self._geodesics.free, *self._geodesics.grid.snap(places).T)
         self.now = np.where(free[:, None], places, self._start)
 
 

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.arrays.grouping import weighted_mean
-from robocov.cost.arrivals import Ways, checked_speeds, first_there
-from robocov.cost.lattice import Lattice, Number, Sites
-from robocov.cost.site_paths import CornerViews, looked_for, site_paths
+from robocov.cost.lattice import Number, Sites, lattice_of
+from robocov.cost.site_paths import CornerViews, Paths, corner_views, site_paths
 from robocov.density.masses import means_over_squares
 from robocov.drawing import Drawable
-from robocov.errors import InputError, checked, counted
+from robocov.errors import InputError, checked, counted, shown
 from robocov.geodesic import Geodesics
-from robocov.geodesic.corners import columns
+from robocov.geodesic.distances import BINS, CORNER_BINS, with_room
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
+    from robocov.geodesic.visibility import AngularWallIndex
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
@@ -205,10 +205,9 @@ class CoverageCost:
         self.geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
         self._areas = np.array([part.area for part in environment.free.geoms])
         self._masses = environment.free_masses
-        self._lattice = Lattice(self.geodesics.walls, self.geodesics.size, self.lattice)
         self.corners = frozen(self.geodesics.corners)
+        self.sites, self._tiles = lattice_of(self.geodesics, self.lattice)
         self._views = self._corner_views(progress)
-        self.sites = self._lattice.sites
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         self.weights = self._weights()
 
@@ -234,17 +233,20 @@ class CoverageCost:
 
     def _corner_views(self, progress: Callable[[float], None] | None) -> CornerViews:
         """Return what the corners see of the sites."""
-        scene, tiles, count = self.geodesics.scene, self._lattice.tiles, len(self.corners)
+        walls, tiles, count = self.geodesics.walls, self._tiles, len(self.corners)
         pieces = [(np.empty((0, 3), dtype=np.int64), np.empty((0, 2)))]
         for begin in range(0, count, _BLOCK):
             if progress is not None:
                 progress(begin / count)
-            pieces.append(looked_for(scene, tiles, begin, min(begin + _BLOCK, count)))
-        rows, lengths = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+            part = begin, min(begin + _BLOCK, count)
+            found = with_room(
+                1, CORNER_BINS, lambda *room, part=part: corner_views(walls, tiles, *part, *room)
+            )
+            pieces.append(found[1:])
+        rows, spans = map(np.concatenate, zip(*pieces, strict=True))
         order = np.argsort(rows[:, 1], kind="stable")
         first = np.searchsorted(rows[order, 1], np.arange(len(tiles.first)))
-        corner, _, mask = columns(rows[order])
-        return CornerViews(first, corner, mask, *columns(lengths[order]))
+        return CornerViews(first, rows[order][:, [0, 2]], spans[order])
 
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -265,27 +267,55 @@ class CoverageCost:
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        x, y, holds = self.geodesics.place(positions)
+        places, holds = self.geodesics.place(positions)
         covered = np.asarray(holds.any(axis=0))
         if speeds is None:
-            return self._result(positions, covered, self._nearest(x, y, covered))
+            return self._result(positions, covered, self._nearest(places, covered))
         speeds = checked_speeds(speeds, len(positions))
-        return self._result(positions, covered, first_there(self._nearest, x, y, holds, speeds), speeds)
+        # of robots that are equally fast the nearest is first: each speed is one search among its robots
+        distances, ways = np.full(len(self.points), np.inf), np.full((3, len(self.points)), -1)
+        times = distances.copy()
+        for speed in np.unique(speeds)[::-1]:
+            rows = np.flatnonzero(speeds == speed)
+            some, their = self._nearest(places[rows], np.asarray(holds[rows].any(axis=0)))
+            sooner = some / speed < times
+            their[0] = rows[their[0]]
+            times[sooner], distances[sooner] = some[sooner] / speed, some[sooner]
+            ways[:, sooner] = their[:, sooner]
+        return self._result(positions, covered, (distances, ways), speeds)
 
-    def _nearest(self, x: Array, y: Array, covered: BoolArray) -> Ways:
-        """Return the ways of the nearest of the robots at (x, y), which stand in some of the components."""
-        return site_paths(self.geodesics.scene, self._lattice.tiles, self._views, x, y, covered)
+    def _nearest(self, places: Array, covered: BoolArray) -> tuple[Array, IntArray]:
+        """Return the distances of the sites from the nearest of (n, 2) places, m, and the ways, (3, m)."""
+        geodesics, tiles = self.geodesics, self._tiles
+        n, m, count = len(places), len(self.points), len(self.corners)
+        work = (
+            np.empty((3, n), np.int64), np.empty((2, count + 1), np.int64),
+            np.empty(len(tiles.boxes), np.int64), Paths.room(count), Paths.room(m),
+        )  # fmt: skip
+        found = np.empty(m), np.empty((3, m), np.int64)
+
+        def fill(index: AngularWallIndex, *_: object) -> int:
+            return int(
+                site_paths(
+                    geodesics.walls, geodesics.graph, tiles, self._views, places, covered, index,
+                    *work, geodesics.grid.unit, *found,
+                )
+            )  # fmt: skip
+
+        with_room(n, BINS, fill)
+        return found
 
     def _result(
-        self, positions: Array, covered: BoolArray, ways: Ways, speeds: Array | None = None
+        self, positions: Array, covered: BoolArray, found: tuple[Array, IntArray], speeds: Array | None = None
     ) -> CoverageResult:
-        distances, owner, corner, last_corner = ways
-        distances = distances * self.geodesics.walls.grid.unit
-        reached = distances if covered.all() else distances[owner >= 0]
-        weights = self.weights
-        some = None if weights is None else weights if covered.all() else weights[owner >= 0]
-        mean = weighted_mean(reached, some)
-        time = None if speeds is None else weighted_mean(reached / speeds[owner[owner >= 0]], some)
+        distances, (owner, corner, last_corner) = found
+        reached, weights, whose = distances, self.weights, owner
+        if not covered.all():
+            some = owner >= 0
+            reached, whose = reached[some], whose[some]
+            weights = None if weights is None else weights[some]
+        mean = weighted_mean(reached, weights)
+        time = None if speeds is None else weighted_mean(reached / speeds[whose], weights)
         return CoverageResult(
             mean_distance=mean,
             value=(mean if time is None else time) * float(self._masses[covered].sum()),
@@ -299,7 +329,7 @@ class CoverageCost:
             corners=self.corners,
             environment=self.environment,
             sites=self.sites,
-            weights=weights,
+            weights=self.weights,
             speeds=speeds,
             mean_time=time,
         )
@@ -335,3 +365,23 @@ class CoverageCost:
         point = np.asarray(point, dtype=float)
         distances = self.geodesics.distances(point[None], positions)[0]
         return self.geodesics.path(point, positions[int(distances.argmin())])
+
+
+def checked_speeds(speeds: object, robots: int) -> Array:
+    """Return the speeds of so many robots, (n,) m/s.
+
+    Raises
+    ------
+    InputError
+        When they are not as many positive numbers.
+    """
+    try:
+        values = np.array(speeds, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (robots,):
+        raise InputError(f"speeds: {shown(speeds)}, but a number for each of {robots} robots was wanted")
+    for k, value in enumerate(values.tolist()):
+        if not 0.0 < value < np.inf:
+            raise InputError(f"speeds[{k}]: {shown(value)} m/s, but a number above 0 was wanted")
+    return values

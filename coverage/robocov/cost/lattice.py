@@ -6,22 +6,24 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray, frozen
 from robocov.arrays.grouping import beginnings
 from robocov.cost.site_paths import GROUP, Tiles
 from robocov.errors import ParameterError
-from robocov.geodesic.visibility import Boxes, along_z_curve, boxes_around
+from robocov.geodesic.walls import along_z_curve, box_tree
 
 if TYPE_CHECKING:
-    from robocov.geodesic.corners import Walls
+    from robocov.geodesic import Geodesics
 
 Number = TypeVar("Number", bound=np.generic)
 
 TILE = 4
 """Cells along a side of a tile."""
+
+_BLOCK = 1 << 18
+"""Cells that are looked at together, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,59 +58,43 @@ class Sites:
         return picture.reshape(self.lattice, self.lattice)
 
 
-class Lattice:
-    """The free cells of a lattice, by rows, and in tiles of 4 by 4 cells.
-
-    Parameters
-    ----------
-    walls : Walls
-    size : float, m
-        Side of the square over the region's bounding box, from its lower left corner.
-    side : int
-        Cells along a side.
-
-    Attributes
-    ----------
-    sites : Sites
-    tiles : Tiles
+def lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
+    """Return the free cells of a lattice of so many cells a side, by rows, and in tiles of 4 by 4 cells.
 
     Raises
     ------
     ParameterError
         When no cell is free.
     """
+    grid, spacing = geodesics.grid, geodesics.size / side
 
-    def __init__(self, walls: Walls, size: float, side: int) -> None:
-        spacing = size / side
-        middles = (np.arange(side) + 0.5) * spacing
-        column_x, row_y = walls.grid.snap(np.column_stack([middles, middles]) + walls.grid.origin).T
-        y, x = (part.ravel() for part in np.meshgrid(row_y, column_x, indexing="ij"))
-        component = np.full(side * side, -1, dtype=np.intp)
-        for k, part in enumerate(walls.free.geoms):
-            component[shapely.contains_xy(part, x, y)] = k
-        cells = np.nonzero(component >= 0)[0]
-        if not len(cells):
-            raise ParameterError(f"lattice: {side}, but none of its sites is free; a finer one was wanted")
-        row, column = np.divmod(cells, side)
-        points = np.column_stack([middles[column], middles[row]]) + walls.grid.origin
-        cells.setflags(write=False)
-        self.sites = Sites(side, spacing, frozen(points), cells)
+    def middles(cells: IntArray) -> Array:
+        return (np.column_stack([cells % side, cells // side]) + 0.5) * spacing + grid.origin
 
-        tile = along_z_curve(column // TILE, row // TILE)
-        by_tile = np.argsort(tile, kind="stable")
-        begin = beginnings(tile[by_tile])
-        slot = (row % TILE * TILE + column % TILE)[by_tile]
-        cell = cells[by_tile]
-        x, y = x[cell], y[cell]
-        boxes = _around(x, y, x, y, begin)
-        groups = _around(*boxes, np.arange(0, len(begin), GROUP))
-        first = np.append(begin, len(cell))
-        tree = boxes_around(*boxes)
-        self.tiles = Tiles(by_tile, x, y, slot, component[cell], first, boxes, groups, tree)
+    free, components = [], []
+    for block in range(0, side * side, _BLOCK):
+        cells = np.arange(block, min(block + _BLOCK, side * side))
+        inside = geodesics.winding(grid.snap(middles(cells))) == 1
+        some = inside.any(axis=1)
+        free.append(cells[some])
+        components.append(inside[some].argmax(axis=1))
+    cells, component = np.concatenate(free), np.concatenate(components)
+    if not len(cells):
+        raise ParameterError(f"lattice: {side}, but none of its sites is free; a finer one was wanted")
+    cells.setflags(write=False)
+    sites = Sites(side, spacing, frozen(middles(cells)), cells)
+
+    tile = along_z_curve(cells % side // TILE, cells // side // TILE)
+    order = np.argsort(tile, kind="stable")
+    places = grid.snap(sites.points[order])
+    begin = beginnings(tile[order])
+    boxes = _boxes(places, places, begin)
+    groups = _boxes(boxes[:, :2], boxes[:, 2:], np.arange(0, len(boxes), GROUP))
+    facts = np.column_stack([order, component[order]])
+    tree = box_tree(boxes[:, :2], boxes[:, 2:])
+    return sites, Tiles(places, facts, np.append(begin, len(cells)), boxes, groups, tree)
 
 
-def _around(low_x: Array, low_y: Array, high_x: Array, high_y: Array, begin: IntArray) -> Boxes:
+def _boxes(low: Array, high: Array, begin: IntArray) -> Array:
     """Return boxes around groups of boxes, given by where the groups begin."""
-    low = (np.minimum.reduceat(side, begin) for side in (low_x, low_y))
-    high = (np.maximum.reduceat(side, begin) for side in (high_x, high_y))
-    return Boxes(*low, *high)
+    return np.hstack([np.minimum.reduceat(low, begin), np.maximum.reduceat(high, begin)])

@@ -1,51 +1,41 @@
 """The nearest robot of every site, and the way to it: equation (22) without the mean.
 
-Most sites see the robot that is nearest as the crow flies. The others are reached by way of a corner, or from
-another robot in view that is nearer than that.
+Most sites see the robot that is nearest as the crow flies. The others are reached by way of a corner, or
+from another robot in view that is nearer than that. Of robots that are equally far that of the lowest
+number counts.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel, kernel
-from robocov.geodesic.corners import useful
-from robocov.geodesic.distances import BINS, CORNER_BINS, Scene, relax
-from robocov.geodesic.visibility import LEAF, Boxes, Fans, beyond_horizon, fans_of, near2, sees, skipped
-
-if TYPE_CHECKING:
-    from robocov.geodesic.distances import Scene
-    from robocov.geodesic.visibility import Fans
+from robocov.compiled import inner_kernel
+from robocov.geodesic.distances import Graph, relax
+from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
+from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
 
 GROUP = 16
 """Tiles that are looked at together first."""
 
-_FEW = 1 << 13
-"""Pairs of robots and walls that are few enough to look at all."""
-
 
 class Tiles(NamedTuple):
-    """The sites of a lattice in square tiles, neighbours together, grid steps."""
+    """The sites of a lattice in square tiles of at most 64, neighbours together, grid steps."""
 
-    site: IntArray
-    """(m,) Their numbers in the lattice, by tile."""
-    x: Array
-    y: Array
-    slot: IntArray
-    """(m,) The place among the cells of the tile."""
-    component: IntArray
-    """(m,) Which component of the free space holds the site."""
+    sites: Array
+    """(m, 2) Where they are, by tile."""
+    facts: IntArray
+    """(m, 2) Their numbers in the lattice, and which component of the free space holds them."""
     first: IntArray
     """(t + 1,) The sites of a tile are those from its own `first` up to the next."""
-    boxes: Boxes
-    """(t,) Around the sites of each tile,"""
-    groups: Boxes
+    boxes: Array
+    """(t, 4) Around the sites of each tile,"""
+    groups: Array
     """around each `GROUP` tiles,"""
-    tree: Boxes
-    """and the tree of the first."""
+    tree: Array
+    """and the `box_tree` of the first."""
 
 
 class CornerViews(NamedTuple):
@@ -53,315 +43,311 @@ class CornerViews(NamedTuple):
 
     first: IntArray
     """(t + 1,) The rows of a tile are those from its own `first` up to the next."""
-    corner: IntArray
-    mask: IntArray
-    """A bit for each slot: whether the site is in useful view."""
-    least: Array
-    """Distance of the nearest of these sites, grid steps."""
-    most: Array
-    """That of the farthest site if all are in useful view, else inf."""
+    rows: IntArray
+    """(r, 2) The corner, and a bit for each site of the tile: whether it is in useful view."""
+    spans: Array
+    """(r, 2) Distance of the nearest of these sites; of the farthest if all are in useful view, else inf."""
+
+
+class Paths(NamedTuple):
+    """The shortest ways to sites or corners."""
+
+    distance: Array
+    """(m,) grid steps, inf where none leads."""
+    ways: IntArray
+    """(m, 4) The robot where it begins, the corners where it bends first and last, -1 for none; and the robot
+    that is nearest as the crow flies."""
+
+    @classmethod
+    def room(cls, m: int) -> Paths:
+        """Return room for the ways to so many sites."""
+        return cls(np.empty(m), np.empty((m, 4), np.int64))
 
 
 @inner_kernel
-def _seen_sites(scene: Scene, tiles: Tiles, fans: Fans, k: int, tile: int, least_most: Array) -> int:
-    """Return the mask of a tile's sites in useful view of a corner; write their least and most distance."""
-    x, y = scene.corners.x[k], scene.corners.y[k]
-    mask, least, most = 0, np.inf, 0.0
+def corner_views(
+    walls: Walls, tiles: Tiles, begin: int, end: int, index: AngularWallIndex, rows: IntArray, spans: Array
+) -> int:
+    """Write what the corners from `begin` to `end` see: corner, tile, mask of a row, and its span.
+
+    Return how many rows there are, -1 if there is no room.
+    """
+    corners, tree, used, leaves = walls.corners, tiles.tree, 0, len(tiles.tree) // 2
+    for k in range(begin, end):
+        if enter_walls(walls, index, 0, corners[k, 0], corners[k, 1], np.inf, 0) < 0:
+            return -1
+        node = 1
+        while node:
+            if tree[node, 0] == np.inf or beyond_horizon(tree, node, index, 0):
+                node = skipped(node)
+                continue
+            if node < leaves:
+                node *= 2
+                continue
+            leaf = (node - leaves) * LEAF
+            for tile in range(leaf, min(leaf + LEAF, len(tiles.boxes))):
+                if used == len(rows):
+                    return -1
+                if not beyond_horizon(tiles.boxes, tile, index, 0):
+                    rows[used, 0], rows[used, 1] = k, tile
+                    rows[used, 2] = _seen_sites(walls, index, tiles, k, tile, spans[used])
+                    used += rows[used, 2] != 0
+            node = skipped(node)
+    return used
+
+
+@inner_kernel
+def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, tile: int, span: Array) -> int:
+    """Return the mask of a tile's sites in useful view of a corner; write their span."""
+    mask, bit, least, most = 0, 1, np.inf, 0.0
     for s in range(tiles.first[tile], tiles.first[tile + 1]):
-        dx, dy = tiles.x[s] - x, tiles.y[s] - y
-        if useful(scene.corners, k, tiles.x[s], tiles.y[s]) and sees(
-            scene.tree, fans, 0, tiles.x[s], tiles.y[s]
-        ):
-            mask |= 1 << tiles.slot[s]
+        x, y = tiles.sites[s, 0], tiles.sites[s, 1]
+        if useful(walls.corners, k, x, y) and sees(walls, index, 0, x, y):
+            mask |= bit
+            dx, dy = x - walls.corners[k, 0], y - walls.corners[k, 1]
             length = np.sqrt(dx * dx + dy * dy)
             least, most = min(least, length), max(most, length)
         else:
             most = np.inf
-    least_most[0], least_most[1] = least, most
+        bit <<= 1
+    span[0], span[1] = least, most
     return mask
 
 
 @inner_kernel
-def _perhaps_seen(scene: Scene, tiles: Tiles, fans: Fans, k: int, out: IntArray) -> int:
-    """Write the tiles that are not beyond the horizon of a corner; return how many."""
-    x, y, horizon = scene.corners.x[k], scene.corners.y[k], fans.horizon[0]
-    boxes, leaves, found, node = tiles.tree, len(tiles.tree.low_x) // 2, 0, 1
-    while node:
-        if boxes.low_x[node] == np.inf or beyond_horizon(boxes, node, x, y, horizon):
-            node = skipped(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        leaf = (node - leaves) * LEAF
-        for tile in range(leaf, min(leaf + LEAF, len(tiles.first) - 1)):
-            if not beyond_horizon(tiles.boxes, tile, x, y, horizon):
-                out[found] = tile
-                found += 1
-        node = skipped(node)
-    return found
-
-
-@kernel
-def looked_for(scene: Scene, tiles: Tiles, begin: int, end: int) -> tuple[IntArray, Array]:
-    """Return the rows of the corners from `begin` to `end`: corner, tile, mask; least, most."""
-    corners, reach, some = scene.corners, np.full(1, np.inf), np.empty(len(tiles.first), dtype=np.int64)
-    rows, lengths, used = np.empty((64, 3), dtype=np.int64), np.empty((64, 2)), 0
-    for k in range(begin, end):
-        fans = fans_of(scene.tree, corners.x[k : k + 1], corners.y[k : k + 1], reach, CORNER_BINS)
-        count = _perhaps_seen(scene, tiles, fans, k, some)
-        if used + count > len(rows):
-            more, further = np.empty((2 * used + count, 3), dtype=np.int64), np.empty((2 * used + count, 2))
-            more[:used], further[:used] = rows[:used], lengths[:used]
-            rows, lengths = more, further
-        for tile in some[:count]:
-            mask = _seen_sites(scene, tiles, fans, k, tile, lengths[used])
-            if mask:
-                rows[used, 0], rows[used, 1], rows[used, 2] = k, tile, mask
-                used += 1
-    return rows[:used], lengths[:used]
-
-
-@inner_kernel
-def _perhaps_nearest(
-    boxes: Boxes, k: int, x: Array, y: Array, given: IntArray, count: int, out: IntArray
-) -> int:
+def _perhaps_nearest(boxes: Array, k: int, robots: Array, given: IntArray, count: int, out: IntArray) -> int:
     """Write which of `count` given robots may be nearest to a place in a box; return how many."""
     bound = np.inf
     for j in range(count):
-        i = given[j]
-        dx = max(x[i] - boxes.low_x[k], boxes.high_x[k] - x[i])
-        dy = max(y[i] - boxes.low_y[k], boxes.high_y[k] - y[i])
+        x, y = robots[given[j], 0], robots[given[j], 1]
+        dx, dy = max(x - boxes[k, 0], boxes[k, 2] - x), max(y - boxes[k, 1], boxes[k, 3] - y)
         bound = min(bound, dx * dx + dy * dy)
-    found = 0
-    for j in range(count):
-        if near2(boxes, k, x[given[j]], y[given[j]]) <= bound:
-            out[found] = given[j]
-            found += 1
-    return found
+    return _within(boxes, k, robots, bound, given, count, out)
 
 
 @inner_kernel
 def _within(
-    boxes: Boxes, k: int, x: Array, y: Array, bound2: float, given: IntArray, count: int, out: IntArray
+    boxes: Array, k: int, robots: Array, bound2: float, given: IntArray, count: int, out: IntArray
 ) -> int:
-    """Write which of `count` given robots are nearer to a box than a bound; return how many."""
+    """Write which of `count` given robots are not farther from a box than a bound; return how many."""
     found = 0
     for j in range(count):
-        if near2(boxes, k, x[given[j]], y[given[j]]) < bound2:
-            out[found] = given[j]
+        i = given[j]
+        if near2(boxes, k, robots[i, 0], robots[i, 1]) <= bound2:
+            out[found] = i
             found += 1
     return found
 
 
-@inlined_kernel
-def _nearest(px: float, py: float, x: Array, y: Array, given: IntArray, count: int) -> tuple[int, float]:
-    """Return the nearest of `count` given robots, of equals the first, and its squared distance."""
-    best, nearest = np.inf, given[0]
+@inner_kernel
+def _nearest_robot(
+    x: float, y: float, robots: Array, given: IntArray, count: int, paths: Paths, k: int
+) -> None:
+    """Write the nearest of `count` given robots as the crow flies, of equals the first, and its distance."""
+    best, nearest = np.inf, -1
     for j in range(count):
-        dx, dy = px - x[given[j]], py - y[given[j]]
+        dx, dy = x - robots[given[j], 0], y - robots[given[j], 1]
         if dx * dx + dy * dy < best:
             best, nearest = dx * dx + dy * dy, given[j]
-    return nearest, best
-
-
-@kernel
-def _nearest_of_sites(tiles: Tiles, x: Array, y: Array) -> tuple[IntArray, Array]:
-    """Return the robot that is nearest to each site as the crow flies, and its squared distance."""
-    m, n = len(tiles.x), len(x)
-    owner, away2 = np.empty(m, dtype=np.int64), np.empty(m)
-    everyone = np.arange(n)
-    some, few = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    for tile in range(len(tiles.first) - 1):
-        if tile % GROUP == 0:
-            near = _perhaps_nearest(tiles.groups, tile // GROUP, x, y, everyone, n, some)
-        count = _perhaps_nearest(tiles.boxes, tile, x, y, some, near, few)
-        for s in range(tiles.first[tile], tiles.first[tile + 1]):
-            owner[s], away2[s] = _nearest(tiles.x[s], tiles.y[s], x, y, few, count)
-    return owner, away2
+    paths.distance[k], paths.ways[k, 0], paths.ways[k, 3] = np.sqrt(best), nearest, nearest
+    paths.ways[k, 1], paths.ways[k, 2] = -1, -1
 
 
 @inner_kernel
-def _corners_seen_from_nearest(
-    scene: Scene, fans: Fans, leaf: int, some: IntArray, near: int, owner: IntArray, distance: Array
-) -> None:
-    """Write the nearest robot of each corner of a leaf, and its distance if it is in useful view."""
-    corners = scene.corners
-    for k in scene.order[leaf * LEAF : (leaf + 1) * LEAF]:
-        i, away2 = _nearest(corners.x[k], corners.y[k], fans.x, fans.y, some, near)
-        owner[k] = i
-        if useful(corners, k, fans.x[i], fans.y[i]) and sees(scene.tree, fans, i, corners.x[k], corners.y[k]):
-            distance[k] = np.sqrt(away2)
-
-
-@inner_kernel
-def _corners_seen_from_others(
-    scene: Scene, fans: Fans, leaf: int, some: IntArray, near: int, owner: IntArray, distance: Array,
-    before: IntArray,
+def _paths_to_corners(
+    walls: Walls, graph: Graph, index: AngularWallIndex, robots: Array, lists: IntArray, queue: IntArray,
+    paths: Paths,
 ) -> None:  # fmt: skip
-    """Write which other robots see the corners of a leaf, and are nearer than has been found."""
-    corners = scene.corners
-    for k in scene.order[leaf * LEAF : (leaf + 1) * LEAF]:
-        nearest = owner[k]
-        for i in some[:near]:
-            dx, dy = corners.x[k] - fans.x[i], corners.y[k] - fans.y[i]
-            away = np.sqrt(dx * dx + dy * dy)
-            if (
-                away < distance[k] and i != nearest and useful(corners, k, fans.x[i], fans.y[i])
-                and sees(scene.tree, fans, i, corners.x[k], corners.y[k])
-            ):  # fmt: skip
-                distance[k], owner[k], before[k] = away, i, -1
-
-
-@kernel
-def _to_corners(scene: Scene, fans: Fans) -> tuple[Array, IntArray, IntArray]:
-    """Return the distance of each corner from the nearest robot, that robot, and the corner before, or -1."""
-    boxes, x, y = scene.boxes, fans.x, fans.y
-    count, n, leaves = len(scene.order), len(x), len(boxes.low_x) // 2
-    distance, before, owner = np.full(count, np.inf), np.full(count, -1), np.full(count, -1)
-    everyone, some = np.arange(n), np.empty(n, dtype=np.int64)
-    for leaf in range((count + LEAF - 1) // LEAF):
-        near = _perhaps_nearest(boxes, leaves + leaf, x, y, everyone, n, some)
-        _corners_seen_from_nearest(scene, fans, leaf, some, near, owner, distance)
+    """Write the shortest ways to the corners."""
+    corners, boxes, n = walls.corners, walls.corner_boxes, len(robots)
+    everyone, some, leaves, waiting = lists[0], lists[1], len(walls.corner_boxes) // 2, 0
+    for k in range(len(corners)):
+        x, y = corners[k, 0], corners[k, 1]
+        if k % LEAF == 0:
+            near = _perhaps_nearest(boxes, leaves + k // LEAF, robots, everyone, n, some)
+        _nearest_robot(x, y, robots, some, near, paths, k)
+        i, queue[1, k] = paths.ways[k, 0], 0
+        if useful(corners, k, robots[i, 0], robots[i, 1]) and sees(walls, index, i, x, y):
+            paths.ways[k, 1] = k
+            queue[0, waiting], queue[1, k] = k, 1
+            waiting += 1
+        else:
+            paths.distance[k] = np.inf
     # few of the other robots matter once it is known how far the nearest one has to go, if not straight
-    relax(scene.graph, distance, before)
-    for leaf in range((count + LEAF - 1) // LEAF):
-        bound = distance[scene.order[leaf * LEAF : (leaf + 1) * LEAF]].max()
-        near = _within(boxes, leaves + leaf, x, y, bound * bound, everyone, n, some)
-        _corners_seen_from_others(scene, fans, leaf, some, near, owner, distance, before)
-    relax(scene.graph, distance, before)
-    return distance, owner, before
+    relax(graph, paths.distance, paths.ways, queue, waiting)
+    waiting = 0
+    for k in range(len(corners)):
+        x, y = corners[k, 0], corners[k, 1]
+        if k % LEAF == 0:
+            bound = 0.0
+            for j in range(k, min(k + LEAF, len(corners))):
+                bound = max(bound, paths.distance[j])
+            near = _within(boxes, leaves + k // LEAF, robots, bound * bound, everyone, n, some)
+        for j in range(near):
+            i = some[j]
+            dx, dy = x - robots[i, 0], y - robots[i, 1]
+            away, owner = np.sqrt(dx * dx + dy * dy), paths.ways[k, 0]
+            if (
+                i != paths.ways[k, 3]
+                and (away < paths.distance[k] or (away == paths.distance[k] and i < owner))
+                and useful(corners, k, robots[i, 0], robots[i, 1])
+                and sees(walls, index, i, x, y)
+            ):
+                paths.distance[k], paths.ways[k, 0], paths.ways[k, 1], paths.ways[k, 2] = away, i, k, -1
+                if not queue[1, k]:
+                    queue[0, waiting], queue[1, k] = k, 1
+                    waiting += 1
+    relax(graph, paths.distance, paths.ways, queue, waiting)
 
 
 @inner_kernel
 def _by_corners(
-    tiles: Tiles, views: CornerViews, corner_x: Array, corner_y: Array, away: Array, tile: int,
-    hidden: BoolArray, distance: Array, last: IntArray,
-) -> None:  # fmt: skip
-    """Write the least distance of the hidden sites of a tile by way of a corner, and that corner."""
-    rows = range(views.first[tile], views.first[tile + 1])
+    tiles: Tiles, views: CornerViews, corners: Array, to: Paths, tile: int, hidden: int, paths: Paths
+) -> float:
+    """Write the shortest ways to the hidden sites of a tile by a corner; return the longest of these."""
     # a row cannot be the best for any site of its tile where another one is better for all of them
-    bound = np.inf
-    for row in rows:
-        bound = min(bound, away[views.corner[row]] + views.most[row])
-    for row in rows:
-        k = views.corner[row]
-        if away[k] == np.inf or away[k] + views.least[row] > bound:
+    bound, begin = np.inf, tiles.first[tile]
+    for row in range(views.first[tile], views.first[tile + 1]):
+        bound = min(bound, to.distance[views.rows[row, 0]] + views.spans[row, 1])
+    for row in range(views.first[tile], views.first[tile + 1]):
+        k, mask = views.rows[row, 0], views.rows[row, 1] & hidden
+        if mask == 0 or to.distance[k] + views.spans[row, 0] > bound or to.distance[k] == np.inf:
             continue
-        for s in range(tiles.first[tile], tiles.first[tile + 1]):
-            if hidden[s] and (views.mask[row] >> tiles.slot[s]) & 1:
-                dx, dy = tiles.x[s] - corner_x[k], tiles.y[s] - corner_y[k]
-                total = away[k] + np.sqrt(dx * dx + dy * dy)
-                if total < distance[s]:
-                    distance[s], last[s] = total, k
+        for s in range(begin, tiles.first[tile + 1]):
+            if (mask >> (s - begin)) & 1:
+                dx, dy = tiles.sites[s, 0] - corners[k, 0], tiles.sites[s, 1] - corners[k, 1]
+                total = to.distance[k] + np.sqrt(dx * dx + dy * dy)
+                owner = to.ways[k, 0]
+                if total < paths.distance[s] or (total == paths.distance[s] and owner < paths.ways[s, 0]):
+                    paths.distance[s], paths.ways[s, 0], paths.ways[s, 1] = total, owner, to.ways[k, 1]
+                    paths.ways[s, 2] = k
+    farthest = 0.0
+    for s in range(begin, tiles.first[tile + 1]):
+        if (hidden >> (s - begin)) & 1:
+            farthest = max(farthest, paths.distance[s])
+    return farthest
 
 
-@kernel
-def _first_corners(before: IntArray) -> IntArray:
-    """Return where the way to each corner bends first."""
-    first = np.empty(len(before), dtype=np.int64)
-    for k in range(len(before)):
-        at = k
-        while before[at] >= 0:
-            at = before[at]
-        first[k] = at
-    return first
+@inner_kernel
+def _from_others(
+    walls: Walls, index: AngularWallIndex, robots: Array, x: float, y: float, some: IntArray, count: int,
+    paths: Paths, s: int,
+) -> None:  # fmt: skip
+    """Write the straight way to a site from one of `count` robots, but for the nearest, if it is shorter."""
+    for j in range(count):
+        i = some[j]
+        dx, dy = x - robots[i, 0], y - robots[i, 1]
+        away = np.sqrt(dx * dx + dy * dy)
+        if (
+            i != paths.ways[s, 3]
+            and (away < paths.distance[s] or (away == paths.distance[s] and i < paths.ways[s, 0]))
+            and sees(walls, index, i, x, y)
+        ):
+            paths.distance[s], paths.ways[s, 0], paths.ways[s, 1], paths.ways[s, 2] = away, i, -1, -1
 
 
 @inner_kernel
 def _seen_from_nearest(
-    scene: Scene, tiles: Tiles, fans: Fans, covered: BoolArray, owner: IntArray, distance: Array,
-    hidden: BoolArray,
-) -> bool:  # fmt: skip
-    """Mark the sites that do not see their nearest robot; return whether there are any."""
-    any_hidden = False
-    for s in range(len(distance)):
-        if not covered[tiles.component[s]]:
-            owner[s], distance[s] = -1, np.inf
-        elif not sees(scene.tree, fans, owner[s], tiles.x[s], tiles.y[s]):
-            hidden[s], any_hidden, distance[s] = True, True, np.inf
-    return any_hidden
+    walls: Walls, index: AngularWallIndex, tiles: Tiles, tile: int, covered: BoolArray, paths: Paths
+) -> int:
+    """Return the mask of the sites of a tile that do not see their nearest robot."""
+    mask, bit = 0, 1
+    for s in range(tiles.first[tile], tiles.first[tile + 1]):
+        if not covered[tiles.facts[s, 1]]:
+            paths.distance[s], paths.ways[s, 0] = np.inf, -1
+        elif not sees(walls, index, paths.ways[s, 0], tiles.sites[s, 0], tiles.sites[s, 1]):
+            mask |= bit
+        bit <<= 1
+    return mask
 
 
 @inner_kernel
-def _farthest(tiles: Tiles, begin: int, end: int, hidden: BoolArray, distance: Array) -> float:
-    """Return the largest distance of a hidden site of the tiles from `begin` to `end`."""
-    bound = 0.0
-    for s in range(tiles.first[begin], tiles.first[end]):
-        if hidden[s]:
-            bound = max(bound, distance[s])
-    return bound
+def _unhide(
+    walls: Walls, tiles: Tiles, views: CornerViews, robots: Array, index: AngularWallIndex, lists: IntArray,
+    hidden: IntArray, to_corners: Paths, paths: Paths,
+) -> None:  # fmt: skip
+    """Write the ways to the sites that do not see the robot that is nearest as the crow flies."""
+    for group in range(len(tiles.groups)):
+        begin, end, bound = group * GROUP, min(group * GROUP + GROUP, len(tiles.boxes)), -1.0
+        for tile in range(begin, end):
+            if hidden[tile]:
+                first = tiles.first[tile]
+                for s in range(first, tiles.first[tile + 1]):
+                    if (hidden[tile] >> (s - first)) & 1:
+                        paths.distance[s] = np.inf
+                far = _by_corners(tiles, views, walls.corners, to_corners, tile, hidden[tile], paths)
+                bound = max(bound, far)
+        if bound < 0.0:
+            continue
+        # whoever else is nearer than by way of a corner may see the site
+        near = _within(tiles.groups, group, robots, bound * bound, lists[0], len(robots), lists[1])
+        for tile in range(begin, end):
+            if hidden[tile]:
+                first, bound = tiles.first[tile], 0.0
+                for s in range(first, tiles.first[tile + 1]):
+                    if (hidden[tile] >> (s - first)) & 1:
+                        bound = max(bound, paths.distance[s])
+                count = _within(tiles.boxes, tile, robots, bound * bound, lists[1], near, lists[2])
+                for s in range(first, tiles.first[tile + 1]):
+                    if (hidden[tile] >> (s - first)) & 1:
+                        x, y = tiles.sites[s, 0], tiles.sites[s, 1]
+                        _from_others(walls, index, robots, x, y, lists[2], count, paths, s)
 
 
 @inner_kernel
-def _seen_from_others(
-    scene: Scene, tiles: Tiles, fans: Fans, s: int, some: IntArray, count: int, nearest: int,
-    owner: IntArray, distance: Array,
-) -> bool:  # fmt: skip
-    """Return whether one of `count` robots, but for the nearest, sees a site and is nearer than any found."""
-    found = False
-    for i in some[:count]:
-        dx, dy = tiles.x[s] - fans.x[i], tiles.y[s] - fans.y[i]
-        away = np.sqrt(dx * dx + dy * dy)
-        if away < distance[s] and i != nearest and sees(scene.tree, fans, i, tiles.x[s], tiles.y[s]):
-            distance[s], owner[s], found = away, i, True
-    return found
-
-
-@kernel
 def site_paths(
-    scene: Scene, tiles: Tiles, views: CornerViews, x: Array, y: Array, covered: BoolArray
-) -> tuple[Array, IntArray, IntArray, IntArray]:
-    """Return the ways of the nearest of (n,) robots, which stand in the components that are `covered`.
+    walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, robots: Array, covered: BoolArray,
+    index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
+    paths: Paths, unit: float, out_distance: Array, out_ways: IntArray,
+) -> int:  # fmt: skip
+    """Write the ways of the nearest of (n, 2) robots, which stand in the components that are `covered`.
+
+    Parameters
+    ----------
+    lists : (3, n)
+        For work, as are `queue`, (2, k + 1), `hidden`, (2, t), and the ways by tile.
+    unit : float
+        Length of a grid step.
+    out_distance : (m,)
+    out_ways : (3, m)
+        As `Paths` has them, by site.
 
     Returns
     -------
-    distance : (m,) grid steps
-        inf where none can come.
-    owner : (m,)
-        That robot, -1 where none can come.
-    first, last : (m,)
-        The corners where its way bends first and last, -1 where it is straight.
+    int
+        Not negative if there was room in the index.
     """
-    m, n = len(tiles.x), len(x)
-    owner, away2 = _nearest_of_sites(tiles, x, y)
-    reach = np.zeros(n)
-    for s in range(m):
-        reach[owner[s]] = max(reach[owner[s]], away2[s])
-    # some walls beyond the own sites save second looks; with few walls that costs more than all of them
-    reach = np.sqrt(reach) * (1.0 + 1e-9) + np.sqrt(reach).mean()
-    if n * len(scene.tree.ax) <= _FEW:
-        reach[:] = np.inf
-    fans = fans_of(scene.tree, x, y, reach, BINS)
-    distance, hidden = np.sqrt(away2), np.zeros(m, dtype=np.bool_)
-    first, last = np.full(m, -1), np.full(m, -1)
-    if _seen_from_nearest(scene, tiles, fans, covered, owner, distance, hidden):
-        away, corner_owner, before = _to_corners(scene, fans)
-        bends = _first_corners(before)
-        everyone = np.arange(n)
-        some, few = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-        corner_x, corner_y = scene.corners.x, scene.corners.y
-        for tile in range(len(tiles.first) - 1):
-            if tile % GROUP == 0:
-                end = min(tile + GROUP, len(tiles.first) - 1)
-                for member in range(tile, end):
-                    _by_corners(tiles, views, corner_x, corner_y, away, member, hidden, distance, last)
-                # whoever else is nearer than by way of a corner may see the site
-                bound = _farthest(tiles, tile, end, hidden, distance)
-                near = _within(tiles.groups, tile // GROUP, x, y, bound * bound, everyone, n, some)
-            bound = _farthest(tiles, tile, tile + 1, hidden, distance)
-            count = _within(tiles.boxes, tile, x, y, bound * bound, some, near, few)
-            for s in range(tiles.first[tile], tiles.first[tile + 1]):
-                if hidden[s]:
-                    nearest = owner[s]
-                    if last[s] >= 0:
-                        first[s] = bends[last[s]]
-                        owner[s] = corner_owner[first[s]]
-                    if _seen_from_others(scene, tiles, fans, s, few, count, nearest, owner, distance):
-                        first[s], last[s] = -1, -1
-    site = tiles.site
-    out_distance, out = np.empty(m), np.empty((3, m), dtype=np.int64)
-    for s in range(m):
-        out_distance[site[s]] = distance[s]
-        out[0, site[s]], out[1, site[s]], out[2, site[s]] = owner[s], first[s], last[s]
-    return out_distance, out[0], out[1], out[2]
+    n, count = len(robots), len(tiles.boxes)
+    for i in range(n):
+        lists[0, i], index.sources[i, 2] = i, 0.0
+    for tile in range(count):
+        if tile % GROUP == 0:
+            near = _perhaps_nearest(tiles.groups, tile // GROUP, robots, lists[0], n, lists[1])
+        some = _perhaps_nearest(tiles.boxes, tile, robots, lists[1], near, lists[2])
+        for s in range(tiles.first[tile], tiles.first[tile + 1]):
+            _nearest_robot(tiles.sites[s, 0], tiles.sites[s, 1], robots, lists[2], some, paths, s)
+            i = paths.ways[s, 0]
+            index.sources[i, 2] = max(index.sources[i, 2], paths.distance[s])
+    # some walls beyond the own sites save second looks
+    beyond = 0.0
+    for i in range(n):
+        beyond += index.sources[i, 2] / n
+    used = 0
+    for i in range(n):
+        reach = index.sources[i, 2] * (1.0 + 1e-9) + beyond
+        used = enter_walls(walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
+        if used < 0:
+            return -1
+    any_hidden = False
+    for tile in range(count):
+        hidden[tile] = _seen_from_nearest(walls, index, tiles, tile, covered, paths)
+        any_hidden = any_hidden or hidden[tile] != 0
+    if any_hidden:
+        _paths_to_corners(walls, graph, index, robots, lists, queue, to_corners)
+        _unhide(walls, tiles, views, robots, index, lists, hidden, to_corners, paths)
+    for s in range(len(paths.distance)):
+        site = tiles.facts[s, 0]
+        out_distance[site] = paths.distance[s] * unit
+        for part in range(3):
+            out_ways[part, site] = paths.ways[s, part]
+    return used

@@ -14,24 +14,11 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel, kernel
+from robocov.compiled import inner_kernel
 from robocov.environment import GRID
 from robocov.errors import InputError
-from robocov.geodesic.corners import Corners, Walls, useful
-from robocov.geodesic.orientation import BITS, Grid
-from robocov.geodesic.visibility import (
-    LEAF,
-    Boxes,
-    Fans,
-    WallTree,
-    along_z_curve,
-    beyond_horizon,
-    boxes_around,
-    fans_of,
-    sees,
-    skipped,
-    wall_tree,
-)
+from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
+from robocov.geodesic.walls import LEAF, Grid, Walls, locate, skipped, useful, walls_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +31,9 @@ BINS, CORNER_BINS = 64, 256
 _BLOCK = 256
 """Corners that are looked at between two beats."""
 
+_TARGETS = 1024
+"""Targets whose views are held at once."""
+
 
 class Graph(NamedTuple):
     """The corners that see each other and can follow each other on a shortest path."""
@@ -54,40 +44,25 @@ class Graph(NamedTuple):
     length: Array
 
 
-class Scene(NamedTuple):
-    """What the kernels know of a map, all in grid steps."""
-
-    tree: WallTree
-    corners: Corners
-    order: IntArray
-    """(k,) The corners, neighbours together, and"""
-    boxes: Boxes
-    """boxes around them."""
-    graph: Graph
-
-
 @inner_kernel
-def seen_corners(scene: Scene, fans: Fans, i: int, least: int, out: IntArray) -> int:
-    """Write the corners from number `least` on in useful view of source i of `fans`; return how many.
+def seen_corners(walls: Walls, index: AngularWallIndex, i: int, least: int, out: IntArray) -> int:
+    """Write the corners from number `least` on in useful view of source i; return how many.
 
-    The fan must reach everywhere.
+    The index must hold all walls.
     """
-    x, y, horizon, boxes = fans.x[i], fans.y[i], fans.horizon[i], scene.boxes
-    corners, leaves, found = scene.corners, len(scene.boxes.low_x) // 2, 0
-    node = 1
+    corners, boxes = walls.corners, walls.corner_boxes
+    leaves, found, node = len(boxes) // 2, 0, 1
     while node:
-        if boxes.low_x[node] == np.inf or beyond_horizon(boxes, node, x, y, horizon):
+        if boxes[node, 0] == np.inf or beyond_horizon(boxes, node, index, i):
             node = skipped(node)
             continue
         if node < leaves:
             node *= 2
             continue
         begin = (node - leaves) * LEAF
-        for k in scene.order[begin : begin + LEAF]:
-            if (
-                k >= least
-                and useful(corners, k, x, y)
-                and sees(scene.tree, fans, i, corners.x[k], corners.y[k])
+        for k in range(max(begin, least), min(begin + LEAF, len(corners))):
+            if useful(corners, k, index.sources[i, 0], index.sources[i, 1]) and sees(
+                walls, index, i, corners[k, 0], corners[k, 1]
             ):
                 out[found] = k
                 found += 1
@@ -95,115 +70,131 @@ def seen_corners(scene: Scene, fans: Fans, i: int, least: int, out: IntArray) ->
     return found
 
 
-@kernel
-def corner_links(scene: Scene, begin: int, end: int) -> IntArray:
-    """Return the linked pairs of a corner, from `begin` to `end`, and one of higher number, (p, 2)."""
-    corners, count = scene.corners, len(scene.corners.x)
-    pairs, used = np.empty((16 * (end - begin) + count, 2), dtype=np.int64), 0
-    seen = np.empty(count, dtype=np.int64)
-    reach = np.full(1, np.inf)
+@inner_kernel
+def _corner_links(
+    walls: Walls,
+    begin: int,
+    end: int,
+    seen: IntArray,
+    index: AngularWallIndex,
+    links: IntArray,
+    lengths: Array,
+) -> int:
+    """Write the linked pairs of a corner, from `begin` to `end`, and one of higher number, and their lengths.
+
+    Return how many there are, -1 if there is no room.
+    """
+    corners, used = walls.corners, 0
     for i in range(begin, end):
-        fans = fans_of(scene.tree, corners.x[i : i + 1], corners.y[i : i + 1], reach, CORNER_BINS)
-        for k in seen[: seen_corners(scene, fans, 0, i + 1, seen)]:
+        if enter_walls(walls, index, 0, corners[i, 0], corners[i, 1], np.inf, 0) < 0:
+            return -1
+        found = seen_corners(walls, index, 0, i + 1, seen)
+        if used + found > len(links):
+            return -1
+        for j in range(found):
             # each of the two must be useful to the other
-            if useful(corners, i, corners.x[k], corners.y[k]):
-                if used == len(pairs):
-                    more = np.empty((2 * used, 2), dtype=np.int64)
-                    more[:used] = pairs
-                    pairs = more
-                pairs[used, 0], pairs[used, 1] = i, k
+            x, y = corners[seen[j], 0], corners[seen[j], 1]
+            if useful(corners, i, x, y):
+                dx, dy = x - corners[i, 0], y - corners[i, 1]
+                links[used, 0], links[used, 1], lengths[used, 0] = i, seen[j], np.sqrt(dx * dx + dy * dy)
                 used += 1
-    return pairs[:used]
+    return used
 
 
-@kernel
-def relax(graph: Graph, distance: Array, before: IntArray) -> None:
+@inner_kernel
+def relax(graph: Graph, distance: Array, ways: IntArray, queue: IntArray, waiting: int) -> None:
     """Lower the distances of the corners from the sources to those by way of other corners.
+
+    Of equally short ways that from the source of lowest number is taken.
 
     Parameters
     ----------
     graph : Graph
     distance : (k,) grid steps
         In direct view; inf where there is none. Changed.
-    before : (k,)
-        Written where a distance is lowered: the corner before on the shortest path.
+    ways : (k, at least 3)
+        The source, the corner where the way from it bends first, the corner before this one. Changed.
+    queue : (2, k + 1)
+        In the first row `waiting` corners to begin with; of all corners, in the second, whether they wait.
     """
-    count = len(distance)
-    waiting = distance < np.inf
-    queue = np.empty(count + 1, dtype=np.int64)
-    head, tail = 0, 0
-    for k in np.argsort(distance):
-        if waiting[k]:
-            queue[tail] = k
-            tail += 1
+    size = queue.shape[1]
+    head, tail = 0, waiting
     while head != tail:
-        k = queue[head]
-        head = (head + 1) % (count + 1)
-        waiting[k] = False
+        k = queue[0, head]
+        head = head + 1 if head + 1 < size else 0
+        queue[1, k] = 0
         for link in range(graph.first[k], graph.first[k + 1]):
             other, total = graph.corner[link], distance[k] + graph.length[link]
-            if total < distance[other]:
-                distance[other], before[other] = total, k
-                if not waiting[other]:
-                    waiting[other] = True
-                    queue[tail] = other
-                    tail = (tail + 1) % (count + 1)
+            if total < distance[other] or (total == distance[other] and ways[k, 0] < ways[other, 0]):
+                distance[other], ways[other, 0], ways[other, 1], ways[other, 2] = (
+                    total,
+                    ways[k, 0],
+                    ways[k, 1],
+                    k,
+                )
+                if not queue[1, other]:
+                    queue[1, other], queue[0, tail] = 1, other
+                    tail = tail + 1 if tail + 1 < size else 0
 
 
-@kernel
-def corner_reach(scene: Scene, fans: Fans, i: int) -> Array:
-    """Return the distance of source i of `fans` to the corners in useful view, (k,), inf to the others."""
-    corners = scene.corners
-    reach = np.full(len(corners.x), np.inf)
-    seen = np.empty(len(corners.x), dtype=np.int64)
-    for k in seen[: seen_corners(scene, fans, i, 0, seen)]:
-        dx, dy = corners.x[k] - fans.x[i], corners.y[k] - fans.y[i]
-        reach[k] = np.sqrt(dx * dx + dy * dy)
-    return reach
+@inner_kernel
+def _corner_distances(
+    walls: Walls, index: AngularWallIndex, graph: Graph, points: Array, bends: bool, distance: Array,
+    ways: IntArray, queue: IntArray,
+) -> int:  # fmt: skip
+    """Write the distances of (n, 2) points to the corners, (n, k), straight or also by way of other corners.
+
+    The ways, (k, 3), are those of the last point. Return how many entries of the index are used, -1 if there
+    is no room.
+    """
+    used = 0
+    for i in range(len(points)):
+        used = enter_walls(walls, index, i, points[i, 0], points[i, 1], np.inf, used)
+        if used < 0:
+            return -1
+        for k in range(len(walls.corners)):
+            distance[i, k], queue[1, k] = np.inf, 0
+            ways[k, 0], ways[k, 1], ways[k, 2] = 0, k, -1
+        found = seen_corners(walls, index, i, 0, queue[0])
+        for j in range(found):
+            k = queue[0, j]
+            dx, dy = walls.corners[k, 0] - points[i, 0], walls.corners[k, 1] - points[i, 1]
+            distance[i, k], queue[1, k] = np.sqrt(dx * dx + dy * dy), 1
+        if bends:
+            relax(graph, distance[i], ways, queue, found)
+    return used
 
 
-@kernel
-def distance_table(scene: Scene, px: Array, py: Array, qx: Array, qy: Array) -> Array:
-    """Return the distances of (n,) sources and (m,) targets, (n, m), inf where no way leads."""
-    fans = fans_of(scene.tree, px, py, np.full(len(px), np.inf), BINS)
-    n, m, count = len(px), len(qx), len(scene.corners.x)
-    last, before = np.empty((m, count)), np.empty(count, dtype=np.int64)
-    for j in range(m):
-        target = fans_of(scene.tree, qx[j : j + 1], qy[j : j + 1], np.full(1, np.inf), BINS)
-        last[j] = corner_reach(scene, target, 0)
-    table = np.empty((n, m))
-    for i in range(n):
-        reach = corner_reach(scene, fans, i)
-        relax(scene.graph, reach, before)
-        for j in range(m):
+@inner_kernel
+def _shortest(
+    walls: Walls, index: AngularWallIndex, reach: Array, points: Array, last: Array, table: Array
+) -> None:
+    """Write the distances of sources and (m, 2) points, (n, m), by those to corners, (n, k) and (m, k)."""
+    for i in range(len(reach)):
+        for j in range(len(points)):
             best = np.inf
-            if sees(scene.tree, fans, i, qx[j], qy[j]):
-                dx, dy = qx[j] - px[i], qy[j] - py[i]
+            if sees(walls, index, i, points[j, 0], points[j, 1]):
+                dx, dy = points[j, 0] - index.sources[i, 0], points[j, 1] - index.sources[i, 1]
                 best = np.sqrt(dx * dx + dy * dy)
-            for k in range(count):
-                best = min(best, reach[k] + last[j, k])
+            for k in range(reach.shape[1]):
+                best = min(best, reach[i, k] + last[j, k])
             table[i, j] = best
-    return table
 
 
-@kernel
-def corners_between(scene: Scene, x: Array, y: Array) -> tuple[bool, IntArray]:
-    """Return whether a way leads from the first of two points to the second, and where it bends."""
-    fans = fans_of(scene.tree, x, y, np.full(2, np.inf), BINS)
-    if sees(scene.tree, fans, 0, x[1], y[1]):
-        return True, np.empty(0, dtype=np.int64)
-    distance, before = corner_reach(scene, fans, 0), np.full(len(scene.corners.x), -1)
-    relax(scene.graph, distance, before)
-    total = distance + corner_reach(scene, fans, 1)
-    if not np.any(total < np.inf):
-        return False, np.empty(0, dtype=np.int64)
-    chain, length = np.empty(len(total), dtype=np.int64), 0
-    k = np.argmin(total)
-    while k >= 0:
-        chain[length] = k
-        length += 1
-        k = before[k]
-    return True, chain[:length][::-1].copy()
+def with_room(
+    n: int, bins: int, fill: Callable[[AngularWallIndex, IntArray, Array], int]
+) -> tuple[AngularWallIndex, IntArray, Array]:
+    """Return an index of n sources, and what filling it writes of numbers, (used, 3), and lengths, (used, 2).
+
+    `fill` returns how many rows it used, and is called with more and more room until that is not negative.
+    """
+    entries, used = 64 * n + 4 * bins, -1
+    while used < 0:
+        index = AngularWallIndex.room(n, bins, entries)
+        numbers, lengths = np.empty((entries, 3), np.int64), np.empty((entries, 2))
+        used = fill(index, numbers, lengths)
+        entries *= 2
+    return index, numbers[:used].copy(), lengths[:used].copy()
 
 
 class Geodesics:
@@ -217,44 +208,42 @@ class Geodesics:
 
     Attributes
     ----------
+    grid : Grid
+    free : MultiPolygon
+        The free space in grid coordinates, one polygon a component.
     walls : Walls
         Vertices, edges and corners, in grid coordinates.
-    scene : Scene
-        The same for kernels.
+    graph : Graph
     size : float, m
         Side of the square over the region's bounding box.
     corners : (k, 2) m
-        The corners.
     """
 
     def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
         self.size = max(high_x - low_x, high_y - low_y)
         self._name = environment.name
-        self.walls = Walls.of(environment.free, Grid.over(np.array([low_x, low_y]), self.size))
-        shapely.prepare(list(self.walls.free.geoms))
-        corners = self.walls.corners
-        x, y = corners.x, corners.y
-        self.corners = self.walls.grid.metres(np.column_stack([x, y]))
-        key = along_z_curve(*((part * 2.0 ** (16 - BITS)).clip(0, 65535).astype(np.int64) for part in (x, y)))
-        order = np.argsort(key, kind="stable")
-        boxes = boxes_around(x[order], y[order], x[order], y[order])
-        nothing = np.empty(0, dtype=np.int64)
-        graph = Graph(nothing, nothing, np.empty(0))
-        self.scene = Scene(wall_tree(self.walls, 2.0**BITS), corners, order, boxes, graph)
-        pieces = [np.empty((0, 2), dtype=np.int64)]
-        for begin in range(0, len(x), _BLOCK):
+        self.grid = Grid.over(np.array([low_x, low_y]), self.size)
+        self.free = shapely.transform(environment.free, self.grid.snap)
+        self.walls = walls_of(self.free)
+        self.corners = self.grid.metres(self.walls.corners[:, :2])
+        count = len(self.corners)
+        seen, pieces = np.empty(count, np.int64), [(np.empty((0, 3), np.int64), np.empty((0, 2)))]
+        for begin in range(0, count, _BLOCK):
             if beat is not None:
                 beat()
-            pieces.append(corner_links(self.scene, begin, min(begin + _BLOCK, len(x))))
-        links = np.concatenate(pieces)
-        links = np.concatenate([links, links[:, ::-1]])
-        one, other = links[np.lexsort((links[:, 1], links[:, 0]))].T
-        first = np.searchsorted(one, np.arange(len(x) + 1))
-        length = np.sqrt((x[one] - x[other]) ** 2 + (y[one] - y[other]) ** 2)
-        self.scene = self.scene._replace(graph=Graph(first, other.copy(), length))
+            part = begin, min(begin + _BLOCK, count), seen
+            found = with_room(
+                1, CORNER_BINS, lambda *room, part=part: _corner_links(self.walls, *part, *room)
+            )
+            pieces.append(found[1:])
+        links, lengths = map(np.concatenate, zip(*pieces, strict=True))
+        one, other = np.concatenate([links[:, :2], links[:, 1::-1]]).T
+        order = np.lexsort((other, one))
+        first = np.searchsorted(one[order], np.arange(count + 1))
+        self.graph = Graph(first, other[order], np.tile(lengths[:, 0], 2)[order])
 
-    def place(self, points: Array, what: str = "positions") -> tuple[Array, Array, BoolArray]:
+    def place(self, points: Array, what: str = "positions") -> tuple[Array, BoolArray]:
         """Return points in grid coordinates, those a hair outside the free space moved into it.
 
         Parameters
@@ -265,7 +254,7 @@ class Geodesics:
 
         Returns
         -------
-        x, y : (n,) grid steps
+        places : (n, 2) grid steps
         holds : (n, c)
             Which component's closure holds which point.
 
@@ -280,40 +269,51 @@ class Geodesics:
             raise InputError(
                 f"{what}: an array of shape {points.shape}, but one [x, y] in metres each was wanted"
             )
-        finite = np.asarray(np.isfinite(points).all(axis=1))
-        snapped = self.walls.grid.snap(np.where(finite[:, None], points, 0.0))
-        holds = self._holds(snapped)
-        for i in np.nonzero(~(finite & holds.any(axis=1)))[0]:
+        places = self.grid.snap(points)
+        # what is not finite is right of, or above, all walls
+        holds = self.winding(places) > 0
+        for i in np.flatnonzero(~holds.any(axis=1)):
             place = f"{what}[{i}] = [{points[i, 0]:.12g}, {points[i, 1]:.12g}]"
-            if not finite[i]:
+            if not np.isfinite(points[i]).all():
                 raise InputError(f"{place}: finite numbers were wanted")
-            moved = self._nearest_free(snapped[i])
-            depth = float(np.hypot(*(moved - snapped[i]))) * self.walls.grid.unit
+            moved = self._nearest_free(places[i])
+            depth = float(np.hypot(*(moved - places[i]))) * self.grid.unit
             if depth > 2.0 * GRID + 1e-9 * self.size:
                 raise InputError(
                     f"{place} is {depth:.3g} m outside the free space of map {self._name!r}; "
                     f"a point inside the boundary and outside every obstacle was wanted"
                 )
-            snapped[i] = moved
-            holds[i] = self._holds(moved[None])[0]
-        x, y = np.ascontiguousarray(snapped.T)
-        return x, y, holds
+            places[i] = moved
+            holds[i] = self.winding(moved[None])[0] > 0
+        return places, holds
 
-    def _holds(self, points: Array) -> BoolArray:
-        columns = [shapely.intersects_xy(part, points[:, 0], points[:, 1]) for part in self.walls.free.geoms]
-        return np.column_stack(columns)
+    def winding(self, places: Array) -> IntArray:
+        """Return how often components wind round (n, 2) grid points, (n, c): once inside, more on them."""
+        holds = np.empty((len(places), len(self.free.geoms)), dtype=np.int64)
+        locate(self.walls, np.ascontiguousarray(places), holds)
+        return holds
 
-    def _nearest_free(self, point: Array) -> Array:
+    def _nearest_free(self, place: Array) -> Array:
         """Return the nearest grid point of the closed free space, to within a few steps."""
-        line = shapely.shortest_line(self.walls.free, shapely.Point(point))
-        foot = np.rint(np.asarray(line.coords)[0])
+        line = shapely.shortest_line(self.free, shapely.Point(place))
+        foot = np.rint(shapely.get_coordinates(line)[0])
         # the foot on a slanted wall is no grid point: the nearest that is not behind the wall
-        steps = np.arange(-2, 3)
+        steps = np.arange(-2.0, 3.0)
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        around = around[self._holds(around).any(axis=1)]
-        if not len(around):
-            around = np.column_stack([self.walls.sectors.x, self.walls.sectors.y])
-        return np.asarray(around[np.hypot(*(around - point).T).argmin()])
+        around = around[(self.winding(around) > 0).any(axis=1)]
+        around = around if len(around) else self.walls.vertices
+        return np.asarray(around[np.hypot(*(around - place).T).argmin()])
+
+    def _to_corners(self, places: Array, *, bends: bool) -> tuple[AngularWallIndex, Array, IntArray]:
+        """Return views of (n, 2) places, their distances to the corners, (n, k), and the last one's ways."""
+        n, count = len(places), len(self.corners)
+        distance, ways = np.empty((n, count)), np.empty((count, 3), dtype=np.int64)
+        queue = np.empty((2, count + 1), np.int64)
+
+        def fill(index: AngularWallIndex, *_: object) -> int:
+            return int(_corner_distances(self.walls, index, self.graph, places, bends, distance, ways, queue))
+
+        return with_room(n, BINS, fill)[0], distance, ways
 
     def distances(self, sources: Array, targets: Array) -> Array:
         """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads.
@@ -323,9 +323,16 @@ class Geodesics:
         InputError
             When a point lies outside the free space.
         """
-        px, py, _ = self.place(sources, "sources")
-        qx, qy, _ = self.place(targets, "targets")
-        return np.asarray(distance_table(self.scene, px, py, qx, qy) * self.walls.grid.unit)
+        begins, _ = self.place(sources, "sources")
+        ends, _ = self.place(targets, "targets")
+        index, reach, _ = self._to_corners(begins, bends=True)
+        table = np.empty((len(begins), len(ends)))
+        for k in range(0, len(ends), _TARGETS):
+            some = ends[k : k + _TARGETS]
+            part = np.empty((len(begins), len(some)))
+            _shortest(self.walls, index, reach, some, self._to_corners(some, bends=False)[1], part)
+            table[:, k : k + _TARGETS] = part * self.grid.unit
+        return table
 
     def path(self, source: Array, target: Array) -> Array:
         """Return the way-points of a shortest path, (w, 2) m, both ends included; (0, 2) where none leads.
@@ -335,9 +342,17 @@ class Geodesics:
         InputError
             When an end lies outside the free space.
         """
-        x, y, _ = self.place(np.stack([source, target]), "ends of the path")
-        reached, bends = corners_between(self.scene, x, y)
-        if not reached:
+        ends, _ = self.place(np.stack([source, target]), "ends of the path")
+        index, reach, ways = self._to_corners(ends[:1], bends=True)
+        last, shortest = self._to_corners(ends[1:], bends=False)[1], np.empty((1, 1))
+        _shortest(self.walls, index, reach, ends[1:], last, shortest)
+        if np.isinf(shortest[0, 0]):
             return np.empty((0, 2))
-        ends = self.walls.grid.metres(np.column_stack([x, y]))
-        return np.concatenate([ends[:1], self.corners[bends], ends[1:]])
+        total = reach[0] + last[0]
+        chain: list[int] = []
+        if total.min(initial=np.inf) <= shortest[0, 0]:
+            chain = [int(total.argmin())]
+            while ways[chain[-1], 2] >= 0:
+                chain.append(int(ways[chain[-1], 2]))
+        metres = self.grid.metres(ends)
+        return np.concatenate([metres[:1], self.corners[chain[::-1]], metres[1:]])

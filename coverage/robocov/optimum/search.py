@@ -171,7 +171,7 @@ class _Search:
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
         self.cost, self.robots = cost, robots
         self.room = Room(environment.free, radius)
-        site_component = cost.geodesics.place(cost.points)[2].argmax(axis=1)
+        site_component = cost.geodesics.place(cost.points)[1].argmax(axis=1)
         sites = np.bincount(site_component, minlength=len(self.room.parts))
         fit = [k for k, part in enumerate(self.room.parts) if not part.is_empty and sites[k]]
         # components are in the order of their areas

@@ -6,7 +6,7 @@ import shapely
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.geodesic import Geodesics
-from robocov.geodesic.visibility import fans_of, pseudo_angle, sees
+from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle, sees
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
@@ -23,10 +23,19 @@ def test_pseudo_angles_grow_with_the_angle():
     assert values.max() <= 4.0
 
 
-def seen(geodesics, fans, x, y):
+def indexed(geodesics, points, reach, bins=64):
+    index, used = AngularWallIndex.room(len(points), bins, 5000 * len(points)), 0
+    for i, (x, y) in enumerate(points):
+        used = enter_walls(geodesics.walls, index, i, x, y, reach**2, used)
+        assert used >= 0
+    return index
+
+
+def seen(geodesics, index, targets):
     """Return which of the targets each source sees."""
-    tree = geodesics.scene.tree
-    return np.array([[sees(tree, fans, i, *q) for q in zip(x, y, strict=True)] for i in range(len(fans.x))])
+    return np.array(
+        [[sees(geodesics.walls, index, i, *q) for q in targets] for i in range(len(index.sources))]
+    )
 
 
 @pytest.mark.parametrize("bins", [1, 7, 64, 256])
@@ -34,33 +43,30 @@ def test_the_view_does_not_depend_on_the_number_of_bins(bins):
     rng = np.random.default_rng(2)
     rings = [rng.uniform(0.1, 0.9, 2) + 0.07 * np.array([[1, 0], [0, 1], [-1, 0.3]]) for _ in range(12)]
     geodesics = Geodesics(environment(*rings))
-    x, y = np.rint(rng.uniform(size=(2, 40)) * 2.0**48)
-    free = shapely.intersects_xy(geodesics.walls.free, x, y)
-    x, y = x[free], y[free]
-    source, target = np.indices((len(x), len(x))).reshape(2, -1)
-    lines = shapely.linestrings(np.stack([np.c_[x[source], y[source]], np.c_[x[target], y[target]]], axis=1))
-    expected = shapely.covers(geodesics.walls.free, lines) | (source == target)
+    points = np.rint(rng.uniform(size=(40, 2)) * 2.0**48)
+    points = points[shapely.intersects_xy(geodesics.free, *points.T)]
+    source, target = np.indices((len(points), len(points))).reshape(2, -1)
+    lines = shapely.linestrings(np.stack([points[source], points[target]], axis=1))
+    expected = shapely.covers(geodesics.free, lines) | (source == target)
     # within reach by the bins, beyond it along the segment
     for reach in (2.0**49, 2.0**46, 0.0):
-        fans = fans_of(geodesics.scene.tree, x, y, np.full(len(x), reach), bins)
-        np.testing.assert_array_equal(seen(geodesics, fans, x, y).ravel(), expected)
+        index = indexed(geodesics, points, reach, bins)
+        np.testing.assert_array_equal(seen(geodesics, index, points).ravel(), expected)
 
 
 def test_only_walls_within_reach_are_held():
     geodesics = Geodesics(environment([(0.7, 0.2), (0.8, 0.2), (0.8, 0.8), (0.7, 0.8)]))
-    (near_x, x), (near_y, y) = np.array([[0.6, 0.9], [0.5, 0.5]]) * 2.0**48
+    near, far = np.array([[0.6, 0.5], [0.9, 0.5]]) * 2.0**48
     for reach, walls in ((0.05, False), (0.31, True)):
-        place = np.array([near_x]), np.array([near_y]), np.array([reach * 2.0**48])
-        fans = fans_of(geodesics.scene.tree, *place, 64)
-        assert (fans.head >= 0).any() == walls
-        assert not sees(geodesics.scene.tree, fans, 0, x, y)
+        index = indexed(geodesics, [near], reach * 2.0**48)
+        assert (index.head >= 0).any() == walls
+        assert not seen(geodesics, index, [far])
 
 
 def test_a_source_on_a_wall_does_not_see_through_it():
     geodesics = Geodesics(environment([(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)]))
-    x, y = np.array([0.25, 0.5, 0.25, 0.75]) * 2.0**48, np.array([0.5, 0.75, 0.25, 0.75]) * 2.0**48
-    fans = fans_of(geodesics.scene.tree, x, y, np.full(4, np.inf), 64)
-    target = np.array([[0.875, 0.5], [0.125, 0.5], [0.25, 0.875], [0.5, 0.875], [0.5, 0.125]]) * 2.0**48
-    found = seen(geodesics, fans, *target.T)
+    sources = np.array([[0.25, 0.5], [0.5, 0.75], [0.25, 0.25], [0.75, 0.75]]) * 2.0**48
+    targets = np.array([[0.875, 0.5], [0.125, 0.5], [0.25, 0.875], [0.5, 0.875], [0.5, 0.125]]) * 2.0**48
+    found = seen(geodesics, indexed(geodesics, sources, np.inf), targets)
     assert found[0].tolist() == [False, True, True, False, False]
     assert found[1].tolist() == [False, False, True, True, False]

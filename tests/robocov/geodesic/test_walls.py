@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import Environment, PolygonObstacle
+from robocov.geodesic.walls import Grid, cross, locate, useful, vertex_at, walls_of
+
+SIZE = 8.0
+
+
+def box(x0, y0, x1, y1):
+    return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+
+
+HALL = box(0, 0, 8, 8)
+
+
+def walls(*obstacles, boundary=HALL):
+    where = Environment("test", boundary, tuple(PolygonObstacle(ring) for ring in obstacles))
+    return walls_of(shapely.transform(where.free, Grid.over(np.zeros(2), SIZE).snap))
+
+
+def corners(walls):
+    return sorted(map(tuple, (walls.corners[:, :2] * SIZE / 2.0**48).tolist()))
+
+
+def hiding(walls):
+    return int(walls.facts[:, 2].sum())
+
+
+def test_an_empty_square_has_neither_corners_nor_walls_that_hide():
+    empty = walls()
+    assert len(empty.corners) == hiding(empty) == 0
+    assert len(empty.sectors) == len(empty.ends) == 4
+
+
+def test_corners_are_where_free_space_turns_round_an_obstacle():
+    pillar = walls(box(3, 3, 5, 5))
+    assert corners(pillar) == [(3, 3), (3, 5), (5, 3), (5, 5)]
+    assert hiding(pillar) == 4
+    room = walls(boundary=((0, 0), (8, 0), (8, 4), (4, 4), (4, 8), (0, 8)))
+    assert corners(room) == [(4, 4)]
+    assert hiding(room) == 2
+
+
+def test_vertices_in_line_are_no_corners():
+    pillar = walls(((3, 3), (4, 3), (5, 3), (5, 5), (3, 5)))
+    assert corners(pillar) == [(3, 3), (3, 5), (5, 3), (5, 5)]
+
+
+@pytest.mark.parametrize("touching", [box(5, 5, 7, 7), ((5, 5), (7, 5), (6, 7))])
+def test_a_pinch_has_two_narrow_sectors_and_no_corner(touching):
+    pinch = walls(box(3, 3, 5, 5), touching)
+    at = vertex_at(pinch.vertices, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
+    sectors = pinch.sectors[slice(*pinch.first[at : at + 2])]
+    assert len(sectors) == 2
+    assert (5.0, 5.0) not in corners(pinch)
+    assert not sectors[:, 4].any()
+
+
+def test_a_straight_wall_past_a_pinch_is_a_corner():
+    line = walls(((1, 1), (3, 1), (2, 3)), box(3, 1, 6, 4))
+    assert (3.0, 1.0) in corners(line)
+
+
+def test_useful_points_of_a_corner_are_those_beside_its_walls():
+    room = walls(boundary=((0, 0), (8, 0), (8, 4), (4, 4), (4, 8), (0, 8)))
+    points = {
+        (6, 2): True,
+        (2, 6): True,
+        (8, 4): True,
+        (4, 8): True,
+        (4, 4): True,
+        (4, 2): True,
+        (2, 4): True,
+        (2, 2): False,
+        (3.999, 3.999): False,
+        (6, 6): False,
+        (4.001, 6): False,
+    }
+    x, y = (np.array(list(points)) / SIZE * 2.0**48).T
+    found = [useful(room.corners, 0, *point) for point in zip(x, y, strict=True)]
+    assert found == list(points.values())
+
+
+def test_vertices_are_found_by_their_place():
+    pillar = walls(box(3, 3, 5, 5))
+    for number, (x, y) in enumerate(pillar.vertices):
+        assert vertex_at(pillar.vertices, x, y) == number
+        assert vertex_at(pillar.vertices, x + 1, y) == vertex_at(pillar.vertices, x, y - 1) == -1
+
+
+def test_points_are_inside_outside_or_on_the_boundary():
+    pinch = walls(box(3, 3, 5, 5), box(5, 5, 7, 7), box(0, 4, 3.5, 4.5), box(7, 4, 8, 6))
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(-1, 10, 0.5), np.arange(-1, 10, 0.5)))
+    points = np.column_stack([x, y]) / SIZE * 2.0**48
+    where = Environment(
+        "test",
+        HALL,
+        tuple(map(PolygonObstacle, (box(3, 3, 5, 5), box(5, 5, 7, 7), box(0, 4, 3.5, 4.5), box(7, 4, 8, 6)))),
+    )
+    holds = np.empty((len(points), len(where.free.geoms)), dtype=np.int64)
+    locate(pinch, points, holds)
+    for k, part in enumerate(where.free.geoms):
+        np.testing.assert_array_equal(holds[:, k] > 0, shapely.intersects_xy(part, x, y))
+        np.testing.assert_array_equal(holds[:, k] == 1, shapely.contains_xy(part, x, y))
+
+
+whole = st.integers(-(2**49), 2**49)
+
+
+@settings(max_examples=300, deadline=None)
+@given(whole, whole, st.integers(-3, 3), st.integers(-3, 3), st.integers(1, 5), whole, whole)
+def test_the_side_of_a_line_is_exact(ux, uy, near_x, near_y, multiple, wx, wy):
+    pairs = [(ux // 5 * multiple + near_x, uy // 5 * multiple + near_y), (wx, wy)]
+    for vx, vy in pairs:
+        value = cross(*map(float, (ux, uy, vx, vy)))
+        exact = ux * vy - uy * vx
+        assert np.sign(value) == (exact > 0) - (exact < 0)
+        assert value == pytest.approx(exact, rel=1e-12, abs=2.0**50)
+
+
+def test_the_grid_keeps_dyadic_numbers():
+    grid = Grid.over(np.array([-3.0, 5.0]), 10.0)
+    points = np.array([[-2.875, 5.5], [7.0, 14.99]])
+    assert grid.unit == 2.0**-44
+    np.testing.assert_allclose(grid.metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
+    np.testing.assert_array_equal(grid.metres(grid.snap(points))[0], points[0])
