@@ -87,7 +87,7 @@ class RangeSensor:
         (n, 2) m
             nan where nothing is in range.
         """
-        points = np.array(positions, dtype=float, order="C")
+        points = np.array(positions, dtype=float)
         if self._addresses is not None:
             _nearest(self._addresses, points, ranges, np.empty(6))
             return points

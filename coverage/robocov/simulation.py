@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -257,12 +258,13 @@ class Simulation:
         return Scans(distances, hit)
 
     def _decided(self, seen: Observations) -> Decision:
+        count, name = len(self.team), self.controller.name
+        if self._built_in:
+            return checked_decision(self._law.decide(seen, self._memory), count, name, seen.time)
         # a user's controller may change what it is given, and use again what it gave
-        ours = self._built_in or not remembers(self.controller)
-        memory = self._memory if ours else _copied(self._memory)
-        made = self._asked(self._law.decide, seen, memory)
-        decision = checked_decision(made, len(self.team), self.controller.name, seen.time)
-        return decision if self._built_in else detached(decision, self.controller.name)
+        memory = _copied(self._memory) if remembers(self.controller) else self._memory
+        made = self._asked(self._law.decide, replace(seen), memory)
+        return detached(checked_decision(made, count, name, seen.time), name)
 
     def _asked(self, question: Callable[..., Any], *args: Any) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
@@ -293,13 +295,14 @@ class Simulation:
             When the controller returns anything but finite forces of shape (n, 2), or the external
             forces are not.
         """
-        decision, inbox = self.snapshot.decision, self.snapshot.inbox
-        external_forces = given_forces(external_forces, len(self.team), "external_forces")
-        forces = given_forces(forces, len(self.team), "forces")
-        self._world.step(
-            decision.forces if forces is None else forces, self.dt, external_forces, time=self.time
-        )
-        self._memory, self._inbox = decision.memory, inbox
+        snapshot = self.snapshot
+        decision = snapshot.decision
+        count = len(self.team)
+        if external_forces is not None:
+            external_forces = given_forces(external_forces, count, "external_forces")
+        forces = decision.forces if forces is None else given_forces(forces, count, "forces")
+        self._world.step(forces, self.dt, external_forces, time=snapshot.seen.time)
+        self._memory, self._inbox = decision.memory, snapshot.inbox
         self._steps += 1
         self._begin_step()
 

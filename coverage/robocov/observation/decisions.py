@@ -15,36 +15,25 @@ from robocov.observation.observations import Decision
 
 
 def checked_decision(made: Any, count: int, controller: str, time: float) -> Decision:
-    """Return the decision when it is one that can be carried out and recorded.
-
-    Parameters
-    ----------
-    made : object
-        What the controller returned.
-    count : int
-        Number of robots.
-    controller : str
-        Its name.
-    time : float, s
+    """Return what a controller decided for `count` robots if it can be carried out and recorded.
 
     Raises
     ------
     ParameterError
         When it is no decision, or its forces are not finite and (n, 2).
     """
-    where = f"controller {controller!r}"
     if not isinstance(made, Decision):
-        raise ParameterError(f"{where}: decide gave {shown(made)}, but a Decision was wanted")
+        wanted = "but a Decision was wanted"
+        raise ParameterError(f"controller {controller!r}: decide gave {shown(made)}, {wanted}")
     decision: Decision = made
-    forces = _rows(decision.forces, count, f"{where}: forces")
-    goals = None if decision.goals is None else _rows(decision.goals, count, f"{where}: goals")
+    forces = _rows(decision.forces, count, "forces", controller)
+    goals = None if decision.goals is None else _rows(decision.goals, count, "goals", controller)
     if forces is not decision.forces or goals is not decision.goals:
         decision = replace(decision, forces=forces, goals=goals)
-    # the sum of squares is finite if all are, and quicker to know; too large forces are looked at again
-    if not isfinite(np.vdot(forces, forces)) and not np.isfinite(forces).all():
+    if not _finite(forces):
         robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
         raise ParameterError(
-            f"{where}: force {forces[robot].tolist()} on robot {robot + 1} "
+            f"controller {controller!r}: force {forces[robot].tolist()} on robot {robot + 1} "
             f"at {time:.3f} s, but finite newtons were wanted"
         )
     return decision
@@ -52,12 +41,6 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
 
 def detached(decision: Decision, controller: str) -> Decision:
     """Return a checked decision with arrays of its own: a user's controller may use its arrays again.
-
-    Parameters
-    ----------
-    decision : Decision
-    controller : str
-        Its name.
 
     Raises
     ------
@@ -72,28 +55,32 @@ def detached(decision: Decision, controller: str) -> Decision:
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
 
 
-def given_forces(values: Array | None, count: int, what: str) -> Array | None:
-    """Return forces from outside, (n, 2) N, when they can be carried out; None where there are none.
+def given_forces(values: Any, count: int, what: str) -> Array:
+    """Return forces from outside, (n, 2) N, if they can be carried out.
 
     Raises
     ------
     ParameterError
         When they are not finite and (n, 2).
     """
-    if values is None:
-        return None
-    values = _rows(values, count, what)
-    if not np.isfinite(values).all():
-        raise ParameterError(f"{what}: {shown(values.tolist())}, but finite newtons were wanted")
-    return values
+    forces = _rows(values, count, what)
+    if not _finite(forces):
+        raise ParameterError(f"{what}: {shown(forces.tolist())}, but finite newtons were wanted")
+    return forces
 
 
-def _rows(values: Any, count: int, what: str) -> Array:
+def _finite(forces: Array) -> bool:
+    # a sum of squares is soon known, and finite if they are, unless they are huge
+    return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
+
+
+def _rows(values: Any, count: int, what: str, controller: str | None = None) -> Array:
     """Return two numbers for each robot as an array, the same one where it is one already."""
     try:
         array = np.asarray(values, dtype=np.float64)
+        if array.shape == (count, 2):
+            return array
+        found = f" of shape {array.shape}, but {(count, 2)} was wanted"
     except (TypeError, ValueError):
-        raise ParameterError(f"{what}: {shown(values)}, but numbers were wanted") from None
-    if array.shape != (count, 2):
-        raise ParameterError(f"{what} of shape {array.shape}, but {(count, 2)} was wanted")
-    return array
+        found = f": {shown(values)}, but numbers were wanted"
+    raise ParameterError((what if controller is None else f"controller {controller!r}: {what}") + found)

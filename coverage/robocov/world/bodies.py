@@ -88,10 +88,8 @@ class World:
         self._moving = motion(movers, 0.0, 1.0)
         self._row: dict[int, int] = {}
         self._contacts: ContactSolver | None = None
-        self._dt = math.nan
         self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
-        self._max_speed = float(team.max_speed.max())
-        self._smallest, self._largest = float(team.radius.min()), float(team.radius.max())
+        self._planned = self._answered = math.nan
 
     @property
     def positions(self) -> Array:
@@ -128,17 +126,23 @@ class World:
         """
         if external_forces is not None:
             external_forces = np.array(external_forces, dtype=float)
-        fastest = self._max_speed
         if external_forces is not None or self._fast:
-            fastest = max(fastest, float((self._speeds() + self._gain(external_forces, dt)).max()))
-        fastest += self._fastest_mover
-        # a robot must not cross a thin wall within one substep
-        parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(fastest * dt / self._smallest))
+            parts = self._substeps(dt, float((self._speeds() + self._gain(external_forces, dt)).max()))
+        else:
+            if self._planned != dt:
+                self._planned, self._usual_substeps = dt, self._substeps(dt)
+            parts = self._usual_substeps
         for part in range(parts):
             if self._movers:
                 self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
                 self._write_state(self._engine)
             self._substep(forces, dt / parts, external_forces)
+
+    def _substeps(self, dt: float, speed: float = 0.0) -> int:
+        """Return of how many substeps a step consists: a robot must not cross a thin wall within one."""
+        fastest = max(float(self.team.max_speed.max()), speed) + self._fastest_mover
+        crossing = fastest * dt / float(self.team.radius.min())
+        return max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(crossing))
 
     def _speeds(self) -> Array:
         return np.asarray(np.hypot(self._velocities[:, 0], self._velocities[:, 1]))
@@ -165,7 +169,7 @@ class World:
             body.position = tuple(place)
             space.add(body, disc)
             self._row[body.id] = row
-        engine = Engine(space, len(self._movers) + len(self.team) + 1)
+        engine = Engine(space, len(self._movers), len(self.team))
         self._write_state(engine)
         return engine
 
@@ -177,8 +181,8 @@ class World:
 
     def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
         engine = self._engine
-        if dt != self._dt:
-            self._dt, self._response = dt, response(self.team, dt)
+        if self._answered != dt:
+            self._answered, self._response = dt, response(self.team, dt)
         answer, limit = self._response, self.team.max_speed
         if self._fast:
             # who is faster than it can be by itself brakes
@@ -188,7 +192,7 @@ class World:
         if external_forces is not None:
             limit = np.maximum(limit, self._speeds() + self._gain(external_forces, dt))
         state = np.empty((2, len(forces), 2))
-        engine.forces[len(self._movers) : -1] = forces
+        engine.robots[:] = forces
         external = _NONE if external_forces is None else external_forces
         _free_substep(
             engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
@@ -204,12 +208,13 @@ class World:
 
     def _touching(self) -> list[int]:
         """Return the robots that touched something in the last free substep."""
-        return sorted({self._row[body] for body in self._engine.touching() if body in self._row})
+        touching = self._engine.touching()
+        return sorted({self._row[body] for body in touching if body in self._row}) if touching else []
 
     def _set_state(self, state: Array) -> None:
         # whoever gets it, a controller or a record, must not change it
         state.setflags(write=False)
-        self._positions, self._velocities = state
+        self._positions, self._velocities = state[0], state[1]
 
     def _resolve_contacts(self, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
         """Move robots again that touch something, and with them whoever they are moved against.
@@ -220,16 +225,15 @@ class World:
         self._contacts = None  # it is of no use once it was interrupted
         if solver is None:
             solver = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
-        begin, radius = len(self._movers), self.team.radius
+        net, radius = self._engine.robots, self.team.radius
         before = np.hstack([self._positions, self._velocities])
-        net = self._engine.forces[begin:]
         while True:
             moved = solver.moved(rows, before[rows], net[rows], self._moving, dt)
             state = free.copy()
             state[0, rows] = moved[:, :2]
             resolved = np.zeros(len(before), dtype=bool)
             resolved[rows] = True
-            first, second, distance = close_pairs(state[0], 2.0 * self._largest)
+            first, second, distance = close_pairs(state[0], 2.0 * float(radius.max()))
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
             if not reached.any():
                 break

@@ -59,7 +59,7 @@ class ContactSolver:
         # the part of an overlap that is left after a second: none after a substep; only what a moving
         # obstacle has run over is deep, and comes out of it gradually
         self._space.collision_bias = 1e-9 if movers else 0.0
-        self._engine = Engine(self._space, len(movers) + len(team) + 1)
+        self._engine = Engine(self._space, len(movers), len(team))
         self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
         self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
         self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}

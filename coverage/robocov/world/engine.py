@@ -23,12 +23,14 @@ _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 
 
 class Engine:
-    """Access to the bodies of a space: dynamic and kinematic ones as they were added, then the static one.
+    """Access to the bodies of a space: obstacles that move, robots as they were added, and the static body.
 
     Attributes
     ----------
     forces : (bodies, 2) N
         To be written with `transfer`; pymunk forgets them after each step.
+    robots : (n, 2) N
+        Those of the robots, the same array.
     states : (bodies, 4) m and m/s
         Positions and velocities, written or read.
     addresses : (7,)
@@ -37,8 +39,10 @@ class Engine:
         How far `forces`, first, and `states`, fifth, have been gone through.
     """
 
-    def __init__(self, space: pymunk.Space, bodies: int) -> None:
+    def __init__(self, space: pymunk.Space, movers: int, robots: int) -> None:
+        bodies = movers + robots + 1
         self.forces, self.states = np.zeros((bodies, 2)), np.zeros((bodies, 4))
+        self.robots = self.forces[movers:-1]
         floats, batches = ffi.new("pmFloatArray[2]"), ffi.new("pmBatchedData[3]")
         self._touching = ffi.gc(lib.pmIntArrayNew(0), lib.pmIntArrayFree)
         for k, values in enumerate((self.forces, self.states)):
@@ -56,7 +60,7 @@ class Engine:
         )
         # what is only pointed to
         self._space, self._floats, self._batches = space, floats, batches
-        self._of_arbiter = function("pmSpaceArbiterIteratorFuncBatched")
+        self._of_arbiters = space._space, function("pmSpaceArbiterIteratorFuncBatched"), batches + 2
 
     def write(self, values: int) -> None:
         """Set `FORCES` or `STATES` of all bodies."""
@@ -68,10 +72,10 @@ class Engine:
 
     def touching(self) -> list[int]:
         """Return the ids of the bodies that touched another one in the last step, in pairs."""
-        self._touching.num = 0
-        lib.cpSpaceEachCachedArbiter(self._space._space, self._of_arbiter, self._batches + 2)
-        count = self._touching.num
-        return list(ffi.unpack(self._touching.arr, count)) if count else []
+        found = self._touching
+        found.num = 0
+        lib.cpSpaceEachCachedArbiter(*self._of_arbiters)
+        return list(ffi.unpack(found.arr, found.num)) if found.num else []
 
 
 def function(name: str) -> Any:

@@ -33,10 +33,14 @@ def solid_pieces(environment: Environment) -> tuple[Array, ...]:
     They cover the obstacles, the region outside a non-convex boundary, and a frame of thickness
     `FRAME` around the region; they do not overlap. Obstacles that move are not among them: see `movers`.
     """
-    environment = environment.static
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
-    return convex_pieces(shapely.difference(frame, environment.free))
+    kept = vars(environment.static)
+    # as a cached property would, which an environment, that knows of no engine, cannot have
+    if "_solid_pieces" not in kept:
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
+        kept["_solid_pieces"] = convex_pieces(shapely.difference(frame, environment.static.free))
+    pieces: tuple[Array, ...] = kept["_solid_pieces"]
+    return pieces
 
 
 class Mover(NamedTuple):
