@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information
-from robocov.controllers.driving import approach, drive, limit_approach_speed, offsets_from_neighbours
+from robocov.controllers.driving import approach, avoid, drive, offsets_from_neighbours
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
@@ -412,11 +412,10 @@ class Atlas:
         last = np.array([len(route) - 1 for route in routes])
         legs = memory.legs + ((memory.legs < last) & (np.hypot(*(aim - positions).T) < _TURN))
         aim = np.array([route[leg] for route, leg in zip(routes, legs.tolist(), strict=True)])
-        walls = positions[:, None] - with_nearest(seen, memory.returns)
-        others = offsets_from_neighbours(seen, _HEEDED)
+        points = with_nearest(seen, memory.returns)
         # what is behind a corner comes into sight late: in a narrow place nothing is far
         braking = _BRAKING * team.max_acceleration
-        gap = np.maximum(np.hypot(*walls[:, 0].T) - team.radius, 0.0)
+        gap = np.maximum(np.hypot(*(positions - seen.obstacle_points).T) - team.radius, 0.0)
         speed = np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _CREEP)
         wanted = approach(aim - positions, math.inf, speed)
         wanted = np.where((legs == last)[:, None], approach(aim - positions, self.k_prop, speed), wanted)
@@ -424,14 +423,10 @@ class Atlas:
         change = _FOR_TURNING * team.max_acceleration * self.response_time
         wanted = seen.velocities + approach(wanted - seen.velocities, 1.0, change)
         # of the size of others a robot knows its own
-        apart = (2.0 * team.radius + _APART)[:, None]
-        wanted = wanted + _aside(wanted, others, apart, braking)
-        robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
-        clearance = np.where(robots, apart, (team.radius + _MARGIN)[:, None])
-        # of two robots each brakes for its half of the way
-        each = braking[:, None] * np.where(robots, 0.25, 1.0)
-        close = np.concatenate([others, walls], axis=1)
-        wanted = limit_approach_speed(wanted, close, clearance, _EAGERNESS, each, team.max_speed)
+        apart = 2.0 * team.radius + _APART
+        wanted = wanted + _aside(wanted, offsets_from_neighbours(seen, _HEEDED), apart, braking)
+        keep = team.radius + _MARGIN
+        wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, _BRAKING)
         forces = drive(wanted, seen, team, self.response_time)
         goals = np.array([route[-1] for route in routes])
         memory = replace(memory, legs=legs)
@@ -444,7 +439,7 @@ def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:
         return np.zeros_like(wanted)
     distance = np.hypot(*np.moveaxis(others, -1, 0))
     away = others / np.maximum(distance, 1e-9)[..., None]
-    allowed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - apart, 0.0))
+    allowed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - apart[:, None], 0.0))
     excess = np.nan_to_num(-(away * wanted[:, None]).sum(axis=2) - allowed, nan=-np.inf)
     worst = np.arange(len(wanted)), excess.argmax(axis=1)
     left = np.nan_to_num(away[worst])[:, ::-1] * [1.0, -1.0]

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers.driving import drive, limit_approach_speed, offsets_from_neighbours, summed
+from robocov.controllers.driving import avoid, drive, summed
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
@@ -89,15 +89,10 @@ class Dispersion:
         team = memory.team
         returns = last_returns(seen, memory.returns)
         largest = float(team.radius.max())
-        others = offsets_from_neighbours(seen, 2.0 * largest + self.clearance + 1.0)
-        walls = seen.positions[:, None] - with_nearest(seen, returns)
-        robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
-        clearance = np.where(robots, self.clearance + largest, self.clearance)[None]
-        # of two robots each brakes for its half of the way
-        braking = np.where(robots, 0.25, 0.5) * team.max_acceleration[:, None]
-        close = np.concatenate([others, walls], axis=1)
+        keep = np.full(len(team), self.clearance)
+        points = with_nearest(seen, returns)
         wanted = self._dispersing(seen, team)
-        wanted = limit_approach_speed(wanted, close, clearance, self.k_avoid, braking, team.max_speed)
+        wanted = avoid(wanted, seen, team, points, keep, keep + largest, self.k_avoid, 0.5)
         forces = drive(wanted, seen, team, self.response_time)
         return Decision(forces=forces, terms={"attraction": forces}, memory=DispersionMemory(team, returns))
 

@@ -27,6 +27,33 @@ def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
 
 
+def avoid(
+    wanted: Array,
+    seen: Observations,
+    team: Team,
+    points: Array,
+    clearance: Array,
+    apart: Array,
+    rate: float,
+    braking: float,
+) -> Array:
+    """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards points and robots.
+
+    Obstacle points, (n, k, 2) m, are kept a clearance, (n,) m, off, other robots `apart`, (n,) m, centre to
+    centre; `braking` is the part of the acceleration that is counted on. See `limit_approach_speed`.
+    """
+    # of two robots each brakes for its half of the way
+    slow, half = braking * team.max_acceleration, 0.5 * braking * team.max_acceleration
+    # whom a robot at full speed need not brake for is far
+    reach = float((apart + np.maximum(team.max_speed / rate, team.max_speed**2 / (2.0 * half))).max())
+    others, walls = offsets_from_neighbours(seen, reach), seen.positions[:, None] - points
+    robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
+    keep = np.where(robots, apart[:, None], clearance[:, None])
+    close = np.concatenate([others, walls], axis=1)
+    each = np.where(robots, half[:, None], slow[:, None])
+    return limit_approach_speed(wanted, close, keep, rate, each, team.max_speed)
+
+
 def limit_approach_speed(
     wanted: Array, away: Array, clearance: Array, rate: float, braking: Array, speed: Array
 ) -> Array:
@@ -52,12 +79,10 @@ def limit_approach_speed(
     # leading out is worth less than full speed, which would leave no room for anything else
     level = np.maximum(level, -0.5 * speed[:, None])
     slowed, feasible = nearest_allowed(wanted, -normal, level, speed)
-    held = np.flatnonzero(~feasible)
-    if len(held):
-        slowed[held], _ = nearest_allowed(
-            wanted[held], -normal[held], np.maximum(level[held], 0.0), speed[held]
-        )
-    return slowed
+    if feasible.all():
+        return slowed
+    stopped, _ = nearest_allowed(wanted, -normal, np.maximum(level, 0.0), speed)
+    return np.where(feasible[:, None], slowed, stopped)
 
 
 @kernel

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
-from robocov.controllers.bug import Bug, Look, Mode
+from robocov.arrays import Array, ComplexArray, frozen
+from robocov.compiled import kernel
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import drive, limit_approach_speed, offsets_from_neighbours
+from robocov.controllers.driving import avoid, drive
 from robocov.controllers.gains import gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
-from robocov.controllers.tangents import free_distances
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings
@@ -25,6 +26,87 @@ _GRAIN = 0.1
 
 _EAGERNESS = 4.0
 """Speed in 1/s with which the distance to what is close may fall to the clearance."""
+
+_BETTER = 0.2
+"""What counts as nearer to the goal must be so much nearer, m: else the modes take turns."""
+
+_BACK = 0.3
+"""Distance in metres at which a robot has come back to a place."""
+
+_ARRIVED = 0.05
+"""Distance in metres at which a robot has arrived."""
+
+_WALK = 1.0
+"""Way in metres along a boundary that is not worth trying."""
+
+_WANES = 0.9
+"""Part of its patience that is left to a robot after every goal that it has kept."""
+
+_TOUCHING = 0.95
+"""A point that is already nearer than the clearance is kept off by this part of its distance."""
+
+
+class Mode(Enum):
+    """What a robot is doing."""
+
+    GOAL = "motion to the goal"
+    BOUNDARY = "boundary following"
+    LEAVING = "leaving the boundary"
+    RETURN = "back to the point of the boundary that is nearest to the goal"
+    PROJECTED = "at that point"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bug:
+    """What one robot remembers of its way.
+
+    Attributes
+    ----------
+    mode : Mode
+    turn : {1, -1}
+        Which way round it looks for the end of what blocks it: counter-clockwise or clockwise.
+    way : (2,) m
+        Where it is heading now; when it is `passing` it goes on from there, and need not slow down.
+    aim : (2,) m or None
+        The goal that it keeps, since it met something on the way there; None while its goal moves.
+    best : (2,) m or None
+        Of all boundaries followed for that goal, and all places left for, the point nearest to it.
+    entered, last : (2,) m or None
+        Where it met the boundary that it follows, and where it was when it looked last.
+    followed, patience : float, m
+        Length of its way along that boundary, and the longest that it goes.
+    resting : (2,) m or None
+        The moving goal when it came to rest at `best`.
+    tries : int
+        How many goals it has kept so far.
+    """
+
+    mode: Mode
+    turn: int
+    way: Array
+    passing: bool = False
+    aim: Array | None = None
+    best: Array | None = None
+    entered: Array | None = None
+    last: Array | None = None
+    followed: float = 0.0
+    patience: float = math.inf
+    resting: Array | None = None
+    tries: int = 0
+
+    def before(self, position: Array, goal: Array, moved: float) -> Bug:
+        """Return the bug without the goal that it keeps, when that is done with and there is another one.
+
+        A robot that rests tries again when its goal has moved by so many metres, and more with every try.
+        """
+        if self.aim is None:
+            return self
+        done = math.dist(position, self.aim) < _ARRIVED
+        if self.mode is Mode.PROJECTED:
+            if self.resting is None and math.dist(position, self.way) < _ARRIVED:
+                return replace(self, resting=frozen(goal))
+            done = done or (self.resting is not None and math.dist(goal, self.resting) > moved * self.tries)
+        return Bug(Mode.GOAL, self.turn, self.way, tries=self.tries) if done else self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +121,7 @@ class TangentBugMemory:
     returns : (n, rays, 2) m or None
         What the last scan of each met.
     met : tuple of (w,)
-        The squares in which each has met something so far, as `_squares` counts them, ascending.
+        The squares in which each has met something so far: column + i row, ascending.
     triangulation : Triangulation or None
         From which the next cells start.
     """
@@ -47,7 +129,7 @@ class TangentBugMemory:
     team: Team
     bugs: tuple[Bug, ...] = ()
     returns: Array | None = None
-    met: tuple[IntArray, ...] = ()
+    met: tuple[ComplexArray, ...] = ()
     triangulation: Triangulation | None = None
 
 
@@ -84,9 +166,7 @@ class TangentBug:
     )
     scanning: ClassVar[Scanning] = Scanning(rays=120, period=0.1)
 
-    clearance: float = gain(
-        0.05, "m", "distance kept from obstacles and robots, beside the radius", high=10.0
-    )
+    clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
     detour: float | None = gain(
         4.0,
@@ -115,7 +195,7 @@ class TangentBug:
         returns = last_returns(seen, memory.returns)
         points = with_nearest(seen, returns)
         if not bugs or seen.scans is not None or returns is None:
-            met = _remembered(points, met)
+            met = tuple(_remembered(near, met[i : i + 1]) for i, near in enumerate(points))
             bugs = self._bugs(seen, memory, cells.centroid, points, met)
         # until the next scan, who has its centroid in view follows it
         direct = np.array([bug.aim is None and not bug.passing for bug in bugs])
@@ -139,15 +219,8 @@ class TangentBug:
         speed = np.where(passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
         speed = np.minimum(speed, distance / self.response_time)
         wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
-        largest = float(team.radius.max())
-        others = offsets_from_neighbours(seen, 4.0 * largest + 1.0)
-        walls = seen.positions[:, None] - points
-        robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
-        keep = (team.radius + 0.5 * self.clearance)[:, None] + np.where(robots, largest, 0.0)
-        # of two robots each brakes for its half of the way
-        braking = np.where(robots, 0.25, 0.5) * team.max_acceleration[:, None]
-        close = np.concatenate([others, walls], axis=1)
-        return limit_approach_speed(wanted, close, keep, _EAGERNESS, braking, team.max_speed)
+        keep = team.radius + 0.5 * self.clearance
+        return avoid(wanted, seen, team, points, keep, keep + float(team.radius.max()), _EAGERNESS, 0.5)
 
     def _bugs(
         self,
@@ -155,46 +228,227 @@ class TangentBug:
         memory: TangentBugMemory,
         goals: Array,
         points: Array,
-        met: tuple[IntArray, ...],
+        met: tuple[ComplexArray, ...],
     ) -> tuple[Bug, ...]:
-        team, directions = memory.team, headings(self.scanning.rays)
+        team, directions = memory.team, np.array(headings(self.scanning.rays))
         found = []
         for i, position in enumerate(seen.positions):
             bug = memory.bugs[i] if memory.bugs else Bug(Mode.GOAL, 1, position)
             bug = bug.before(position, goals[i], self.moved)
+            goal = (goals[i] if bug.aim is None else bug.aim) - position
             reach = min(float(team.sensing_range[i]), seen.region.diameter)
             keep = float(team.radius[i]) + self.clearance
             near = points[i] - position
-            look = Look(
-                position=position,
-                goal=(goals[i] if bug.aim is None else bug.aim) - position,
-                points=near,
-                walls=_middles(met[i]) - position,
-                directions=directions,
-                free=free_distances(near, directions, keep, reach),
-                keep=keep,
-                reach=reach,
-                grain=_GRAIN,
-                jump=self.jump,
-                detour=self.detour,
-            )
-            found.append(look.next(bug))
+            free = free_distances(near, directions, keep, reach)
+            walls = (np.column_stack([met[i].real, met[i].imag]) + 0.5) * _GRAIN - position
+            found.append(Look(self, position, goal, near, walls, directions, free, keep, reach).next(bug))
         return tuple(found)
 
 
-def _remembered(points: Array, met: tuple[IntArray, ...]) -> tuple[IntArray, ...]:
-    """Return the squares that each robot has met something in, with those of (n, k, 2) points."""
-    found = [np.unique(_squares(near[~np.isnan(near[:, 0])])) for near in points]
-    return tuple(np.union1d(old, new) for old, new in zip(met, found, strict=True)) if met else tuple(found)
+def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
+    """Return the squares that a robot has met something in, with those of (k, 2) points; nan for none."""
+    square = np.floor(points[~np.isnan(points[:, 0])] / _GRAIN)
+    return np.unique(np.concatenate([*met, square[:, 0] + 1j * square[:, 1]]))
 
 
-def _squares(points: Array) -> IntArray:
-    """Return numbers of the squares of (k, 2) points."""
-    column, row = np.floor(points / _GRAIN).astype(np.int64).T
-    return np.asarray((column << 32) + row + (1 << 31))
+class Gap(NamedTuple):
+    """An end of the contour that blocks the way: a node of the local tangent graph.
+
+    It is the first ray that passes it, and the point just past it, (2,) m from the robot.
+    """
+
+    ray: int
+    point: Array
 
 
-def _middles(squares: IntArray) -> Array:
-    """Return the middles of squares, (k, 2) m."""
-    row = (squares & 0xFFFFFFFF) - (1 << 31)
-    return np.asarray((np.column_stack([squares >> 32, row]) + 0.5) * _GRAIN)
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What one robot sees in one scan.
+
+    Attributes
+    ----------
+    law : TangentBug
+    position : (2,) m
+    goal : (2,) m
+        From the robot.
+    points : (m, 2) m
+        Obstacle points, from the robot; nan where a ray met nothing.
+    walls : (w, 2) m
+        All that it has met so far, from the robot, to within `_GRAIN`.
+    directions, free : (k, 2), (k,) m
+        Unit vectors evenly round a full turn, and how far the robot can go straight on along each.
+    keep, reach : float, m
+        Distance that its centre keeps from obstacles, and range of its sensor.
+    """
+
+    law: TangentBug
+    position: Array
+    goal: Array
+    points: Array
+    walls: Array
+    directions: Array
+    free: Array
+    keep: float
+    reach: float
+
+    def next(self, bug: Bug) -> Bug:
+        """Return what the robot does from now on."""
+        if self._in_view(self.goal) or (bug.mode is Mode.GOAL and self._ahead_is_free()):
+            return self._off(bug, Mode.GOAL, self.position + self.goal)
+        if bug.mode is Mode.PROJECTED:
+            return bug
+        if bug.mode is Mode.LEAVING:
+            there = bug.way - self.position
+            if _length(there) > _BACK and self._in_view(there):
+                return bug
+            # as good as reached: the next place to leave for must be nearer
+            bug = replace(bug, mode=Mode.GOAL, best=bug.way)
+        return self._to_goal(bug) if bug.mode is Mode.GOAL else self._along_boundary(bug)
+
+    def _off(self, bug: Bug, mode: Mode, way: Array, passing: bool = False) -> Bug:
+        """Return the bug on its way through free space."""
+        return replace(bug, mode=mode, way=frozen(way), passing=passing, entered=None, followed=0.0)
+
+    def _in_view(self, place: Array) -> bool:
+        """Return whether the robot can go straight to a place."""
+        far = _length(place)
+        return far < _ARRIVED or self._towards(place) >= far - 1e-9
+
+    def _ahead_is_free(self) -> bool:
+        """Return whether the robot can go as far towards its goal as it sees."""
+        return self._towards(self.goal) >= self.reach - 1e-9
+
+    def _towards(self, place: Array) -> float:
+        """Return how far the robot can go straight on towards a place, m."""
+        direction = place / max(_length(place), 1e-300)
+        return float(free_distances(self.points, direction[None], self.keep, self.reach)[0])
+
+    def _ends(self, towards: Array) -> dict[int, Gap]:
+        """Return the ends of the contour that blocks the view in a direction, by the turn to them."""
+        first, at = int((self.directions @ towards).argmax()), self._towards(towards)
+        found = {}
+        for turn in (1, -1):
+            end = end_of_contour(self.free, self.directions, first, turn, at, self.law.jump, self.reach)
+            if end is not None:
+                found[turn] = end
+        return found
+
+    def _to_goal(self, bug: Bug) -> Bug:
+        ends = self._ends(self.goal)
+        by_way_of = {turn: _length(end.point) + _length(self.goal - end.point) for turn, end in ends.items()}
+        # of two that are about as good, the one that it was going to
+        by_way_of = {turn: far - (_BETTER if turn == bug.turn else 0.0) for turn, far in by_way_of.items()}
+        distance = _length(self.goal)
+        nearer = [turn for turn, end in ends.items() if _length(self.goal - end.point) < distance]
+        if nearer:
+            turn = min(nearer, key=lambda turn: by_way_of[turn])
+            way = self.position + ends[turn].point
+            return self._off(replace(bug, turn=turn), Mode.GOAL, way, passing=True)
+        turn = min(ends, key=lambda turn: by_way_of[turn], default=bug.turn)
+        here, goal = frozen(self.position), frozen(self.position + self.goal)
+        tries = bug.tries + (bug.aim is None)
+        patience = np.inf if self.law.detour is None else self.law.detour * distance * _WANES**tries
+        bug = replace(bug, mode=Mode.BOUNDARY, turn=turn, passing=True, aim=goal, tries=tries)
+        bug = replace(bug, entered=here, last=here, followed=0.0, patience=float(patience))
+        inside = len(self.walls) and np.hypot(*(self.goal - self.walls).T).min() < self.keep + _GRAIN
+        if inside or patience < _WALK:
+            # the goal is in what the robot has met, or too close to it for any robot
+            return self._at_best(replace(bug, best=self._best(bug, ends)))
+        return self._along_boundary(bug)
+
+    def _along_boundary(self, bug: Bug) -> Bug:
+        entered = bug.entered
+        assert entered is not None and bug.last is not None
+        bug = replace(bug, followed=bug.followed + _length(self.position - bug.last), last=self.position)
+        distances = np.hypot(*self.points.T)
+        if np.isnan(distances).all():
+            return self._off(bug, Mode.GOAL, self.position + self.goal)
+        ends = self._ends(self.points[int(np.nanargmin(distances))])
+        # of a closed contour all is in view
+        end = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
+        best = self._best(bug, ends)
+        bug = replace(bug, way=frozen(self.position + end), best=best)
+        if bug.mode is Mode.RETURN:
+            lost = bug.followed > 3.0 * bug.patience
+            return self._at_best(replace(bug, best=frozen(self.position)) if lost else bug)
+        # every ray where it is nearest to the goal
+        along = np.clip(self.directions @ self.goal, 0.0, self.free)
+        left = np.hypot(*(self.goal - along[:, None] * self.directions).T)
+        ray = int(left.argmin())
+        if left[ray] < _length(self.position + self.goal - best) - _BETTER:
+            there = self.position + along[ray] * self.directions[ray]
+            return self._off(bug, Mode.LEAVING, there, passing=True)
+        round_once = bug.followed > 2.0 * np.pi * _BACK and _length(self.position - entered) < _BACK
+        if round_once or not ends or bug.followed > bug.patience:
+            # who has not been round goes back the way that it came
+            turn = bug.turn if round_once else -bug.turn
+            return self._at_best(replace(bug, mode=Mode.RETURN, turn=turn))
+        return bug
+
+    def _best(self, bug: Bug, ends: dict[int, Gap]) -> Array:
+        """Return the point of the boundary followed, and in view, that is nearest to the goal, (2,) m."""
+        seen = np.ones(len(self.free), dtype=bool)
+        if len(ends) == 2:
+            # from the one end round to the other
+            span = (ends[1].ray - ends[-1].ray - 1) % len(seen)
+            seen[:] = False
+            seen[(ends[-1].ray + 1 + np.arange(span)) % len(seen)] = True
+        places = self.free[seen, None] * self.directions[seen]
+        known = np.zeros(2) if bug.best is None else bug.best - self.position
+        places = np.concatenate([known[None], places])
+        return frozen(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
+
+    def _at_best(self, bug: Bug) -> Bug:
+        """Return the bug on the last piece of its way to the best point, when that is in view."""
+        assert bug.best is not None
+        there = bug.best - self.position
+        far, free = _length(there), self._towards(there)
+        # seen from here the boundary may be a little closer than it looked
+        if far < _ARRIVED or free >= far - self.keep:
+            way = frozen(self.position + there * min(1.0, free / max(far, 1e-300)))
+            return replace(bug, mode=Mode.PROJECTED, way=way, passing=False, entered=None, resting=None)
+        return bug if bug.mode is Mode.RETURN else replace(bug, mode=Mode.RETURN)
+
+
+@kernel
+def free_distances(points: Array, directions: Array, clearance: float, reach: float) -> Array:
+    """Return how far a disc can go straight on along each of (k, 2) directions, (k,) m, `reach` at most.
+
+    Its centre keeps a clearance (m) from (m, 2) m obstacle points, which are relative to it; nan where none.
+    """
+    result = np.empty(len(directions))
+    for k in range(len(directions)):
+        ahead_x, ahead_y = directions[k]
+        result[k] = reach
+        for x, y in points:
+            along = ahead_x * x + ahead_y * y
+            across = ahead_x * y - ahead_y * x
+            keep = min(clearance, _TOUCHING * math.sqrt(x * x + y * y))
+            depth2 = keep * keep - across * across
+            # nan is not above 0
+            if along > 0.0 and depth2 > 0.0:
+                result[k] = min(result[k], max(along - math.sqrt(depth2), 0.0))
+    return result
+
+
+def end_of_contour(
+    free: Array, directions: Array, first: int, turn: int, blocked_at: float, jump: float, reach: float
+) -> Gap | None:
+    """Return where the contour ends that blocks a ray, going round by `turn`; None when it is closed.
+
+    The `first` ray, of the (k,) m free ones in (k, 2) directions, is the nearest to the direction that is
+    blocked, `blocked_at` so many metres. The contour ends where the next ray is free for longer by `jump`,
+    or so far that it meets nothing, `reach`.
+    """
+    before = blocked_at
+    for step in range(len(free)):
+        ray = (first + turn * step) % len(free)
+        ahead = float(free[ray])
+        if ahead > before + jump or ahead >= reach:
+            return Gap(ray, directions[ray] * min(ahead, before + jump))
+        before = ahead
+    return None
+
+
+def _length(vector: Array) -> float:
+    return math.hypot(vector[0], vector[1])

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Lloyd, TangentBug
-from robocov.controllers.bug import Mode
-from robocov.controllers.tangents import end_of_contour, free_distances
+from robocov.controllers.tangentbug import Mode, end_of_contour, free_distances
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
