@@ -6,26 +6,23 @@ one that cannot be written is not written.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import io
 import os
 import struct
 import time
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import platformdirs
+from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
 from robocov.files.array_file import opened_arrays
 from robocov.files.atomic import written
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 _SUFFIX = ".robocov"
 
@@ -72,13 +69,11 @@ class ArrayCache:
         """Return a name for what is computed from these parts, a digest of their exact values."""
         digest = hashlib.blake2b(digest_size=20)
         for part in parts:
-            kind = type(part).__name__.encode()
             if isinstance(part, float):
                 data = struct.pack("<d", part)
             else:
                 data = part if isinstance(part, bytes) else str(part).encode()
-            digest.update(b"%s %d\n" % (kind, len(data)))
-            digest.update(data)
+            digest.update(b"%s %d\n" % (type(part).__name__.encode(), len(data)) + data)
         return digest.hexdigest()
 
     def load(self, key: str) -> dict[str, NDArray[Any]] | None:
@@ -93,7 +88,7 @@ class ArrayCache:
         start = len(_FORMAT) + _DIGEST
         payload = memoryview(data)[start:]
         if data[:start] != _FORMAT + _digest(payload):
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 path.unlink()
             return None
         # what was written whole can be read, except by a numpy that knows less than the writer's
@@ -104,7 +99,7 @@ class ArrayCache:
             return None
         for array in arrays.values():
             array.setflags(write=False)
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             os.utime(path)
         return arrays
 
@@ -131,8 +126,7 @@ class ArrayCache:
         """Remove what was not used for the longest time beyond the limit, and what was left half-written."""
         found: list[tuple[float, int, Path]] = []
         for path in self.folder.glob(f"*{_SUFFIX}"):
-            # another process may have been quicker
-            with contextlib.suppress(OSError):
+            with suppress(OSError):  # another process may have been quicker
                 status = path.stat()
                 if not path.name.startswith("."):
                     found.append((status.st_mtime, status.st_size, path))
@@ -142,7 +136,7 @@ class ArrayCache:
         for _, size, path in sorted(found):
             if total <= self.limit:
                 break
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 path.unlink()
             total -= size
 

@@ -7,18 +7,15 @@ import math
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from robocov.errors import InputError, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
 
 MOST_BYTES = 2_000_000_000
 """Bytes that the arrays of one file may take: about the largest run that can be asked for."""
@@ -51,14 +48,10 @@ class Header(NamedTuple):
 
 
 class ArrayFile:
-    """The arrays in an .npz file.
-
-    Attributes
-    ----------
-    headers : dict of name to Header
-    """
+    """The arrays in an .npz file: their `headers` by name, and how to read them."""
 
     def __init__(self, archive: zipfile.ZipFile, size: int, most_bytes: int) -> None:
+        self._archive = archive
         self._entries: dict[str, zipfile.ZipInfo] = {}
         self.headers: dict[str, Header] = {}
         entries = sorted(archive.infolist(), key=lambda entry: entry.header_offset)
@@ -72,11 +65,10 @@ class ArrayFile:
             name = entry.filename.removesuffix(".npy")
             if entry.header_offset + _LOCAL_HEADER + entry.compress_size > end:
                 raise ValueError(f"{shown(name)} overlaps what comes after it")
-            if name in self._entries:
+            if name in self.headers:
                 raise ValueError(f"{shown(name)} is there twice")
             self._entries[name] = entry
             self.headers[name] = _header_of(archive, entry, name)
-        self._archive = archive
 
     def read(self, name: str) -> NDArray[Any]:
         """Return an array."""
@@ -87,20 +79,10 @@ class ArrayFile:
 
 @contextmanager
 def opened_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> Iterator[ArrayFile]:
-    """Give the arrays in an .npz file; whatever is wrong with it while it is read is an error of one line.
+    """Give the arrays in an .npz file, which messages call `where`.
 
-    Parameters
-    ----------
-    file : binary file
-    where : str
-        What messages call it.
-    most_bytes : int
-        Of all arrays together.
-
-    Raises
-    ------
-    InputError
-        When it is none, is damaged, holds objects, or more than is good for the machine.
+    Whatever is wrong with it while it is read is an InputError of one line: also where it holds objects, or
+    more than is good for the machine.
     """
     try:
         size = file.seek(0, io.SEEK_END)

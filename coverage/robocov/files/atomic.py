@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from robocov.errors import OutputError, shown
+from robocov.errors import OutputError, reason, shown
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -49,12 +49,10 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
             part.chmod(stat.S_IMODE(real.stat().st_mode))
         part.replace(real)
     except OSError as error:
-        with suppress(OSError):  # where the folder is none, there is no part to be removed either
+        raise _refused(target, f"cannot be written: {reason(error)}") from error
+    finally:
+        with suppress(OSError):  # it is gone, or where the folder is none, there never was one
             part.unlink()
-        raise OutputError(f"{_told(target)}: cannot be written: {error.strerror or error}") from error
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def writable(target: Path) -> Path:
@@ -70,31 +68,23 @@ def writable(target: Path) -> Path:
         mode = real.stat().st_mode
     except FileNotFoundError as error:
         if target.is_symlink():
-            raise OutputError(f"{_told(target)}: is a link to nothing, but a file was wanted") from error
+            raise _refused(target, "is a link to nothing, but a file was wanted") from error
         return target
     except (OSError, RuntimeError, ValueError) as error:  # a circle of links was a RuntimeError before 3.13
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise OutputError(f"{_told(target)}: cannot be written: {reason}") from error
+        raise _refused(target, f"cannot be written: {reason(error)}") from error
     if not stat.S_ISREG(mode):
         kind = next((words for test, words in _KINDS if test(mode)), "something else")
-        raise OutputError(f"{_told(target)}: is {kind}, but a file was wanted")
+        raise _refused(target, f"is {kind}, but a file was wanted")
     return real
 
 
-def _told(target: Path) -> str:
-    """Return a path for people: on one line."""
-    text = str(target)
-    return text if text.isprintable() else shown(text)
+def _refused(target: Path, what: str) -> OutputError:
+    name = str(target)
+    return OutputError(f"{name if name.isprintable() else shown(name)}: {what}")
 
 
 def on_disk(paths: Iterable[Path]) -> None:
-    """Return when files and folders are on the disk; all at once, which takes as long as one of them.
-
-    Raises
-    ------
-    OSError
-        When a file cannot be written.
-    """
+    """Return when files and folders are on the disk: all at once, which takes as long as one of them."""
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(8) as threads:  # most of what it takes is waiting
@@ -102,13 +92,13 @@ def on_disk(paths: Iterable[Path]) -> None:
 
 
 def _on_disk(path: Path) -> None:
-    if path.is_dir():
-        with suppress(OSError):  # not every system knows that of folders
-            descriptor = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-    else:
+    if not path.is_dir():
         with path.open("rb+") as file:
             os.fsync(file.fileno())
+        return
+    with suppress(OSError):  # not every system knows that of folders
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

@@ -8,20 +8,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from robocov.errors import OutputError
+from robocov.errors import OutputError, reason
 
 
 @contextmanager
 def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterator[None]:
     """Keep other processes from the same folder; the lock ends with this process, however that ends.
 
-    Parameters
-    ----------
-    folder : Path
-    name : str
-        Of the file in it that is locked.
-    remove : bool
-        Leave no such file.
+    The file `name` in it is locked, and removed afterwards where `remove` is given.
 
     Raises
     ------
@@ -34,20 +28,21 @@ def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterat
             # not inherited by processes that are started: their lives are their own
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+            raise OutputError(f"{folder}: cannot be written to: {reason(error)}") from error
         try:
             if not _taken(descriptor):
                 raise OutputError(
                     f"{folder}: another process is at work in this folder; wait until it has ended"
                 )
-            if _is_at(descriptor, path):
-                try:
-                    yield
-                finally:
-                    if remove:
-                        with suppress(OSError):
-                            path.unlink()
-                return
+            if not _is_at(descriptor, path):
+                continue
+            try:
+                yield
+            finally:
+                if remove:
+                    with suppress(OSError):
+                        path.unlink()
+            return
         finally:
             os.close(descriptor)
 
@@ -80,5 +75,5 @@ else:
         except BlockingIOError:
             return False
         except OSError:
-            return True
+            pass
         return True

@@ -13,13 +13,12 @@ import json
 import os
 import re
 import shutil
-import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
-from robocov.errors import InputError, OutputError, shown
+from robocov.errors import InputError, OutputError, reason, shown
 from robocov.files.atomic import on_disk, written
 from robocov.files.lock import locked
 
@@ -62,14 +61,7 @@ _HEAD_BYTES = 4096
 
 
 class ResultFolder:
-    """A folder while its result is being made.
-
-    Attributes
-    ----------
-    path : Path
-    new : Path
-        The hidden folder that the files of the result are written to.
-    """
+    """A folder while its result is being made: the files go to the hidden folder `new`."""
 
     def __init__(self, path: Path, owned: set[str], *, replaces: bool, part: str = "") -> None:
         self.path = path
@@ -92,10 +84,7 @@ class ResultFolder:
     def commit(self) -> None:
         """Put what is made in the place of the earlier result; or beside it, where it replaces none.
 
-        Raises
-        ------
-        OutputError
-            When that cannot be done, or a file of somebody else is in the way.
+        An OutputError says why that cannot be done: also where a file of somebody else is in the way.
         """
         with _telling(self.path):
             staging = self.path / _STAGING
@@ -150,7 +139,7 @@ def results(
             with _telling(folder):
                 earlier = _replaceable(folder, overwrite=overwrite)
                 owned = earlier or set()
-                own = (*_FILES[kind], "frames/000000.png", *(f"frames/{name}" for name in _frames(folder)))
+                own = (*_FILES[kind], "frames/000000.png", *_frames(folder))
                 inner = (f"{part}/{name}" for part in parts for name in _FILES["run"])
                 for name in sorted({*owned, *own, *inner}):
                     _require_free(folder, name, owned)
@@ -167,12 +156,7 @@ def results(
 def extended(folder: Path) -> Iterator[ResultFolder]:
     """Give the folder of a result, or of one run of a comparison, to which files are added.
 
-    Raises
-    ------
-    InputError
-        When there is no result in it.
-    OutputError
-        As `results`.
+    Raises an InputError where there is no result in it, and what `results` raises.
     """
     home, part = _home(folder)
     with _held(home):
@@ -218,14 +202,21 @@ def _listing(path: Path) -> tuple[set[str], set[str]] | None:
         content = json.loads(path.read_bytes())
         if {key: content[key] for key in _HEAD} != _HEAD:
             raise ValueError(f"{shown(content['format'])}, version {shown(content['version'])}")
-        for name in (*content["files"], *content.get("removed", ())):
+        files, removed = set(content["files"]), set(content.get("removed", ()))
+        for name in files | removed:
             if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in name.split("/")):
                 raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
             if not _has_our_name(name):  # or whoever sends a folder might have any file replaced or removed
                 raise ValueError(f"{shown(name)}, but a file of a result was wanted")
-        return set(content["files"]), set(content.get("removed", ()))
+        return files, removed
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
+
+
+def _has_our_name(name: str) -> bool:
+    """Return whether a file in a folder could be one of a result, by its name alone."""
+    own = name.rpartition("/")[2]
+    return own in _NAMES or own == _MANIFEST or bool(_FRAME.fullmatch(own) or _HALF.fullmatch(own))
 
 
 def _carry_out(folder: Path) -> None:
@@ -303,7 +294,10 @@ def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
 
 
 def _owned(folder: Path) -> set[str] | None:
-    """Return the files of the result in a folder, None where there is none."""
+    """Return the files of the result in a folder, None where there is none.
+
+    Without a manifest that can be read, as in results of earlier versions, those that have the names of ours.
+    """
     with suppress(InputError):  # one that is damaged still says whose folder it is
         manifest = _listing(folder / _MANIFEST)
         if manifest is not None:
@@ -311,33 +305,21 @@ def _owned(folder: Path) -> set[str] | None:
     kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json")), None)
     if kind is None and not os.path.lexists(folder / _MANIFEST) and not _is_remainder(folder):
         return None
-    return _of_earlier_version(folder, kind or "run")
-
-
-def _of_earlier_version(folder: Path, kind: Kind) -> set[str]:
-    """Return the files of a result without a manifest: those that have the names of ours."""
-    names = {name for name in _FILES[kind] if _is_file(folder / name)}
+    names = {name for name in _FILES[kind or "run"] if _is_file(folder / name)}
     names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name)}
     names |= {path.name for path in folder.iterdir() if _HALF.fullmatch(path.name) and _is_file(path)}
-    names |= {f"frames/{name}" for name in _frames(folder)}
     for part in _parts(folder) if kind == "comparison" else ():
         inner = (*(_owned(part) or ()), _MANIFEST)
         names |= {f"{part.name}/{name}" for name in inner if _is_file(part / name)}
-    return names
+    return names | _frames(folder)
 
 
-def _has_our_name(name: str) -> bool:
-    """Return whether a file in a folder could be one of a result, by its name alone."""
-    own = name.rpartition("/")[2]
-    return own in _NAMES or own == _MANIFEST or bool(_FRAME.fullmatch(own) or _HALF.fullmatch(own))
-
-
-def _frames(folder: Path) -> list[str]:
-    """Return the names of the pictures of a film in a folder's ``frames/``."""
+def _frames(folder: Path) -> set[str]:
+    """Return the pictures of a film in a folder."""
     frames = folder / "frames"
     if frames.is_symlink() or not frames.is_dir():
-        return []
-    return [path.name for path in frames.iterdir() if _FRAME.fullmatch(path.name)]
+        return set()
+    return {f"frames/{path.name}" for path in frames.iterdir() if _FRAME.fullmatch(path.name)}
 
 
 def _parts(folder: Path) -> list[Path]:
@@ -354,9 +336,8 @@ def _is_remainder(folder: Path) -> bool:
     """Return whether a folder holds what an earlier version leaves when it is killed: files of ours alone."""
     names = {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}
     half = {name for name in names if _HALF.fullmatch(name)}
-    return names - half <= {"frames", *_NAMES} and (
-        bool(half) or any(_is_ours(folder / name) for name in _BEGINNINGS)
-    )
+    known = half or any(_is_ours(folder / name) for name in _BEGINNINGS)
+    return bool(known) and names - half <= {"frames", *_NAMES}
 
 
 def _is_ours(path: Path, name: str = "") -> bool:
@@ -372,11 +353,7 @@ def _is_ours(path: Path, name: str = "") -> bool:
 
 def _is_file(path: Path) -> bool:
     """Return whether there is a file, or a link."""
-    try:
-        mode = path.lstat().st_mode
-    except FileNotFoundError:
-        return False
-    return stat.S_ISREG(mode) or stat.S_ISLNK(mode)
+    return path.is_symlink() or path.is_file()
 
 
 def _require_free(folder: Path, name: str, owned: set[str]) -> None:
@@ -406,4 +383,4 @@ def _telling(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
+        raise OutputError(f"{folder}: cannot be used for results: {reason(error)}") from error
