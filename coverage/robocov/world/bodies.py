@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import call_c, inner_kernel, kernel
+from robocov.compiled import inner_kernel, kernel
 from robocov.errors import ParameterError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
 from robocov.world.contacts import ContactSolver, obstacle_space, robot_body
-from robocov.world.engine import FORCES, GET_BODY, SET_BODY, SPACE, STATES, STEP, Engine, transfer
+from robocov.world.engine import STATES, Engine, observed_step
 
 if TYPE_CHECKING:
     from robocov.world.solid import Mover
@@ -53,6 +53,8 @@ class World:
         Obstacles that move, as kinematic bodies; see `robocov.world.contacts`.
     failed_robots : (w, 3) m or None
         x, y and radius of robots that have failed, and stand in the way.
+    runs : int
+        In so many worlds at once, each with its part of the robots, which never meet those of the others.
 
     Raises
     ------
@@ -72,8 +74,9 @@ class World:
         *,
         movers: tuple[Mover, ...] = (),
         failed_robots: Array | None = None,
+        runs: int = 1,
     ) -> None:
-        self.team = team
+        self.team, self._runs = team, runs
         self._pieces, self._movers, self._failed_robots = pieces, movers, failed_robots
         light, heavy = float(team.mass.min()), float(team.mass.max())
         if heavy > MAX_MASS_RATIO * light:
@@ -135,7 +138,8 @@ class World:
         for part in range(parts):
             if self._movers:
                 self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
-                self._write_state(self._engine)
+                for run in range(self._runs):
+                    self._write_state(self._engine, run)
             self._substep(forces, dt / parts, external_forces)
 
     def _substeps(self, dt: float, speed: float = 0.0) -> int:
@@ -158,26 +162,33 @@ class World:
     @cached_property
     def _engine(self) -> Engine:
         """The space that tells who touches: nothing is pushed out of an overlap, nothing is remembered."""
-        space = obstacle_space(self._pieces, self._movers, self._failed_robots)
-        space.iterations = space.collision_persistence = 1
-        space.collision_bias = 1.0
+        spaces = []
         self._row = {}
         columns = self._positions.tolist(), self.team.mass.tolist(), self.team.radius.tolist()
+        each = len(self.team) // self._runs
         for row, (place, mass, radius) in enumerate(zip(*columns, strict=True)):
+            if row % each == 0:
+                space = obstacle_space(self._pieces, self._movers, self._failed_robots)
+                space.iterations = space.collision_persistence = 1
+                space.collision_bias = 1.0
+                spaces.append(space)
             body, disc = robot_body(mass, radius)
             # before it enters the space, which keeps a pair for any two discs that enter in one place
             body.position = tuple(place)
             space.add(body, disc)
             self._row[body.id] = row
-        engine = Engine(space, len(self._movers), len(self.team))
-        self._write_state(engine)
+        engine = Engine(spaces, len(self._movers), each)
+        for run in range(self._runs):
+            self._write_state(engine, run)
         return engine
 
-    def _write_state(self, engine: Engine) -> None:
-        begin = len(self._movers)
-        engine.states[:begin] = self._moving
-        engine.states[begin:-1, :2], engine.states[begin:-1, 2:] = self._positions, self._velocities
-        engine.write(STATES)
+    def _write_state(self, engine: Engine, run: int) -> None:
+        begin, state = len(self._movers), engine.states[run]
+        each = len(self.team) // self._runs
+        mine = slice(run * each, (run + 1) * each)
+        state[:begin] = self._moving
+        state[begin:-1, :2], state[begin:-1, 2:] = self._positions[mine], self._velocities[mine]
+        engine.write(STATES, run)
 
     def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
         engine = self._engine
@@ -192,17 +203,20 @@ class World:
         if external_forces is not None:
             limit = np.maximum(limit, self._speeds() + self._gain(external_forces, dt))
         state = np.empty((2, len(forces), 2))
-        engine.robots[:] = forces
+        engine.robots[:] = forces.reshape(self._runs, -1, 2)
         external = _NONE if external_forces is None else external_forces
+        engine.forget_contacts()
         _free_substep(
             engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
         )
-        touching = self._touching()
-        if touching:
-            self._resolve_contacts(np.array(touching), state, dt, limit)
+        touching, each = self._touching(), len(forces) // self._runs
+        touched = {row // each for row in touching}
+        for run in touched:
+            rows = np.array([row for row in touching if row // each == run])
+            self._resolve_contacts(rows, slice(run * each, (run + 1) * each), state, dt, limit)
         self._set_state(state)
-        if touching:
-            self._write_state(engine)
+        for run in touched:
+            self._write_state(engine, run)
         if external_forces is not None or self._fast:
             self._fast = self._anybody_fast()
 
@@ -216,8 +230,8 @@ class World:
         state.setflags(write=False)
         self._positions, self._velocities = state[0], state[1]
 
-    def _resolve_contacts(self, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
-        """Move robots again that touch something, and with them whoever they are moved against.
+    def _resolve_contacts(self, rows: IntArray, run: slice, free: Array, dt: float, limit: Array) -> None:
+        """Move robots of a run again that touch something, and with them whoever they are moved against.
 
         `free`, (2, n, 2) m and m/s, is how all moved as if nobody touched anything, and is corrected.
         """
@@ -225,20 +239,20 @@ class World:
         self._contacts = None  # it is of no use once it was interrupted
         if solver is None:
             solver = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
-        net, radius = self._engine.robots, self.team.radius
-        before = np.hstack([self._positions, self._velocities])
+        each, radius, positions = run.stop - run.start, self.team.radius[run], free[0, run].copy()
+        net = self._engine.robots[run.start // each]
+        resolved = np.zeros(each, dtype=bool)
         while True:
-            moved = solver.moved(rows, before[rows], net[rows], self._moving, dt)
-            state = free.copy()
-            state[0, rows] = moved[:, :2]
-            resolved = np.zeros(len(before), dtype=bool)
-            resolved[rows] = True
-            first, second, distance = close_pairs(state[0], 2.0 * float(radius.max()))
+            before = np.hstack([self._positions[rows], self._velocities[rows]])
+            moved = solver.moved(rows, before, net[rows - run.start], self._moving, dt)
+            positions[rows - run.start] = moved[:, :2]
+            resolved[rows - run.start] = True
+            first, second, distance = close_pairs(positions, 2.0 * float(radius.max()))
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
             if not reached.any():
                 break
             resolved[second[reached]] = True
-            rows = np.flatnonzero(resolved)
+            rows = run.start + np.flatnonzero(resolved)
         # impulses of a contact may exceed what a robot can do by itself
         free[0, rows], free[1, rows] = moved[:, :2], scale_to_limits(moved[:, 2:], limit[rows])
         self._contacts = solver
@@ -281,26 +295,27 @@ def _free_substep(
     the acceleration: the old velocity lies within the limit, and projecting onto a disc does not move a point
     away from a point of the disc.
     """
-    begin = len(states) - 1 - len(answer)
+    each = len(answer) // len(addresses)
+    begin = states.shape[1] - 1 - each
     for i in range(len(answer)):
-        vx, vy = states[begin + i, 2], states[begin + i, 3]
+        run, row = i // each, begin + i % each
+        vx, vy = states[run, row, 2], states[run, row, 3]
         decay, drive = answer[i, 0], answer[i, 1]
-        dx, dy = drive * forces[begin + i, 0] - decay * vx, drive * forces[begin + i, 1] - decay * vy
+        dx, dy = drive * forces[run, row, 0] - decay * vx, drive * forces[run, row, 1] - decay * vy
         scale = _scale(dx, dy, answer[i, 3])
         ux, uy = vx + dx * scale, vy + dy * scale
         scale = _scale(ux, uy, answer[i, 4])
-        forces[begin + i, 0] = (ux * scale - vx) * answer[i, 2]
-        forces[begin + i, 1] = (uy * scale - vy) * answer[i, 2]
+        forces[run, row, 0] = (ux * scale - vx) * answer[i, 2]
+        forces[run, row, 1] = (uy * scale - vy) * answer[i, 2]
         if len(external):
-            forces[begin + i, 0] += external[i, 0]
-            forces[begin + i, 1] += external[i, 1]
-    transfer(addresses, filled, SET_BODY, FORCES)
-    call_c(addresses[STEP], (addresses[SPACE], dt))
-    transfer(addresses, filled, GET_BODY, STATES)
+            forces[run, row, 0] += external[i, 0]
+            forces[run, row, 1] += external[i, 1]
+    for run in range(len(addresses)):
+        observed_step(addresses, filled, run, dt)
     for i in range(len(answer)):
         for k in range(2):
-            moved[0, i, k] = states[begin + i, k]
-            moved[1, i, k] = states[begin + i, 2 + k]
+            moved[0, i, k] = states[i // each, begin + i % each, k]
+            moved[1, i, k] = states[i // each, begin + i % each, 2 + k]
 
 
 def scale_to_limits(vectors: Array, limit: Array) -> Array:

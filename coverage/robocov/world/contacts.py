@@ -59,7 +59,7 @@ class ContactSolver:
         # the part of an overlap that is left after a second: none after a substep; only what a moving
         # obstacle has run over is deep, and comes out of it gradually
         self._space.collision_bias = 1e-9 if movers else 0.0
-        self._engine = Engine(self._space, len(movers), len(team))
+        self._engine = Engine([self._space], len(movers), len(team))
         self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
         self._fastest_mover = max((mover.path.speed for mover in movers), default=0.0)
         self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}
@@ -85,30 +85,31 @@ class ContactSolver:
         parts = min(_MOST_SUBSTEPS, max(1, math.ceil(fastest * dt / self._travel)))
 
         engine, space = self._engine, self._space._space
+        states, net = engine.states[0], engine.forces[0]
         mine = slice(len(motion), len(motion) + len(rows))
         robots = [self._robot(row) for row in rows.tolist()]
         # in C, as Python's `Space.add` and `remove` cost more than all else
         for body, _ in robots:
             lib.cpSpaceAddBody(space, body._body)
-        engine.states[: mine.start], engine.states[mine], engine.states[mine.stop] = motion, state, 0.0
+        states[: mine.start], states[mine], states[mine.stop] = motion, state, 0.0
         engine.write(STATES)
         for _, disc in robots:
             lib.cpSpaceAddShape(space, disc._shape)
-        engine.forces[:] = 0.0
-        engine.forces[mine] = forces
+        net[:] = 0.0
+        net[mine] = forces
         self._substeps(robots, parts, dt / parts)
         for _, disc in robots:
             lib.cpSpaceRemoveShape(space, disc._shape)
         engine.read()
-        velocities = engine.states[mine, 2:].copy()
+        velocities = states[mine, 2:].copy()
         # what is left is the push out of an overlap that pymunk has decided but not yet applied
-        engine.states[: mine.stop, 2:] = engine.forces[:] = 0.0
+        states[: mine.stop, 2:] = net[:] = 0.0
         engine.write(STATES)
         self._substeps(robots, 1, dt / parts)
         engine.read()
         for body, _ in robots:
             lib.cpSpaceRemoveBody(space, body._body)
-        return np.hstack([engine.states[mine, :2], velocities])
+        return np.hstack([states[mine, :2], velocities])
 
     def _robot(self, row: int) -> tuple[pymunk.Body, pymunk.Circle]:
         if row not in self._robots:
@@ -117,11 +118,11 @@ class ContactSolver:
 
     def _substeps(self, robots: list[tuple[pymunk.Body, pymunk.Circle]], count: int, dt: float) -> None:
         if not self._movers:
-            substeps(self._engine.addresses, self._engine.filled, count, dt)
+            substeps(self._engine.addresses, self._engine.filled, 0, count, dt)
             return
         for _ in range(count):
             before = [body.position for body, _ in robots]
-            substeps(self._engine.addresses, self._engine.filled, 1, dt)
+            substeps(self._engine.addresses, self._engine.filled, 0, 1, dt)
             for (body, disc), place in zip(robots, before, strict=True):
                 self._keep_before_walls(body, disc.radius, place)
 

@@ -1,4 +1,4 @@
-"""The bodies of a pymunk space as arrays, and the engine's C functions called from kernels."""
+"""The bodies of pymunk spaces as arrays, and the engine's C functions called from kernels."""
 
 from __future__ import annotations
 
@@ -15,67 +15,74 @@ if TYPE_CHECKING:
 
     from robocov.arrays import IntArray
 
-SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, FORCES, STATES = range(7)
+SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER, FORCES, STATES, CONTACTS = range(10)
 """What is where in `Engine.addresses`."""
+
+_FUNCTIONS = (
+    *("cpSpaceStep", "cpSpaceEachBody"),
+    *("pmSpaceBodySetIteratorFuncBatched", "pmSpaceBodyGetIteratorFuncBatched"),
+    *("cpSpaceEachCachedArbiter", "pmSpaceArbiterIteratorFuncBatched"),
+)
 
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 
 
 class Engine:
-    """Access to the bodies of a space: obstacles that move, robots as they were added, and the static body.
+    """The bodies of spaces: obstacles that move, robots as they were added, and the static body.
 
     Attributes
     ----------
-    forces : (bodies, 2) N
+    forces : (spaces, bodies, 2) N
         To be written with `transfer`; pymunk forgets them after each step.
-    robots : (n, 2) N
+    robots : (spaces, n, 2) N
         Those of the robots, the same array.
-    states : (bodies, 4) m and m/s
+    states : (spaces, bodies, 4) m and m/s
         Positions and velocities, written or read.
-    addresses : (7,)
+    addresses : (spaces, 10)
         Of C functions and of what they are called with.
-    filled : (8,)
+    filled : (spaces, 8)
         How far `forces`, first, and `states`, fifth, have been gone through.
     """
 
-    def __init__(self, space: pymunk.Space, movers: int, robots: int) -> None:
-        bodies = movers + robots + 1
-        self.forces, self.states = np.zeros((bodies, 2)), np.zeros((bodies, 4))
-        self.robots = self.forces[movers:-1]
-        floats, batches = ffi.new("pmFloatArray[2]"), ffi.new("pmBatchedData[3]")
+    def __init__(self, spaces: list[pymunk.Space], movers: int, robots: int) -> None:
+        count, bodies = len(spaces), movers + robots + 1
+        self.forces, self.states = np.zeros((count, bodies, 2)), np.zeros((count, bodies, 4))
+        self.robots = self.forces[:, movers:-1]
+        floats, batches = ffi.new("pmFloatArray[]", 2 * count), ffi.new("pmBatchedData[]", 3 * count)
         self._touching = ffi.gc(lib.pmIntArrayNew(0), lib.pmIntArrayFree)
-        for k, values in enumerate((self.forces, self.states)):
-            # C must not make the array of numpy's longer, which it does as soon as it is full
-            floats[k].arr, floats[k].max = ffi.from_buffer("double[]", values), 2**30
-        for k, fields in enumerate((batch.BodyFields.FORCE, _STATE, _BODIES)):
-            batches[k].fields = fields.value
-            batches[k].floatArray, batches[k].intArray = floats + k % 2, self._touching
-        self.filled: Any = np.frombuffer(ffi.buffer(floats), dtype=np.intc)
-        self.addresses = addresses_of(
-            space._space,
-            *map(function, ("cpSpaceStep", "cpSpaceEachBody")),
-            *map(function, ("pmSpaceBodySetIteratorFuncBatched", "pmSpaceBodyGetIteratorFuncBatched")),
-            *(batches, batches + 1),
-        )
+        self.filled: Any = np.frombuffer(ffi.buffer(floats), dtype=np.intc).reshape(count, 8)
+        addresses = []
+        for k, space in enumerate(spaces):
+            first, each = floats + 2 * k, batches + 3 * k
+            for j, values in enumerate((self.forces[k], self.states[k])):
+                # C must not make the array of numpy's longer, which it does as soon as it is full
+                first[j].arr, first[j].max = ffi.from_buffer("double[]", values), 2**30
+            for j, fields in enumerate((batch.BodyFields.FORCE, _STATE, _BODIES)):
+                each[j].fields = fields.value
+                each[j].floatArray, each[j].intArray = first + j % 2, self._touching
+            pointers = space._space, *map(function, _FUNCTIONS), each, each + 1, each + 2
+            addresses.append(addresses_of(*pointers))
+        self.addresses = np.array(addresses)
         # what is only pointed to
-        self._space, self._floats, self._batches = space, floats, batches
-        self._of_arbiters = space._space, function("pmSpaceArbiterIteratorFuncBatched"), batches + 2
+        self._spaces, self._floats, self._batches = spaces, floats, batches
 
-    def write(self, values: int) -> None:
-        """Set `FORCES` or `STATES` of all bodies."""
-        transfer(self.addresses, self.filled, SET_BODY, values)
+    def write(self, values: int, k: int = 0) -> None:
+        """Set `FORCES` or `STATES` of all bodies of space k."""
+        transfer(self.addresses, self.filled, k, SET_BODY, values)
 
-    def read(self) -> None:
-        """Get `states`."""
-        transfer(self.addresses, self.filled, GET_BODY, STATES)
+    def read(self, k: int = 0) -> None:
+        """Get `states` of space k."""
+        transfer(self.addresses, self.filled, k, GET_BODY, STATES)
+
+    def forget_contacts(self) -> None:
+        """Begin anew with what `touching` returns."""
+        self._touching.num = 0
 
     def touching(self) -> list[int]:
-        """Return the ids of the bodies that touched another one in the last step, in pairs."""
-        found = self._touching
-        found.num = 0
-        lib.cpSpaceEachCachedArbiter(*self._of_arbiters)
-        return list(ffi.unpack(found.arr, found.num)) if found.num else []
+        """Return the ids of the bodies in contact, in pairs, in the observed steps."""
+        count = self._touching.num
+        return list(ffi.unpack(self._touching.arr, count)) if count else []
 
 
 def function(name: str) -> Any:
@@ -89,15 +96,24 @@ def addresses_of(*pointers: Any) -> IntArray:
 
 
 @kernel
-def transfer(addresses: IntArray, filled: IntArray, direction: int, values: int) -> None:
-    """Set or get the forces or states of all bodies."""
-    filled[0] = filled[4] = 0
-    call_c(addresses[EACH_BODY], (addresses[SPACE], addresses[direction], addresses[values]))
+def transfer(addresses: IntArray, filled: IntArray, k: int, direction: int, values: int) -> None:
+    """Set or get the forces or states of all bodies of space k."""
+    filled[k, 0] = filled[k, 4] = 0
+    call_c(addresses[k, EACH_BODY], (addresses[k, SPACE], addresses[k, direction], addresses[k, values]))
 
 
 @kernel
-def substeps(addresses: IntArray, filled: IntArray, count: int, dt: float) -> None:
-    """Make substeps under the same forces."""
+def substeps(addresses: IntArray, filled: IntArray, k: int, count: int, dt: float) -> None:
+    """Make substeps of space k under the same forces."""
     for _ in range(count):
-        transfer(addresses, filled, SET_BODY, FORCES)
-        call_c(addresses[STEP], (addresses[SPACE], dt))
+        transfer(addresses, filled, k, SET_BODY, FORCES)
+        call_c(addresses[k, STEP], (addresses[k, SPACE], dt))
+
+
+@kernel
+def observed_step(addresses: IntArray, filled: IntArray, k: int, dt: float) -> None:
+    """Make a step of space k under `Engine.forces`, read its states, and note who touched."""
+    substeps(addresses, filled, k, 1, dt)
+    transfer(addresses, filled, k, GET_BODY, STATES)
+    noting = (addresses[k, SPACE], addresses[k, GET_ARBITER], addresses[k, CONTACTS])
+    call_c(addresses[k, EACH_ARBITER], noting)
