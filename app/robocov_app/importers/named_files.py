@@ -39,7 +39,7 @@ def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> 
     beside = path.parent / PureWindowsPath(name).name
     try:
         allowed = anywhere or _inside(named, path.parent)
-        if not (allowed and named.exists()) and beside.is_file() and _inside(beside, path.parent):
+        if not (allowed and _exists(named)) and beside.is_file() and _inside(beside, path.parent):
             key = at.rpartition(": ")[2]
             return beside, f"{key}: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
     except (OSError, ValueError, RuntimeError) as error:
@@ -56,3 +56,12 @@ def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> 
 def _inside(named: Path, folder: Path) -> bool:
     """Return whether a file is in `folder` or below, links followed."""
     return named.resolve().is_relative_to(folder.resolve())
+
+
+def _exists(named: Path) -> bool:
+    """Return whether there is such a file; an OSError where that cannot be known, as from a name too long."""
+    try:
+        named.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True

@@ -26,7 +26,11 @@ def main() -> None:
     """Do tasks until there are no more."""
     # Ctrl-C is for the parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    faulthandler.enable()
+    if sys.version_info >= (3, 14):
+        # the engine's own frames would take the place of the controller's
+        faulthandler.enable(c_stack=False)
+    else:
+        faulthandler.enable()
     _end_with_parent()
     source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     target = os.fdopen(os.dup(sys.stdout.fileno()), "wb")

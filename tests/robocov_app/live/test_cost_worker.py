@@ -175,7 +175,8 @@ worker.environment(load_map("museum"), 64)
 while not any(type(event).__name__ == "Ready" for event in worker.poll()):
     time.sleep(0.01)
 print(worker._talk._process.pid, flush=True)
-time.sleep(600)
+while True:  # a signal just before a sleep does not end it
+    time.sleep(0.1)
 """
 
 
