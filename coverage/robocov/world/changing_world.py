@@ -26,18 +26,14 @@ if TYPE_CHECKING:
 class ChangingWorld:
     """As `World`, with a row for every robot that ever is.
 
-    Parameters
+    Attributes
     ----------
-    conditions : Conditions
-    environment : Environment
-    pieces : convex polygons, (k, 2) m each
-        The walls of it.
-    movers : tuple of Mover
-    team : Team
     positions : (n, 2) m
-        Of a robot that has not joined yet: where it would start.
-    velocities : (n, 2) m/s or None
-    time : float, s
+        Of a robot that has not joined yet: where it would start, or is to join; read-only.
+    velocities : (n, 2) m/s
+        Zero of those that do not work; read-only.
+    working : (n,) bool
+        Which robots are there and have not failed; read-only.
     """
 
     def __init__(
@@ -54,36 +50,19 @@ class ChangingWorld:
     ) -> None:
         self._conditions, self._environment = conditions, environment
         self._pieces, self._movers, self.team = pieces, movers, team
-        self._positions = np.array(positions, dtype=float)
-        self._velocities = np.zeros_like(self._positions)
-        if velocities is not None:
-            self._velocities[:] = velocities
-        self._working = conditions.working(time, len(team))
+        self.positions = np.array(positions, dtype=float)
+        self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
+        self.working = conditions.working(time, len(team))
         self._failed = conditions.failed(time, len(team))
         for join in conditions.joins:
-            if join.place is not None and not (self._working | self._failed)[join.robot - 1]:
-                self._positions[join.robot - 1] = join.place
+            if join.place is not None and not (self.working | self._failed)[join.robot - 1]:
+                self.positions[join.robot - 1] = join.place
         self._begin()
-
-    @property
-    def positions(self) -> Array:
-        """Centres of the robots, (n, 2) m; of one that has not joined, where it is to; read-only."""
-        return self._positions
-
-    @property
-    def velocities(self) -> Array:
-        """Velocities, (n, 2) m/s, zero of those that do not work; read-only."""
-        return self._velocities
-
-    @property
-    def working(self) -> BoolArray:
-        """Which robots are there and have not failed, (n,) bool; read-only."""
-        return self._working
 
     @property
     def failed_robots(self) -> Array:
         """x, y and radius of the robots that have failed, (w, 3) m."""
-        return np.column_stack([self._positions, self.team.radius])[self._failed]
+        return np.column_stack([self.positions, self.team.radius])[self._failed]
 
     def copy(self) -> ChangingWorld:
         """Return an independent world in the same state, which goes on identically."""
@@ -103,43 +82,34 @@ class ChangingWorld:
             When there is no room for a robot that joins.
         """
         rows = self._rows
+        self.positions, self.velocities = self.positions.copy(), np.zeros_like(self.velocities)
         if self._world is not None:
-            self._world.step(
-                forces[rows], dt, None if external_forces is None else external_forces[rows], time=time
-            )
-            self._positions, self._velocities = self._positions.copy(), np.zeros_like(self._velocities)
-            self._positions[rows], self._velocities[rows] = self._world.positions, self._world.velocities
-            self._protect()
-        self._turn_to(time + dt)
+            external = None if external_forces is None else external_forces[rows]
+            self._world.step(forces[rows], dt, external, time=time)
+            self.positions[rows], self.velocities[rows] = self._world.positions, self._world.velocities
+        working = self._conditions.working(time + dt, len(self.team))
+        failed = self._conditions.failed(time + dt, len(self.team))
+        if (working != self.working).any() or (failed != self._failed).any():
+            self._change(working, failed, time + dt)
+        self._protect()
 
-    def _turn_to(self, time: float) -> None:
-        """Let robots fail and join whose time has come."""
-        count = len(self.team)
-        working, failed = self._conditions.working(time, count), self._conditions.failed(time, count)
-        if (working == self._working).all() and (failed == self._failed).all():
-            return
-        self._positions, self._velocities = self._positions.copy(), self._velocities.copy()
-        there = self._working | self._failed
+    def _change(self, working: BoolArray, failed: BoolArray, time: float) -> None:
+        """Let robots fail and join."""
+        there = self.working | self._failed
         self._failed = failed & there
         for robot in np.flatnonzero(working & ~there).tolist():
-            self._positions[robot] = self._place(robot, there, time)
+            self.positions[robot] = self._place(robot, there, time)
             there[robot] = True
-        self._working = working
-        self._velocities[~working] = 0.0
+        self.working = working
+        self.velocities[~working] = 0.0
         self._begin()
 
     def _place(self, robot: int, there: BoolArray, time: float) -> tuple[float, float]:
         """Return where a robot joins, as near as it fits beside those that are there."""
-        radius = self.team.radius
-        x, y = self._positions[robot].tolist()
+        radius, (x, y) = self.team.radius, self.positions[robot].tolist()
+        environment, others = self._environment.at(time), self.positions[there]
         try:
-            return nearest_free(
-                self._environment.at(time),
-                float(radius[robot]),
-                self._positions[there],
-                (x, y),
-                radius[there],
-            )
+            return nearest_free(environment, float(radius[robot]), others, (x, y), radius[there])
         except StartError:
             raise StartError(
                 f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], but there is no room for it in "
@@ -149,21 +119,21 @@ class ChangingWorld:
     def _begin(self) -> None:
         """Make the world of the robots that work."""
         self._protect()
-        rows = self._rows = np.flatnonzero(self._working)
+        rows = self._rows = np.flatnonzero(self.working)
         # a team of none is no team
         self._world: World | None = None
         if len(rows):
             self._world = World(
                 self._pieces,
                 only(self.team, rows),
-                self._positions[rows],
-                self._velocities[rows],
+                self.positions[rows],
+                self.velocities[rows],
                 movers=self._movers,
                 failed_robots=self.failed_robots,
             )
 
     def _protect(self) -> None:
-        for array in (self._positions, self._velocities, self._working):
+        for array in (self.positions, self.velocities, self.working):
             array.setflags(write=False)
 
 

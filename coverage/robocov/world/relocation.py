@@ -1,4 +1,4 @@
-"""Making room: where robots go when an obstacle appears on top of them, or where one more fits."""
+"""Room for robots: whether they fit, where they go when an obstacle appears on them, where one more fits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from robocov.errors import StartError
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbours import close_pairs
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray
@@ -23,20 +23,9 @@ _ROUNDS = 300
 
 
 def relocated(environment: Environment, positions: Array, team: Team) -> Array:
-    """Return places where all robots fit, near where they are.
+    """Return places, (n, 2) m, where all robots fit, near where they are.
 
     Who fits stays where it is, unless others that have to go somewhere push it.
-
-    Parameters
-    ----------
-    environment : Environment
-    positions : (n, 2) m
-        Anywhere.
-    team : Team
-
-    Returns
-    -------
-    (n, 2) m
 
     Raises
     ------
@@ -52,15 +41,11 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
         if inset.is_empty:
             robot = int(np.argmax(team.radius == radius)) + 1
             raise StartError(f"robot {robot} of radius {radius:g} m fits nowhere in map {environment.name!r}")
-    crowd = Neighbours(len(places))
-    reach = 2.0 * float(team.radius.max())
     for _ in range(_ROUNDS):
-        stuck = ~_fits(environment, places, team)
-        for robot in np.flatnonzero(stuck).tolist():
-            inset = room[float(team.radius[robot])]
-            line = shapely.shortest_line(inset, shapely.Point(places[robot]))
+        for robot in np.flatnonzero(_wall_distance(environment, places) < team.radius).tolist():
+            line = shapely.shortest_line(room[float(team.radius[robot])], shapely.Point(places[robot]))
             places[robot] = np.asarray(line.coords)[0]
-        first, second, distance = crowd.closer_than(places, reach)
+        first, second, distance = close_pairs(places, 2.0 * float(team.radius.max()))
         missing = team.radius[first] + team.radius[second] - distance
         clash = np.flatnonzero((missing > 0.0) & (first < second))
         if not len(clash):
@@ -83,63 +68,34 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
 def nearest_free(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
-    """Return the place nearest to a point where a robot fits, the others staying where they are.
+    """Return the place nearest to a point, m, where a robot fits, the others staying where they are.
 
-    Parameters
-    ----------
-    environment : Environment
-    radius : float, m
-        Of the robot.
-    others : (n, 2) m
-    point : (x, y) m
-    radii : (n,) m or None
-        Of the others; None: as the robot's.
+    `others` is (n, 2) m, `radii` (n,) m or None: as the robot's.
 
     Raises
     ------
     StartError
         When there is none.
     """
-    place, free = shapely.Point(point), environment.free
     beside = np.full(len(others), radius) if radii is None else radii
     apart = np.hypot(*(others - point).T)
-    if (
-        shapely.contains_properly(free, place)
-        and shapely.distance(free.boundary, place) >= radius
-        and (apart >= radius + beside).all()
-    ):
+    if _wall_distance(environment, np.array([point]))[0] >= radius and (apart >= radius + beside).all():
         return float(point[0]), float(point[1])
-    room = free.buffer(-(radius + _GAP), join_style="round")
+    room = environment.free.buffer(-(radius + _GAP), join_style="round")
     if len(others):
         # a buffer's polygon is inscribed, and room is wanted all round
         reach = (radius + beside + _GAP) / np.cos(np.pi / 64)
         room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), reach, quad_segs=16)))
     if room.is_empty:
         raise StartError("there is no room for a robot there")
-    x, y = np.asarray(shapely.shortest_line(room, place).coords)[0].tolist()
+    x, y = np.asarray(shapely.shortest_line(room, shapely.Point(point)).coords)[0].tolist()
     return x, y
-
-
-def _fits(environment: Environment, places: Array, team: Team) -> BoolArray:
-    """Return which robots touch no wall."""
-    points = shapely.points(places)
-    inside = shapely.contains_properly(environment.free, points)
-    return np.asarray(inside & (shapely.distance(environment.free.boundary, points) >= team.radius))
 
 
 def check_starts(
     environment: Environment, positions: Array, team: Team, slack: float, there: BoolArray | None = None
 ) -> None:
-    """Check that robots are free, but for so many metres.
-
-    Parameters
-    ----------
-    environment : Environment
-    positions : (n, 2) m
-    team : Team
-    slack : float, m
-    there : (n,) bool or None
-        Which robots are looked at; None: all.
+    """Check that robots, (n, 2) m, or those that are `there`, (n,), are free but for `slack` metres.
 
     Raises
     ------
@@ -149,26 +105,26 @@ def check_starts(
     there = np.ones(len(positions), dtype=bool) if there is None else there
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
         raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
-    points = shapely.points(positions)
-    inside = shapely.contains_properly(environment.free, points)
-    wall = shapely.distance(environment.free.boundary, points)
-    for i in np.flatnonzero(there).tolist():
+    wall = _wall_distance(environment, positions)
+    for i in np.flatnonzero(there & (wall < team.radius - slack)).tolist():
         place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
-        if not inside[i]:
+        if wall[i] < 0.0:
             raise StartError(
                 f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}"
             )
-        if wall[i] < team.radius[i] - slack:
-            raise StartError(
-                f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
-            )
-    first, second, distance = Neighbours(len(positions)).closer_than(
-        positions, 2.0 * float(team.radius.max())
-    )
+        raise StartError(
+            f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
+        )
+    first, second, distance = close_pairs(positions, 2.0 * float(team.radius.max()))
     clash = distance < team.radius[first] + team.radius[second] - slack
-    clash &= there[first] & there[second]
-    if clash.any():
-        k = int(np.flatnonzero(clash)[0])
+    for k in np.flatnonzero(clash & there[first] & there[second]).tolist():
         raise StartError(
             f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
         )
+
+
+def _wall_distance(environment: Environment, places: Array) -> Array:
+    """Return how far places are from a wall, (n,) m; -inf within one."""
+    points = shapely.points(places)
+    inside = shapely.contains_properly(environment.free, points)
+    return np.where(inside, shapely.distance(environment.free.boundary, points), -np.inf)

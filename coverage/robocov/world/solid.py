@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-import numpy as np
 import shapely
 
 from robocov.arrays import Array, frozen
@@ -44,14 +43,7 @@ def solid_pieces(environment: Environment) -> tuple[Array, ...]:
 
 
 class Mover(NamedTuple):
-    """An obstacle that moves.
-
-    Attributes
-    ----------
-    pieces : tuple of convex polygons, (k, 2) m each
-        Where it is at time zero.
-    path : ObstaclePath
-    """
+    """An obstacle that moves: convex polygons, (k, 2) m each, where it is at time zero, and its path."""
 
     pieces: tuple[Array, ...]
     path: ObstaclePath
@@ -59,40 +51,32 @@ class Mover(NamedTuple):
 
 def movers(environment: Environment) -> tuple[Mover, ...]:
     """Return the obstacles that move."""
-    return tuple(
-        Mover(convex_pieces(shape.polygon), shape.path)
-        for shape in environment.obstacles
-        if shape.path is not None
-    )
+    moving = ((shape.polygon, shape.path) for shape in environment.obstacles)
+    return tuple(Mover(convex_pieces(polygon), path) for polygon, path in moving if path is not None)
 
 
 def convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that tile the polygons of `geometry`."""
-    pieces: list[Array] = []
-    for part in shapely.get_parts(geometry):
-        if part.geom_type == "Polygon" and part.area > 0.0:
-            pieces.extend(frozen(loop) for loop in _merged(_triangles(part)))
-    return tuple(pieces)
+    parts = shapely.get_parts(geometry)
+    polygons = (part for part in parts if part.geom_type == "Polygon" and part.area > 0.0)
+    return tuple(frozen(loop) for polygon in polygons for loop in _merged(_triangles(polygon)))
 
 
 def _triangles(polygon: BaseGeometry) -> list[Loop]:
-    triangles: list[Loop] = []
-    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
-        a, b, c, _ = (tuple(corner) for corner in triangle.exterior.coords)
+    triangles = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
+    loops: list[Loop] = []
+    for corners in triangles[:, :3].tolist():
+        a, b, c = map(tuple, corners)
         turn = _turn(a, b, c)
         if turn != 0.0:
-            triangles.append([a, b, c] if turn > 0 else [a, c, b])
-    return triangles
+            loops.append([a, b, c] if turn > 0.0 else [a, c, b])
+    return loops
 
 
 def _merged(loops: list[Loop]) -> list[Loop]:
     """Remove the diagonals between convex loops as long as what remains is convex."""
     pieces: dict[int, Loop] = dict(enumerate(loops))
-    owner = {
-        (loop[k], loop[(k + 1) % len(loop)]): number
-        for number, loop in pieces.items()
-        for k in range(len(loop))
-    }
+    owner = {(loop[k - 1], loop[k]): n for n, loop in pieces.items() for k in (1, 2, 0)}
     for a, b in list(owner):
         first, second = owner.get((a, b)), owner.get((b, a))
         if first is None or second is None or first == second:
@@ -101,7 +85,7 @@ def _merged(loops: list[Loop]) -> list[Loop]:
         if joined is None:
             continue
         for k, corner in enumerate(pieces[second]):
-            owner[corner, pieces[second][(k + 1) % len(pieces[second])]] = first
+            owner[pieces[second][k - 1], corner] = first
         del pieces[second], owner[a, b], owner[b, a]
         pieces[first] = joined
     return list(pieces.values())
@@ -109,28 +93,15 @@ def _merged(loops: list[Loop]) -> list[Loop]:
 
 def _joined(first: Loop, second: Loop, a: Corner, b: Corner) -> Loop | None:
     """Return the union of two loops across the edge a→b of `first`, or None when it is not convex."""
-    start = first.index(b)
-    around = [first[(start + k) % len(first)] for k in range(len(first))]  # b … a
-    other = second.index(a)
-    beyond = [second[(other + k) % len(second)] for k in range(len(second))]  # a … b
+    start, other = first.index(b), second.index(a)
+    around = first[start:] + first[:start]  # b … a
+    beyond = second[other:] + second[:other]  # a … b
     joined = around + beyond[1:-1]
-    size = len(joined)
     at_a, at_b = len(around) - 1, 0
-    for k in (at_a, at_b):
-        if _turn(joined[k - 1], joined[k], joined[(k + 1) % size]) <= 0.0:
-            return None
-    return joined
+    bent = (_turn(joined[k - 1], joined[k], joined[(k + 1) % len(joined)]) for k in (at_a, at_b))
+    return joined if all(turn > 0.0 for turn in bent) else None
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
     """Return twice the signed area of the triangle; positive when counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def pieces_area(pieces: tuple[Array, ...]) -> float:
-    """Return the total area of the pieces, m²."""
-    total = 0.0
-    for ring in pieces:
-        ahead = np.roll(ring, -1, axis=0)
-        total += 0.5 * float((ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum())
-    return total
