@@ -1,37 +1,308 @@
-"""Conditions of a run: what goes wrong or changes, and what robots then hear and know."""
+"""Conditions: what goes wrong, or changes, during a run.
+
+Without them the world of the paper is ideal: who is in range is heard at once and always, everybody knows
+exactly where it is, the range sensor is exact, and all robots work from the beginning to the end.
+"""
 
 from __future__ import annotations
 
-from robocov.conditions.parameters import (
-    FAILING,
-    LIMITS,
-    LOSS,
-    POSITION,
-    QUANTITIES,
-    SCANNING,
-    SENSING,
-    SOON,
-    UNITS,
-    Conditions,
-    Failure,
-    Join,
-    parsed_failure,
-    parsed_join,
-)
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from numbers import Integral
+from typing import Any, NamedTuple, TypeVar
 
-__all__ = [
-    "FAILING",
-    "LIMITS",
-    "LOSS",
-    "POSITION",
-    "QUANTITIES",
-    "SCANNING",
-    "SENSING",
-    "SOON",
-    "UNITS",
-    "Conditions",
-    "Failure",
-    "Join",
-    "parsed_failure",
-    "parsed_join",
-]
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.conditions.draws import Draws
+from robocov.errors import ParameterError, checked, is_number, shown
+
+LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
+"""The independent streams of random numbers of a run."""
+
+SOON = 1e-9
+"""Seconds by which two moments may differ and still be one: what sums of steps miss."""
+
+_LONGEST = 1e6
+
+LIMITS: dict[str, tuple[float, float, str, str]] = {
+    # smallest, largest, unit, what it is called in run.json
+    "loss": (0.0, 1.0, "", "loss"),
+    "delay": (0.0, 1e3, "s", "delay_s"),
+    "message_rate": (1e-3, 1e4, "Hz", "message_rate_hz"),
+    "forget_after": (1e-3, _LONGEST, "s", "forget_after_s"),
+    "position_noise": (0.0, 1e3, "m", "position_noise_m"),
+    "sensing_noise": (0.0, 1e3, "m", "sensing_noise_m"),
+    "failure_rate": (0.0, 1e3, "1/s", "failure_rate_per_s"),
+}
+"""What each condition that is a number may be."""
+QUANTITIES = tuple(LIMITS)
+"""The conditions that are numbers."""
+UNITS = {name: unit for name, (_, _, unit, _) in LIMITS.items()}
+
+
+class Failure(NamedTuple):
+    """A robot, numbered from 1, that fails at a time, s: from then on it is a silent obstacle."""
+
+    robot: int
+    time: float
+
+    def __str__(self) -> str:
+        return f"{self.robot}@{self.time:g}"
+
+
+class Join(NamedTuple):
+    """A robot, numbered from 1, that joins at a time, s.
+
+    It appears at `place`, (x, y) m, or as near as it fits then; by default where it would have started.
+    """
+
+    robot: int
+    time: float
+    place: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        place = "" if self.place is None else f":{self.place[0]:g},{self.place[1]:g}"
+        return f"{self.robot}@{self.time:g}{place}"
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """All that varies during a run, seeded.
+
+    Communication is ideal, as without conditions, unless there is loss, delay, a message rate or position
+    noise. A robot that fails is then forgotten at once, else after `forget_after`.
+
+    Attributes
+    ----------
+    loss : float
+        Packet loss: the probability with which a message does not reach a receiver.
+    delay : float, s
+        Latency of messages.
+    message_rate : float, Hz, or None
+        How often all robots broadcast their positions; None: at every control step. Who is out of range at
+        that moment does not get the message.
+    forget_after : float, s
+        Timeout after which a robot that has not been heard of is taken to be gone. Until then it is taken to
+        be where its last message said.
+    position_noise : float, m
+        Localization noise, sigma in x and in y, white over the control steps. A robot acts on the noisy
+        position and broadcasts it; the physics goes on from the true one.
+    sensing_noise : float, m
+        Range noise of the sensor, sigma.
+    failure_rate : float, 1/s
+        Of each robot, while it works: lifetimes are exponentially distributed.
+    failures : tuple of Failure
+        At most one a robot; also given as ``(robot, time)``.
+    joins : tuple of Join
+        At most one a robot; also given as ``(robot, time)`` or ``(robot, time, place)``.
+    seed : int
+        Of all random numbers in this.
+
+    Raises
+    ------
+    ParameterError
+        On a value out of range; the message names it.
+    """
+
+    loss: float = 0.0
+    delay: float = 0.0
+    message_rate: float | None = None
+    forget_after: float = 3.0
+    position_noise: float = 0.0
+    sensing_noise: float = 0.0
+    failure_rate: float = 0.0
+    failures: tuple[Failure, ...] = ()
+    joins: tuple[Join, ...] = ()
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, (low, high, unit, _) in LIMITS.items():
+            value = getattr(self, name)
+            if name == "message_rate":
+                unit += " or null"
+            if name != "message_rate" or value is not None:
+                object.__setattr__(self, name, checked(f"conditions.{name}", value, low, high, unit))
+        object.__setattr__(self, "failures", _entries("failures", Failure, self.failures))
+        object.__setattr__(self, "joins", _entries("joins", Join, self.joins))
+        if not is_number(self.seed, Integral) or self.seed < 0:
+            raise ParameterError(f"conditions.seed: {shown(self.seed)}, but a whole number from 0 was wanted")
+        if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
+            raise ParameterError(
+                f"conditions.forget_after: {self.forget_after:g} s, but at least the "
+                f"{1.0 / self.message_rate:g} s between two messages was wanted"
+            )
+        fails = {each.robot: each.time for each in self.failures}
+        for k, join in enumerate(self.joins):
+            if fails.get(join.robot, math.inf) <= join.time:
+                raise ParameterError(
+                    f"conditions.joins[{k}]: robot {join.robot} joins at {join.time:g} s, but it has failed "
+                    f"at {fails[join.robot]:g} s"
+                )
+
+    @property
+    def ideal(self) -> bool:
+        """Whether this is as good as no conditions."""
+        return not (self.talks or self.sensing_noise or self.team_changes)
+
+    @property
+    def talks(self) -> bool:
+        """Whether robots know of each other by messages only."""
+        return bool(self.loss or self.delay or self.message_rate is not None or self.position_noise)
+
+    @property
+    def team_changes(self) -> bool:
+        """Whether robots may fail or join."""
+        return bool(self.failure_rate or self.failures or self.joins)
+
+    def of_robots_that_stay(self) -> Conditions | None:
+        """Return the conditions without failing and joining; None where ideal ones are left."""
+        rest = replace(self, failure_rate=0.0, failures=(), joins=())
+        return None if rest.ideal else rest
+
+    def check_team(self, count: int) -> None:
+        """Check that a team of `count` robots can be under these conditions.
+
+        Raises
+        ------
+        ParameterError
+            When it has no robot of a number that is to fail or join, or no robot is there at the beginning.
+        """
+        for name in ("failures", "joins"):
+            for k, each in enumerate(getattr(self, name)):
+                if each.robot > count:
+                    raise ParameterError(
+                        f"conditions.{name}[{k}]: robot {each.robot}, but one of 1 to {count} was wanted"
+                    )
+        if len(self.joins) == count and min(each.time for each in self.joins) > 0.0:
+            raise ParameterError("conditions.joins: all robots, but at least one from the start was wanted")
+
+    def lives(self, count: int) -> tuple[Array, Array]:
+        """Return from when and until when each robot works, (n,) s each; -inf and inf without limit."""
+        begins, ends = np.full(count, -np.inf), np.full(count, np.inf)
+        for join in self.joins:
+            begins[join.robot - 1] = join.time
+        if self.failure_rate:
+            chance = Draws(self.seed, FAILING).uniform(0, np.arange(count))
+            ends = np.maximum(begins, 0.0) - np.log(chance) / self.failure_rate
+        for failure in self.failures:
+            ends[failure.robot - 1] = min(ends[failure.robot - 1], failure.time)
+        return begins, ends
+
+    def working(self, time: float | Array, count: int) -> BoolArray:
+        """Return which robots are there and have not failed at times (...), s: (..., n) bool."""
+        return self.present(time, count) & ~self.failed(time, count)
+
+    def failed(self, time: float | Array, count: int) -> BoolArray:
+        """Return which robots have failed, as `working` does."""
+        return np.asarray(self.lives(count)[1] <= np.asarray(time)[..., None] + SOON)
+
+    def present(self, time: float | Array, count: int) -> BoolArray:
+        """Return which robots are there, working or failed, as `working` does."""
+        return np.asarray(self.lives(count)[0] <= np.asarray(time)[..., None] + SOON)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the conditions as plain JSON, units in the key names."""
+        plain: dict[str, Any] = {key: getattr(self, name) for name, (*_, key) in LIMITS.items()}
+        plain["failures"] = [{"robot": robot, "time_s": time} for robot, time in self.failures]
+        plain["joins"] = [
+            {"robot": robot, "time_s": time, "place_m": None if place is None else [*place]}
+            for robot, time, place in self.joins
+        ]
+        return plain | {"seed": int(self.seed)}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
+        """Return the conditions that `to_dict` wrote.
+
+        Raises
+        ------
+        ParameterError
+            When a key is missing or a value cannot be used.
+        """
+        try:
+            given: dict[str, Any] = {name: plain[key] for name, (*_, key) in LIMITS.items()}
+            given["failures"] = [(each["robot"], each["time_s"]) for each in plain["failures"]]
+            given["joins"] = [(each["robot"], each["time_s"], each["place_m"]) for each in plain["joins"]]
+            return cls(**given, seed=plain["seed"])
+        except (KeyError, TypeError) as error:
+            raise ParameterError(f"conditions: cannot be read ({error!r})") from error
+
+    def __repr__(self) -> str:
+        said = {each.name: getattr(self, each.name) for each in fields(self)}
+        usual = {each.name: each.default for each in fields(self)}
+        words = (f"{name}={value!r}" for name, value in said.items() if repr(value) != repr(usual[name]))
+        return f"Conditions({', '.join(words)})"
+
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
+_FAILURE = re.compile(rf"(\d{{1,9}})@({_NUMBER})", re.ASCII)
+_JOIN = re.compile(rf"{_FAILURE.pattern}(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
+
+
+def parsed_failure(text: str) -> Failure:
+    """Return a failure from a text like ``3@20``: robot 3 fails after 20 s.
+
+    Raises
+    ------
+    ParameterError
+        When it is none.
+    """
+    found = _FAILURE.fullmatch(text)
+    if found is None:
+        raise ParameterError(f"{shown(text)}, but ROBOT@SECONDS, as in 3@20, was wanted")
+    return Failure(int(found[1]), float(found[2]))
+
+
+def parsed_join(text: str) -> Join:
+    """Return a join from a text like ``5@30`` or ``5@30:2.5,1``: robot 5 joins after 30 s, at [2.5, 1].
+
+    Raises
+    ------
+    ParameterError
+        When it is none.
+    """
+    found = _JOIN.fullmatch(text)
+    if found is None:
+        raise ParameterError(f"{shown(text)}, but ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted")
+    place = None if found[3] is None else (float(found[3]), float(found[4]))
+    return Join(int(found[1]), float(found[2]), place)
+
+
+Entry = TypeVar("Entry", Failure, Join)
+
+
+def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry, ...]:
+    """Return failures or joins in the order of the robots, checked."""
+    found: dict[int, Entry] = {}
+    for k, each in enumerate(given):
+        at = f"conditions.{name}[{k}]"
+        try:
+            robot, time, *rest = each
+            entry = kind(robot, time, *rest)
+        except (TypeError, ValueError):
+            raise ParameterError(f"{at}: {shown(each)}, but a robot and a time were wanted") from None
+        if not is_number(robot, Integral) or robot < 1:
+            raise ParameterError(f"{at}: robot {shown(robot)}, but a whole number from 1 was wanted")
+        if robot in found:
+            raise ParameterError(f"{at}: robot {robot} is given twice")
+        if not is_number(time) or not 0.0 <= time <= _LONGEST:
+            wanted = f"a number from 0 to {_LONGEST:g} s"
+            raise ParameterError(f"{at}: time {shown(time)}, but {wanted} was wanted")
+        entry = entry._replace(robot=int(robot), time=float(time))
+        if isinstance(entry, Join) and entry.place is not None:
+            entry = entry._replace(place=_place(at, entry.place))
+        found[int(robot)] = entry
+    return tuple(found[robot] for robot in sorted(found))
+
+
+def _place(at: str, given: Any) -> tuple[float, float]:
+    try:
+        x, y = given
+        if all(is_number(value) and math.isfinite(value) for value in (x, y)):
+            return float(x), float(y)
+    except (TypeError, ValueError):
+        pass
+    raise ParameterError(f"{at}: place {shown(given)}, but [x, y] in metres was wanted")

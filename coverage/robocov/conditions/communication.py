@@ -16,7 +16,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions.draws import Draws
-from robocov.conditions.parameters import LOSS, SOON, Conditions
+from robocov.conditions import LOSS, SOON, Conditions
 from robocov.observation.neighbours import Neighbours
 
 NEVER = -1
@@ -24,22 +24,15 @@ NEVER = -1
 
 
 class Broadcast(NamedTuple):
-    """What all robots sent at one step, on its way.
-
-    Attributes
-    ----------
-    arrives, sent : int
-        Steps.
-    places : (n, 2) m
-        What each robot told of itself.
-    reaches : (n, n) bool
-        Whether the message of the robot of the column gets to that of the row.
-    """
+    """What all robots sent at one step, on its way."""
 
     arrives: int
+    """Step, as `sent`."""
     sent: int
     places: Array
+    """What each robot told of itself, (n, 2) m."""
     reaches: BoolArray
+    """Whether the message of the robot of the column gets to that of the row, (n, n)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,13 +63,7 @@ class Inbox:
         return cls(sent, arrived, np.zeros((count, count, 2)))
 
     def rearranged(self, rows: IntArray) -> Inbox:
-        """Return what other robots have of this, when some have gone and others have come.
-
-        Parameters
-        ----------
-        rows : (m,) int
-            Which row of this each robot was, -1 for one that is new and has heard nothing.
-        """
+        """Return what remains for a team in which robot i was that of `rows[i]`; -1 is one that is new."""
         old, new = np.maximum(rows, 0), np.asarray(rows) < 0
         strange = new[:, None] | new
 
@@ -91,16 +78,7 @@ class Inbox:
 
 
 class Radio:
-    """Sends and delivers messages under some conditions.
-
-    Parameters
-    ----------
-    conditions : Conditions
-    ranges : (n,) m
-        Communication ranges.
-    dt : float, s
-        Control period.
-    """
+    """Sends and delivers messages under some conditions among robots of communication ranges, (n,) m."""
 
     def __init__(self, conditions: Conditions, ranges: Array, dt: float) -> None:
         self._conditions, self._ranges, self._dt = conditions, ranges, dt
@@ -108,19 +86,9 @@ class Radio:
         self._delay = math.ceil(conditions.delay / dt - SOON)
 
     def exchange(self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray) -> Inbox:
-        """Return what the robots have once messages were sent and delivered at a step.
+        """Return what the robots have once messages were sent and delivered at a step since time zero.
 
-        Parameters
-        ----------
-        inbox : Inbox
-            After the step before.
-        step : int
-            Control steps since time zero.
-        told : (n, 2) m
-            Where each robot believes itself to be.
-        positions : (n, 2) m
-            Where it is, which says who is in range.
-        working : (n,) bool
+        Robots tell where they believe themselves to be, (n, 2) m; where they are says who is in range.
         """
         on_the_way = inbox.on_the_way
         if self._sends(step):

@@ -1,9 +1,9 @@
-"""Chance that depends on nothing but a seed, a step, and whom it is for.
+"""Random numbers that depend on nothing but a seed, a step, and whom they are for.
 
 A generator that is drawn from again and again has a state, and a run that is copied, rewound or branched
 would have to carry it. Here each number is a function of the seed and of what it is drawn for: the
 counter-based generator Philox-4x32-10 of Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy
-as 1, 2, 3* (SC 2011), over as many counters at once as are asked for.
+as 1, 2, 3* (SC 2011), over as many counters at once as are asked for; numpy's makes one stream at a time.
 """
 
 from __future__ import annotations
@@ -26,17 +26,7 @@ _HALF = np.uint64(32)
 
 
 def philox(counter: Words, key: tuple[int, int]) -> Words:
-    """Return Philox-4x32-10 of counters under a key.
-
-    Parameters
-    ----------
-    counter : (4, ...) words of 32 bits
-    key : two words of 32 bits
-
-    Returns
-    -------
-    (4, ...) words of 32 bits
-    """
+    """Return Philox-4x32-10 of counters, (4, ...), under a key of two words, (4, ...)."""
     a, b, c, d = np.asarray(counter, dtype=np.uint64)
     first, second = key
     for _ in range(_ROUNDS):
@@ -48,20 +38,11 @@ def philox(counter: Words, key: tuple[int, int]) -> Words:
 
 
 class Draws:
-    """One stream of chance: numbers for steps and for pairs of whatever is counted.
-
-    Streams of one seed are independent of each other, and so are those of different seeds.
-
-    Parameters
-    ----------
-    seed : int
-        From 0.
-    stream : int
-        From 0.
+    """A stream of random numbers for steps and for pairs of robots; seeds and streams are independent.
 
     Examples
     --------
-    >>> draws = Draws(7, 0)
+    >>> draws = Draws(seed=7, stream=0)
     >>> now, later = draws.uniform(3, np.array([0, 1])), draws.uniform(4, np.array([0, 1]))
     >>> bool((now == draws.uniform(3, np.array([0, 1]))).all()), bool((now == later).any())
     (True, False)
@@ -74,19 +55,12 @@ class Draws:
     def uniform(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
         """Return numbers in the open interval from 0 to 1, of the shape of `one` and `other` together.
 
-        Parameters
-        ----------
-        step : int
-            From 0 to 2⁶⁴ - 1.
-        one, other : whole numbers from 0 to 2³² - 1
+        `step` is from 0 to 2⁶⁴ - 1, `one` and `other` are whole numbers from 0 to 2³² - 1.
         """
         return np.asarray(self._pair(step, one, other)[0])
 
     def normal(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
-        """Return pairs of independent standard normal numbers, (..., 2), by Box and Muller's transformation.
-
-        The parameters are those of `uniform`.
-        """
+        """Return pairs of independent standard normal numbers, (..., 2), by the Box-Muller transform."""
         radius, angle = self._pair(step, one, other)
         radius, angle = np.sqrt(-2.0 * np.log(radius)), 2.0 * np.pi * angle
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)

@@ -9,7 +9,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.draws import Draws
-from robocov.conditions.parameters import POSITION, SCANNING, SENSING, Conditions
+from robocov.conditions import POSITION, SCANNING, SENSING, Conditions
 from robocov.observation import Decision, Observations
 from robocov.observation.scans import Scans
 from robocov.robots import Team
@@ -23,13 +23,6 @@ class Perception:
 
     Row i of what they know still belongs to robot i: messages are what i received, and noise is drawn for
     i, by the step and its row alone.
-
-    Parameters
-    ----------
-    conditions : Conditions
-    team : Team
-    dt : float, s
-        Control period.
     """
 
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
@@ -47,16 +40,10 @@ class Perception:
     def known(
         self, seen: Observations, inbox: Inbox | None, working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
-        """Return what the robots know, and what they have heard by then.
+        """Return what the robots know that work, (n,) bool, and what they have heard by then.
 
-        Parameters
-        ----------
-        seen : Observations
-            As they are: where the robots are, who is in range, what the sensor ought to measure.
-        inbox : Inbox or None
-            After the step before.
-        working : (n,) bool
-            The others know nothing.
+        `seen` is the truth: where the robots are, who is in range, what the sensor ought to measure; `inbox`
+        is as after the step before.
         """
         step = round(seen.time / self._dt)
         truth = seen.positions
@@ -73,23 +60,23 @@ class Perception:
         return replace(seen, neighbours=neighbours, reported_positions=places, report_ages=ages), inbox
 
     def _estimated(self, step: int, positions: Array) -> Array:
-        """Return where the robots believe themselves to be, (n, 2) m."""
-        spread = self._conditions.position_noise
-        if not spread:
+        """Return the positions as the robots localize themselves, (n, 2) m."""
+        sigma = self._conditions.position_noise
+        if not sigma:
             return positions
-        estimated = positions + spread * self._position_chance.normal(step, self._robots)
+        estimated = positions + sigma * self._position_chance.normal(step, self._robots)
         estimated.setflags(write=False)
         return np.asarray(estimated)
 
     def _sensed(self, step: int, seen: Observations, positions: Array) -> Array:
         """Return the obstacle points, (n, 2) m, as robots take them to be that think to be at `positions`."""
-        spread = self._conditions.sensing_noise
-        if not spread and positions is seen.positions:
+        sigma = self._conditions.sensing_noise
+        if not sigma and positions is seen.positions:
             return seen.obstacle_points
         offset = seen.obstacle_points - seen.positions
-        if spread:
+        if sigma:
             distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-            noisy = distance + spread * self._sensing_chance.normal(step, self._robots)[:, 0]
+            noisy = distance + sigma * self._sensing_chance.normal(step, self._robots)[:, 0]
             # towards where the point is; one that is touched lies in no direction
             away = np.where(distance > 0.0, distance, 1.0)
             offset *= np.where(distance > 0.0, np.maximum(noisy, NEAREST) / away, 1.0)[:, None]
@@ -97,24 +84,18 @@ class Perception:
 
     def _scanned(self, step: int, seen: Observations) -> Scans | None:
         """Return the scans as they are measured: what meets nothing is told to meet nothing."""
-        scans, spread = seen.scans, self._conditions.sensing_noise
-        if scans is None or not spread:
+        scans, sigma = seen.scans, self._conditions.sensing_noise
+        if scans is None or not sigma:
             return scans
         rays = np.arange(scans.distances.shape[1])
-        error = spread * self._scanning_chance.normal(step, self._robots[:, None], rays)[..., 0]
+        error = sigma * self._scanning_chance.normal(step, self._robots[:, None], rays)[..., 0]
         distances = np.where(scans.hit, np.maximum(scans.distances + error, NEAREST), scans.distances)
         distances.setflags(write=False)
         return replace(scans, distances=distances)
 
 
 def of_working(decision: Decision, working: BoolArray) -> Decision:
-    """Return a decision in which robots that do not work want nothing.
-
-    Parameters
-    ----------
-    decision : Decision
-    working : (n,) bool
-    """
+    """Return a decision in which robots that do not work, (n,) bool, want nothing."""
     if working.all():
         return decision
     idle = ~working
