@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions.draws import Draws
 from robocov.conditions import LOSS, SOON, Conditions
+from robocov.conditions.draws import Draws
 from robocov.observation.neighbours import Neighbours
 
 NEVER = -1

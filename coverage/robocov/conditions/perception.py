@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
+from robocov.conditions import POSITION, SCANNING, SENSING, Conditions
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.draws import Draws
-from robocov.conditions import POSITION, SCANNING, SENSING, Conditions
 from robocov.observation import Decision, Observations
 from robocov.observation.scans import Scans
 from robocov.robots import Team
