@@ -10,7 +10,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, nearest_allowed
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import gain, response_time_gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -28,15 +28,9 @@ _TOGETHER = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """Where robots had heard those to be that were near.
+    """Where, (m, 2) m, and when, s, robots heard those to be that were near.
 
-    Attributes
-    ----------
-    time : float, s
-    pair : (m,)
-        ``robot * n + neighbour``, ascending.
-    positions : (m, 2) m
-        Of the neighbour, as the robot knew it.
+    The (m,) pairs are ``robot * n + neighbour``, ascending.
     """
 
     time: float
@@ -46,18 +40,7 @@ class Heard:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarrierMemory:
-    """What the robots remember.
-
-    Attributes
-    ----------
-    team : Team
-        A robot knows its own body and limits, and those of the others.
-    heard : Heard or None
-    returns : (n, rays, 2) m or None
-        What the last scan of each met.
-    triangulation : Triangulation or None
-        From which the next cells start.
-    """
+    """What the robots remember: the bodies and limits of all, whom they heard, what the last scan met."""
 
     team: Team
     heard: Heard | None = None
@@ -101,9 +84,7 @@ class Barrier:
     gamma: float = gain(20.0, "s/m²", "how fast h may fall, as gamma h³", low=1e-3)
     braking: float = gain(0.8, "a_max", "alpha: the part of the acceleration counted on", low=0.05, high=1.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
-    response_time: float = gain(
-        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
-    )
+    response_time: float = response_time_gain()
     cells: str = choice_of_cells()
 
     def __post_init__(self) -> None:
@@ -134,14 +115,9 @@ class Barrier:
     def certified(
         self, seen: Observations, memory: BarrierMemory, wanted: Array
     ) -> tuple[Array, BarrierMemory]:
-        """Return the certified accelerations nearest to any that are wanted, and what to remember.
+        """Return the certified accelerations nearest to the wanted ones, (n, 2) m/s², and what to remember.
 
-        Parameters
-        ----------
-        seen : Observations
-        memory : BarrierMemory
-            What `begin`, or this method the last time, returned.
-        wanted : (n, 2) m/s²
+        The memory is what `begin`, or this method the last time, returned.
         """
         team = memory.team
         returns = last_returns(seen, memory.returns)
@@ -204,11 +180,7 @@ def _derived(heard: Heard, before: Heard | None, fastest: Array) -> Array:
     Where a message was late, the next one makes a leap: nobody is faster than `fastest`, (m,) m/s.
     """
     velocities = np.zeros_like(heard.positions)
-    if before is None or not len(before.pair) or heard.time <= before.time:
-        return velocities
-    place = np.minimum(np.searchsorted(before.pair, heard.pair), len(before.pair) - 1)
-    known = before.pair[place] == heard.pair
-    moved = heard.positions[known] - before.positions[place[known]]
-    velocities[known] = moved / (heard.time - before.time)
-    speed = np.hypot(*velocities.T)
-    return np.asarray(velocities * np.minimum(1.0, fastest / np.maximum(speed, 1e-300))[:, None])
+    if before is not None and heard.time > before.time:
+        _, now, then = np.intersect1d(heard.pair, before.pair, assume_unique=True, return_indices=True)
+        velocities[now] = (heard.positions[now] - before.positions[then]) / (heard.time - before.time)
+    return approach(velocities, 1.0, fastest)

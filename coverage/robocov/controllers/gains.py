@@ -95,6 +95,11 @@ def gain(
     return field(default=default, metadata={"gain": Gain("", default, unit, low, high, meaning, optional)})
 
 
+def response_time_gain() -> Any:
+    """Declare the gain that says how fast a law drives its robots to the velocities that it wants."""
+    return gain(0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0)
+
+
 def choice(default: str, words: Sequence[str], meaning: str) -> Any:
     """Declare a gain that is one of several words as a dataclass field.
 

@@ -11,8 +11,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.driving import drive
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.driving import approach, drive
+from robocov.controllers.gains import gain, response_time_gain, validate_gains
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError, shown
@@ -30,19 +30,9 @@ _SIMPLER = 0.005
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeodesicMemory:
-    """What the robots remember.
+    """What the robots remember of the last planning, and when, s, it was.
 
-    Attributes
-    ----------
-    team : Team
-    goals : (n, 2) m or None
-        Where each was going at the last planning, and
-    way : (n, 2) m or None
-        the first way-point to there.
-    beyond : (n,) m or None
-        Length of the way from there to the goal.
-    planned : float, s
-        When that was.
+    Their goals and the first way-points to them, (n, 2) m, and the lengths of the ways from there, (n,) m.
     """
 
     team: Team
@@ -84,9 +74,7 @@ class GeodesicLloyd:
     clearance: float = gain(0.03, "m", "distance that ways keep from walls, beyond the radius", high=10.0)
     period: float = gain(0.2, "s", "time from one planning to the next", high=60.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of way to the goal", high=100.0)
-    response_time: float = gain(
-        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
-    )
+    response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -101,13 +89,7 @@ class GeodesicLloyd:
         return replace(self, environment=environment)
 
     def begin(self, region: Region, team: Team) -> GeodesicMemory:
-        """Return what the robots know of themselves.
-
-        Raises
-        ------
-        ParameterError
-            When the law has not been told the map, or no robot fits into it.
-        """
+        """Return what the robots know of themselves; a ParameterError when no robot fits into the map."""
         self._plan(team)
         return GeodesicMemory(team)
 
@@ -123,7 +105,7 @@ class GeodesicLloyd:
         speed = np.minimum(self.k_prop * (distance + memory.beyond), team.max_speed)
         # the last metre before a way-point that is not the goal is not slower than the others
         speed = np.minimum(speed, distance / self.response_time)
-        wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
+        wanted = approach(offset, np.inf, speed)
         forces = drive(wanted, seen, team, self.response_time)
         return Decision(forces=forces, goals=memory.goals, terms={"attraction": forces}, memory=memory)
 
@@ -136,28 +118,9 @@ class GeodesicLloyd:
 
 
 class Plan:
-    """The map as robots of some size see it that know it; immutable.
+    """The map as robots see it whose centres keep a clearance (m) from the walls; immutable.
 
-    Parameters
-    ----------
-    environment : Environment
-    clearance : float, m
-        From the centres of the robots to the walls.
-    lattice : int
-
-    Attributes
-    ----------
-    cost : CoverageCost
-        What is descended.
-    room : MultiPolygon
-        Where the centres of robots may be, and
-    paths : Geodesics
-        the shortest ways in there.
-
-    Raises
-    ------
-    ParameterError
-        When no robot fits in.
+    It has the `cost` that is descended, the `room` where centres may be, and the shortest `paths` in there.
     """
 
     def __init__(self, environment: Environment, clearance: float, lattice: int) -> None:

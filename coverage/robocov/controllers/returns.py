@@ -11,15 +11,7 @@ from robocov.observation import Observations
 def last_returns(seen: Observations, before: Array | None) -> Array | None:
     """Return the points that each robot's last scan met, (n, rays, 2) m, nan where a ray met nothing.
 
-    Obstacles stand still, robots do not: between two scans a robot goes on with the points of the last
-    one, which it has seen from where it was then.
-
-    Parameters
-    ----------
-    seen : Observations
-        With scans in those steps in which the sensor has made a turn.
-    before : (n, rays, 2) m or None
-        What this function returned the last time.
+    Between two scans a robot goes on with the points of the last one, which this function returned `before`.
     """
     scans = seen.scans
     if scans is None:

@@ -12,8 +12,8 @@ import numpy as np
 from robocov.arrays import Array, ComplexArray, frozen
 from robocov.compiled import kernel
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import avoid, drive
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.driving import approach, avoid, drive
+from robocov.controllers.gains import gain, response_time_gain, validate_gains
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -111,19 +111,9 @@ class Bug:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TangentBugMemory:
-    """What the robots remember.
+    """What the robots remember: themselves, for each the bug, what the last scan met, and squares met so far.
 
-    Attributes
-    ----------
-    team : Team
-        A robot knows its own body and limits.
-    bugs : tuple of Bug
-    returns : (n, rays, 2) m or None
-        What the last scan of each met.
-    met : tuple of (w,)
-        The squares in which each has met something so far: column + i row, ascending.
-    triangulation : Triangulation or None
-        From which the next cells start.
+    These are (w,) numbers, column + i row, ascending.
     """
 
     team: Team
@@ -176,9 +166,7 @@ class TangentBug:
     )
     moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
-    response_time: float = gain(
-        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
-    )
+    response_time: float = response_time_gain()
     cells: str = choice_of_cells()
 
     def __post_init__(self) -> None:
@@ -218,7 +206,7 @@ class TangentBug:
         distance = np.hypot(*offset.T)
         speed = np.where(passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
         speed = np.minimum(speed, distance / self.response_time)
-        wanted = offset * (speed / np.maximum(distance, 1e-300))[:, None]
+        wanted = approach(offset, math.inf, speed)
         keep = team.radius + 0.5 * self.clearance
         return avoid(wanted, seen, team, points, keep, keep + float(team.radius.max()), _EAGERNESS, 0.5)
 
