@@ -51,3 +51,15 @@ def _bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total)
         yield lambda done: bar.update(task, completed=done)
+
+
+def tell_of_compiling(*groups: str) -> None:
+    """Tell when kernels are compiled for the first time; see `robocov.compiled.compile_ahead`."""
+    from robocov import compiled
+
+    def tell(_: str) -> None:
+        compiled.on_compile.remove(tell)
+        print("compiling the simulation, once", file=sys.stderr)
+
+    compiled.on_compile.append(tell)
+    compiled.compile_ahead(*groups)

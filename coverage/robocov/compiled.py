@@ -1,18 +1,22 @@
 """Kernels: plain loops over arrays, compiled by numba when they are first called.
 
 Numba is imported only then. What it compiles is kept in the user's cache folder (``NUMBA_CACHE_DIR`` names
-another one), by the code of a kernel and of all kernels that it calls; an entry that is damaged, or of
-another numba or processor, counts as missing.
+another one, else ``ROBOCOV_CACHE`` one for all that is kept, or none), by the code of a kernel and of all
+kernels that it calls; an entry that is damaged, or of another numba or processor, counts as missing. No two
+processes compile the same kernel at the same time: the second one waits, and loads it.
 With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 """
 
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import pickle
+import subprocess
 import sys
-from contextlib import suppress
+import time
+from contextlib import ExitStack, suppress
 from functools import cached_property, update_wrapper
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -21,7 +25,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import platformdirs
 
+from robocov.errors import OutputError
 from robocov.files.array_cache import ArrayCache
+from robocov.files.lock import locked
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,8 +39,23 @@ _FORMAT = 1
 
 _COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
+_LIMIT = 1 << 28
+"""Bytes of all that is kept; what was not used for the longest time goes first."""
+
+GROUPS = {"cost": "robocov.cost.coverage", "step": "robocov.simulation"}
+"""Kernels that belong together: the module whose function `example` calls them all, on something tiny."""
+
+_PATIENCE = 60.0
+"""Seconds for which another process is waited for."""
+
+_ahead: list[str] = []
+
+_helpers: list[subprocess.Popen[bytes]] = []
+
+_example: _Example | None = None
+
 on_compile: list[Callable[[str], None]] = []
-"""Called with the name of each kernel that is about to be compiled, because the cache does not hold it."""
+"""Called with the name of each kernel that the cache does not hold, before it is compiled."""
 
 
 def kernel(function: _Function) -> _Function:
@@ -78,7 +99,7 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         """Return what the function returns."""
-        return self._dispatcher(*args)
+        return self._dispatcher(*args) if _example is None else _example.call(self, self._function, args)
 
     @cached_property
     def _callees(self) -> dict[str, Kernel]:
@@ -172,12 +193,8 @@ class _KernelCache:
 
     def __init__(self, name: str, identity: str) -> None:
         self._name, self._identity = name, identity
-        # the variable of numba's own caches
-        named = os.environ.get("NUMBA_CACHE_DIR")
-        folder = (
-            Path(named) if named else platformdirs.user_cache_path("robocov", appauthor=False) / "kernels"
-        )
-        self._cache = ArrayCache(folder)
+        folder, self._lock = _cache_folder(), ExitStack()
+        self._cache = None if folder is None else ArrayCache(folder, _LIMIT)
 
     def _key(self, sig: Any, codegen: Any) -> str:
         parts = _numba().__version__, np.__version__, sys.version, repr(codegen.magic_tuple())
@@ -185,23 +202,128 @@ class _KernelCache:
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for the types of the arguments, None where it is to be compiled."""
+        target_context.refresh()
+        key = self._key(sig, target_context.codegen())
+        found = self._loaded(key, target_context)
+        if found is None:
+            for tell in on_compile:
+                tell(self._name)
+            if self._is_kept():
+                _start_helpers()
+                found = self._awaited(key, target_context)
+        return found
+
+    def _is_kept(self) -> bool:
+        if self._cache is None:
+            return False
+        with suppress(OSError):
+            self._cache.folder.mkdir(parents=True, exist_ok=True)
+        return self._cache.folder.is_dir() and os.access(self._cache.folder, os.W_OK)
+
+    def _awaited(self, key: str, target_context: Any) -> Any:
+        """Return what another process that has begun to compile this is going to save, None if none has."""
+        assert self._cache is not None
+        until = time.monotonic() + _PATIENCE
+        while time.monotonic() < until:
+            try:
+                self._lock.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
+            except OutputError:
+                time.sleep(0.02)
+                continue
+            # it may have been saved just before
+            found = self._loaded(key, target_context)
+            if found is not None:
+                self._lock.close()
+            return found
+        return None
+
+    def _loaded(self, key: str, target_context: Any) -> Any:
         from numba.core import compiler
 
-        target_context.refresh()
-        entry = self._cache.load(self._key(sig, target_context.codegen()))
+        entry = None if self._cache is None else self._cache.load(key)
         if entry is not None:
             # a cache is never in the way, whatever there may be in it
             with suppress(Exception):
                 rebuild: Any = compiler.CompileResult._rebuild
                 return rebuild(target_context, *pickle.loads(entry["code"].tobytes()))
-        for tell in on_compile:
-            tell(self._name)
         return None
 
     def save_overload(self, sig: Any, result: Any) -> None:
         """Keep what was compiled."""
-        code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
-        self._cache.save(self._key(sig, result.codegen), {"code": code})
+        if self._cache is not None:
+            code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
+            self._cache.save(self._key(sig, result.codegen), {"code": code})
+        self._lock.close()
+
+
+def _cache_folder() -> Path | None:
+    # the variable of numba's own caches
+    named, ours = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("ROBOCOV_CACHE")
+    if named:
+        return Path(named)
+    if ours == "":
+        return None
+    return (Path(ours) if ours else platformdirs.user_cache_path("robocov", appauthor=False)) / "kernels"
+
+
+def compile_ahead(*groups: str) -> None:
+    """Say which `GROUPS` of kernels are going to be called, those first that are called last.
+
+    As soon as a kernel is not in the cache, other processes compile these, as many as there are other cores.
+    """
+    _ahead[:] = groups
+
+
+def _start_helpers() -> None:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    helpers = min(len(_ahead), cores - 1)
+    path = os.pathsep.join(filter(None, sys.path))
+    for k in range(helpers):
+        # -P: what lies in the working folder is not meant
+        command = [sys.executable, "-P", "-m", "robocov.compiled", *_ahead[k::helpers]]
+        with suppress(OSError):
+            _helpers.append(
+                subprocess.Popen(
+                    command,
+                    env={**os.environ, "PYTHONPATH": path},
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+            )
+    _ahead.clear()
+
+
+class _Example:
+    """Calls of kernels, which run as Python meanwhile."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Kernel, tuple[Any, ...]]] = []
+        self._inside = False
+
+    def call(self, kernel: Kernel, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+        """Return what the function returns; keep the call, unless another kernel's function makes it."""
+        if self._inside:
+            return function(*args)
+        self.calls.append((kernel, tuple(map(_numba().typeof, args))))
+        self._inside = True
+        try:
+            return function(*args)
+        finally:
+            self._inside = False
+
+
+def compile_group(name: str) -> None:
+    """Compile one of the `GROUPS`, its last kernels first: who calls them begins with the others."""
+    global _example
+    module = importlib.import_module(GROUPS[name])
+    _example = example = _Example()
+    try:
+        module.example()
+    finally:
+        _example = None
+    for kernel, kinds in reversed(example.calls):
+        kernel._dispatcher.compile(kinds)
 
 
 def _described(kind: Any) -> str:
@@ -229,3 +351,11 @@ def _numba() -> ModuleType:
         if ours:
             del sys.modules["coverage"]
     return numba
+
+
+if __name__ == "__main__":
+    # the module that the kernels know is another one than this, which is called otherwise
+    from robocov import compiled
+
+    for group in sys.argv[1:]:
+        compiled.compile_group(group)

@@ -16,7 +16,7 @@ from robocov.conditions.perception import Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller
 from robocov.controllers.user_modules import fault_of
-from robocov.environment import Environment
+from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.decisions import checked_decision, detached, given_forces
@@ -452,3 +452,14 @@ def check_dt(dt: float) -> None:
     """
     if not 1e-4 <= dt <= 1.0:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
+
+
+def example() -> None:
+    """Call the kernels of a step."""
+    from robocov.controllers import Rapf
+
+    square, triangle = ((0, 0), (3, 0), (3, 3), (0, 3)), PolygonObstacle(((1, 1), (2, 1), (2, 2)))
+    starts = np.array([[0.4, 0.4], [0.4, 0.8], [0.8, 0.4], [2.5, 0.5]])
+    simulation = Simulation(Environment("example", square, (triangle,)), Rapf(), starts)
+    for _ in range(3):
+        simulation.step()

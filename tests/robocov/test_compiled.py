@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov.compiled import kernel, on_compile
+from robocov.compiled import GROUPS, _KernelCache, compile_group, kernel, on_compile
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,22 +27,23 @@ print(doubled(0.5))
 """
 
 
-def said(folder, *, jit=True, script=SCRIPT):
-    """Return what a script in the checkout's root says that calls a kernel."""
+def started(folder, *, jit=True, script=SCRIPT):
+    """Start a script in the checkout's root that calls a kernel."""
     variables = {
         "NUMBA_CACHE_DIR": str(folder),
         "NUMBA_DISABLE_JIT": str(int(not jit)),
         "PYTHONPATH": os.pathsep.join(str(ROOT / part) for part in ("", "coverage", "app")),
     }
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=ROOT,
-        env=os.environ | variables,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return done.stdout.split()
+    command = [sys.executable, "-c", script]
+    return subprocess.Popen(command, cwd=ROOT, env=os.environ | variables, stdout=subprocess.PIPE, text=True)
+
+
+def said(*args, **options):
+    """Return what such a script says."""
+    process = started(*args, **options)
+    answer, _ = process.communicate()
+    assert process.returncode == 0
+    return answer.split()
 
 
 def test_a_kernel_is_compiled_once_and_a_damaged_cache_is_a_miss(tmp_path):
@@ -52,6 +54,22 @@ def test_a_kernel_is_compiled_once_and_a_damaged_cache_is_a_miss(tmp_path):
     for damaged in (b"", whole[:1000], whole[:-1] + b"?"):
         entry.write_bytes(damaged)
         assert said(tmp_path) == ["doubled", "1.0"]
+
+
+def test_of_several_processes_one_compiles(tmp_path):
+    script = SCRIPT + "print(sum(doubled._dispatcher._cache_hits.values()))"
+    processes = [started(tmp_path, script=script) for _ in range(3)]
+    hits = [int(process.communicate()[0].split()[-1]) for process in processes]
+    assert sorted(hits) == [0, 1, 1]
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_the_example_of_a_group_stands_for_real_calls(group, monkeypatch):
+    """A process that compiles ahead runs it as Python, and notes what is called with which types."""
+    compile_group(group)
+    monkeypatch.setattr(_KernelCache, "load_overload", lambda *_: pytest.fail("another signature"))
+    importlib.import_module(GROUPS[group]).example()
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):

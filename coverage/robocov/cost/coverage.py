@@ -16,6 +16,7 @@ from robocov.cost.lattice import Number, Sites, lattice_of
 from robocov.cost.site_paths import CornerViews, Paths, corner_views, site_paths
 from robocov.density.masses import means_over_squares
 from robocov.drawing import Drawable
+from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, checked, counted, shown
 from robocov.geodesic import Geodesics
 from robocov.geodesic.distances import BINS, CORNER_BINS, with_room
@@ -23,7 +24,6 @@ from robocov.geodesic.distances import BINS, CORNER_BINS, with_room
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov.environment import Environment
     from robocov.geodesic.visibility import AngularWallIndex
 
 MAX_LATTICE = 4096
@@ -385,3 +385,9 @@ def checked_speeds(speeds: object, robots: int) -> Array:
         if not 0.0 < value < np.inf:
             raise InputError(f"speeds[{k}]: {shown(value)} m/s, but a number above 0 was wanted")
     return values
+
+
+def example() -> None:
+    """Call all kernels of the cost."""
+    square, triangle = ((0, 0), (3, 0), (3, 3), (0, 3)), PolygonObstacle(((1, 1), (2, 1), (2, 2)))
+    CoverageCost(Environment("example", square, (triangle,)), 2)(np.array([[0.5, 0.5]]))
