@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 _SAME_PLACE = 1e-6
 """Vertices closer than this, in metres, are one vertex given twice."""
 
-
 MANY_VERTICES = 5000
 """Of a map with more vertices it is said that it takes time."""
 
@@ -33,18 +32,8 @@ _COST_SECONDS = 1.2e-7
 desks in a hall, 2.9 and 11.7 s."""
 
 
-@dataclass(frozen=True)
-class StartReport:
-    """A start of a map.
-
-    Attributes
-    ----------
-    name : str
-    kind : str
-        ``disc``, ``uniform`` or ``points``.
-    capacity : int
-        About how many robots fit.
-    """
+class StartReport(NamedTuple):
+    """A start of a map: its kind, ``disc``, ``uniform`` or ``points``, and about how many robots fit."""
 
     name: str
     kind: str
@@ -70,11 +59,9 @@ class MapReport:
     warnings : tuple of str
         What may be a mistake, one line each.
     density : str or None
-        Which kind of density there is; None where every place counts the same, for want of one.
-    density_range : (lowest, highest) or None
-        Bounds of its values.
+        Its kind, None where there is none; with bounds of its values, `density_range`, and
     mean_density : float
-        Its mean over the free space.
+        its mean over the free space.
     """
 
     name: str
@@ -106,11 +93,11 @@ class MapReport:
             "vertices": self.vertices,
             "obstacles": self.obstacles,
             "components_m2": list(self.components),
-            "narrowest_gap_m": None if gap is None else gap.width,
-            "narrowest_gap_between": None if gap is None else [list(point) for point in gap.between],
+            "narrowest_gap_m": gap and gap.width,
+            "narrowest_gap_between": gap and [list(point) for point in gap.between],
             "starts": {start.name: {"kind": start.kind, "capacity": start.capacity} for start in self.starts},
             "density": self.density,
-            "density_range": None if self.density_range is None else list(self.density_range),
+            "density_range": self.density_range and list(self.density_range),
             "mean_density": self.mean_density,
             "warnings": list(self.warnings),
         }
@@ -248,10 +235,9 @@ def _start_report(environment: Environment, name: str, radius: float) -> StartRe
     spec = environment.starts[name]
     if isinstance(spec, PointsStart):
         return StartReport(name, "points", len(spec.positions))
-    room = environment.free.buffer(-radius * (1 + GAP))
+    room, kind = environment.free.buffer(-radius * (1 + GAP)), "uniform"
     if isinstance(spec, DiscStart):
-        room = room.intersection(shapely.Point(spec.center).buffer(spec.radius, quad_segs=64))
+        room, kind = room.intersection(shapely.Point(spec.center).buffer(spec.radius, quad_segs=64)), "disc"
     # robots in the densest packing, a hexagonal one
     cell = 2 * math.sqrt(3) * (radius * (1 + GAP)) ** 2
-    kind = "disc" if isinstance(spec, DiscStart) else "uniform"
     return StartReport(name, kind, max(1, int(room.area / cell)))

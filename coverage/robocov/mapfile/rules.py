@@ -9,7 +9,7 @@ import shapely
 from shapely import Polygon
 
 from robocov.density import WeightedArea, WeightedPolygons
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
+from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.environment.starts import GAP, DiscStart, PointsStart, UniformStart
 from robocov.errors import MapError, Mistake, StartError, place
 from robocov.mapfile.models import LARGEST, SMALLEST
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.environment import Ring
-    from robocov.environment.obstacle_path import ObstaclePath
     from robocov.errors import JsonPath
 
 _FLAT = 1e-9
@@ -28,13 +27,7 @@ _FLAT = 1e-9
 
 
 def check_rules(environment: Environment, where: str) -> None:
-    """Check that `environment` can be simulated.
-
-    Parameters
-    ----------
-    environment : Environment
-    where : str
-        What messages call the map: a file's name.
+    """Check that `environment`, which messages call `where`, can be simulated.
 
     Raises
     ------
@@ -43,12 +36,16 @@ def check_rules(environment: Environment, where: str) -> None:
     """
     found = list(_ring_mistakes(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
-        found += _obstacle_mistakes(("obstacles", k), obstacle)
+        at = ("obstacles", k)
+        if isinstance(obstacle, PolygonObstacle):
+            found += _polygon_mistakes(at, obstacle)
+        elif isinstance(obstacle, WallObstacle):
+            found += _line_mistakes((*at, "points"), obstacle.points, "wall")
         if obstacle.path is not None:
-            found += _path_mistakes(("obstacles", k, "path"), obstacle.path)
+            found += _line_mistakes((*at, "path", "points"), obstacle.path.points, "path")
     if isinstance(environment.density, WeightedPolygons):
         for k, area in enumerate(environment.density.areas):
-            found += _area_mistakes(("density", "areas", k), area)
+            found += _polygon_mistakes(("density", "areas", k), area)
     if not found:
         found = list(_space_mistakes(environment))
     if found:
@@ -64,9 +61,11 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
         what = f"{count} different point{'s' if count > 1 else ''}, but at least 3 were wanted"
         yield Mistake.at(at, what)
         return
-    wrong_size = _wrong_size(extent)
-    if wrong_size:
-        yield Mistake.at(at, wrong_size)
+    if extent.max() > LARGEST:
+        yield _too_large(at, extent)
+        return
+    if extent.min() < SMALLEST:
+        yield Mistake.at(at, f"{_size(extent)}, but at least {SMALLEST * 1000:g} mm each way was wanted")
         return
     polygon = Polygon(points)
     # a ring that crosses itself may have no area either
@@ -78,14 +77,24 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
         yield _crossing(at, points, polygon)
 
 
-def _wrong_size(extent: Array) -> str | None:
-    """Return what is wrong with the (2,) width and height of something."""
-    size = f"{extent[0]:g} x {extent[1]:g} m"
+def _line_mistakes(at: JsonPath, line: Ring, thing: str) -> Iterator[Mistake]:
+    """Yield what is wrong with the points of a wall or a path."""
+    points = np.asarray(line, dtype=float)
+    extent = np.ptp(points, axis=0)
     if extent.max() > LARGEST:
-        return f"{size}, but at most {LARGEST / 1000:g} km was wanted"
-    if extent.min() < SMALLEST:
-        return f"{size}, but at least {SMALLEST * 1000:g} mm each way was wanted"
-    return None
+        yield _too_large(at, extent)
+    elif extent.max() < SMALLEST:
+        length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        size = f"{length:g} m long" if thing == "wall" else f"{extent.max():g} m wide"
+        yield Mistake.at(at, f"a {thing} {size}, but at least {SMALLEST * 1000:g} mm was wanted")
+
+
+def _too_large(at: JsonPath, extent: Array) -> Mistake:
+    return Mistake.at(at, f"{_size(extent)}, but at most {LARGEST / 1000:g} km was wanted")
+
+
+def _size(extent: Array) -> str:
+    return f"{extent[0]:g} x {extent[1]:g} m"
 
 
 def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
@@ -108,56 +117,22 @@ def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
     )
 
 
-def _obstacle_mistakes(
-    at: JsonPath, obstacle: PolygonObstacle | CircleObstacle | WallObstacle
-) -> Iterator[Mistake]:
-    if isinstance(obstacle, PolygonObstacle):
-        found = list(_ring_mistakes((*at, "vertices"), obstacle.vertices))
-        for k, hole in enumerate(obstacle.holes):
-            found += _ring_mistakes((*at, "holes", k), hole)
-        yield from found
-        if not found:
-            yield from _hole_mistakes(at, obstacle)
-    elif isinstance(obstacle, WallObstacle):
-        points = np.asarray(obstacle.points, dtype=float)
-        extent = np.ptp(points, axis=0)
-        if extent.max() < SMALLEST:
-            length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-            what = f"a wall {length:g} m long, but at least {SMALLEST * 1000:g} mm was wanted"
-            yield Mistake.at((*at, "points"), what)
-        elif extent.max() > LARGEST:
-            size = f"{extent[0]:g} x {extent[1]:g} m"
-            yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
-
-
-def _area_mistakes(at: JsonPath, area: WeightedArea) -> Iterator[Mistake]:
-    """Yield what is wrong with the outline of a weighted area."""
-    yield from _obstacle_mistakes(at, PolygonObstacle(area.vertices, area.holes))
-
-
-def _path_mistakes(at: JsonPath, path: ObstaclePath) -> Iterator[Mistake]:
-    """Yield what is wrong with the path of an obstacle."""
-    extent = np.ptp(np.asarray(path.points, dtype=float), axis=0)
-    if extent.max() > LARGEST:
-        size = f"{extent[0]:g} x {extent[1]:g} m"
-        yield Mistake.at((*at, "points"), f"{size}, but at most {LARGEST / 1000:g} km was wanted")
-    elif extent.max() < SMALLEST:
-        what = f"a path {extent.max():g} m wide, but at least {SMALLEST * 1000:g} mm was wanted"
-        yield Mistake.at((*at, "points"), what)
-
-
-def _hole_mistakes(at: JsonPath, obstacle: PolygonObstacle) -> Iterator[Mistake]:
-    """Yield what is wrong with the holes of a polygon whose rings are good one by one."""
-    if obstacle.polygon.is_valid:
+def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Mistake]:
+    found = list(_ring_mistakes((*at, "vertices"), shape.vertices))
+    for k, hole in enumerate(shape.holes):
+        found += _ring_mistakes((*at, "holes", k), hole)
+    yield from found
+    if found or shape.polygon.is_valid:
         return
-    shell = Polygon(obstacle.vertices)
+    # each ring is good by itself
+    shell = Polygon(shape.vertices)
     good: list[Ring] = []
-    for k, hole in enumerate(obstacle.holes):
+    for k, hole in enumerate(shape.holes):
         path = (*at, "holes", k)
         if not shell.covers(Polygon(hole)):
             what = f"sticks out of {place((*at, 'vertices'))}, but a hole inside was wanted"
             yield Mistake.at(path, what)
-        elif not Polygon(obstacle.vertices, [*good, hole]).is_valid:
+        elif not Polygon(shape.vertices, [*good, hole]).is_valid:
             yield Mistake.at(path, "meets the outline or another hole, but a hole apart from them was wanted")
         else:
             good.append(hole)
