@@ -134,6 +134,14 @@ class Kernel:
     def _dispatcher(self) -> Any:
         dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True, **self._options)
         dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
+        array, typeof = _numba().types.Array, dispatcher.typeof_pyval
+
+        def without_flags(value: Any) -> Any:
+            # else each combination of arrays that may be written and that may not would be compiled anew
+            kind = typeof(value)
+            return kind.copy(readonly=False) if isinstance(kind, array) and not kind.mutable else kind
+
+        dispatcher.typeof_pyval = without_flags
         return dispatcher
 
     @cached_property

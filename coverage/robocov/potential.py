@@ -1,6 +1,6 @@
-"""The artificial potentials (23)-(27) of the paper, as pure functions of offsets and distances.
+"""The forces (24) and (27) of the paper's artificial potentials (23) and (26), in one walk over the robots.
 
-All are vectorised: m pairs, or n robots, at once. What the paper leaves open is decided here:
+What the paper leaves open is decided here:
 
 - *Contact*. (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude stays what it is
   there, and the potential goes on linearly, so that F = -grad U holds everywhere.
@@ -15,94 +15,124 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.compiled import inlined_kernel, inner_kernel, kernel
+from robocov.observation.neighbours import binned, row_of
 
 CONTACT_DISTANCE = 0.01
 """Distance in metres below which the repulsion no longer grows: a tenth of a robot's radius."""
 
+_TOGETHER = 1e-12
+"""Distance in metres at which two robots in one place are taken to be."""
+
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
-def repulsive_potential(distance: Array, k_rep: float, rho_0: float) -> Array:
-    """Return the repulsive potential (23), J.
+@inlined_kernel
+def _repulsion(distance: float, k_rep: float, rho_0: float) -> float:
+    """Return the magnitude of (24) for each metre of offset, N/m; zero where that has no direction."""
+    inverse = 1.0 / max(distance, CONTACT_DISTANCE)
+    magnitude = k_rep * max(inverse - 1.0 / rho_0, 0.0) * inverse * inverse
+    return magnitude / distance if distance > 0.0 else 0.0
+
+
+@inlined_kernel
+def _attraction(square: float, k_att: float, limit: float) -> float:
+    """Return the magnitude of (27) for each metre of offset, N/m."""
+    return float(min(k_att * square, limit / max(np.sqrt(square), 1e-300)))
+
+
+@kernel
+def potential_forces(
+    positions: Array,
+    reported: Array,
+    indptr: IntArray,
+    indices: IntArray,
+    team: int,
+    obstacle_points: Array,
+    goals: Array,
+    k_rep: float,
+    rho_0: float,
+    k_att: float,
+    limit: float,
+) -> Array:
+    """Return the forces (25) + (27) on each robot, and their three parts, (4, n, 2) N.
+
+    The parts are the attraction to the goal (27), the sum of (24) over the robots within `rho_0` that it
+    hears, and (24) from the closest obstacle point, zero where that is nan.
 
     Parameters
     ----------
-    distance : (m,) m
-        rho, from the robot to the other robot or to the obstacle point.
-    k_rep : float, N m³
-    rho_0 : float, m
-        Range of the interaction; the potential is zero beyond it.
+    positions, obstacle_points, goals : (n, 2) m
+    reported : (m, 2) m, indptr : (n + 1,), indices : (m,), team : int
+        Who hears whom, and where; as `robocov.voronoi.clipping.cells_of` takes them.
+    k_rep, rho_0, k_att, limit : float
+        N m³, m, N/m³ and N; `limit` may be infinite.
     """
-    near = np.clip(distance, CONTACT_DISTANCE, rho_0)
-    energy = 0.5 * k_rep * (1.0 / near - 1.0 / rho_0) ** 2
-    inside = np.maximum(CONTACT_DISTANCE - distance, 0.0)
-    return np.asarray(energy + inside * _repulsion_at(np.array(CONTACT_DISTANCE), k_rep, rho_0))
+    n = len(positions)
+    forces = np.zeros((4, n, 2))
+    starts, order = np.empty(2 * team + 8, np.intp), np.empty(team, np.intp)
+    left = low = scale = 0.0
+    columns = rows = 1
+    for i in range(n):
+        x, y = positions[i, 0], positions[i, 1]
+        if len(indptr):
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                if len(reported):
+                    _push(forces, i, j, x - reported[k, 0], y - reported[k, 1], k_rep, rho_0)
+                else:
+                    _push(forces, i, j, x - positions[j, 0], y - positions[j, 1], k_rep, rho_0)
+        else:
+            if i % team == 0:
+                left, low, scale, columns, rows = binned(positions, i, i + team, rho_0, starts, order)
+            column, row = row_of(x - left, scale), row_of(y - low, scale)
+            for r in range(max(row - 1, 0), min(row + 2, rows)):
+                b = r * columns
+                for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
+                    j = order[k]
+                    if j != i:
+                        _push(forces, i, j, x - positions[j, 0], y - positions[j, 1], k_rep, rho_0)
+        dx, dy = x - obstacle_points[i, 0], y - obstacle_points[i, 1]
+        part = _repulsion(np.sqrt(dx * dx + dy * dy), k_rep, rho_0)
+        if part > 0.0:
+            forces[3, i, 0], forces[3, i, 1] = part * dx, part * dy
+        dx, dy = goals[i, 0] - x, goals[i, 1] - y
+        part = _attraction(dx * dx + dy * dy, k_att, limit)
+        forces[1, i, 0], forces[1, i, 1] = part * dx, part * dy
+        for c in range(2):
+            forces[0, i, c] = forces[1, i, c] + forces[2, i, c] + forces[3, i, c]
+    return forces
 
 
-def repulsive_force(offset: Array, distance: Array, k_rep: float, rho_0: float) -> Array:
-    """Return the repulsive force (24), (m, 2) N, away from the other end of each pair.
-
-    Parameters
-    ----------
-    offset : (m, 2) m
-        q - q_i: from the other robot or the obstacle point to the robot.
-    distance : (m,) m
-        Its length; where it is zero the force is zero (see `separation` for robots).
-    k_rep : float, N m³
-    rho_0 : float, m
-    """
-    size = np.maximum(distance, CONTACT_DISTANCE)
-    over = _repulsion_at(size, k_rep, rho_0) / np.maximum(distance, 1e-300)
-    over[distance <= 0.0] = 0.0
-    return np.asarray(offset * over[:, None])
+@inner_kernel
+def _push(forces: Array, i: int, j: int, dx: float, dy: float, k_rep: float, rho_0: float) -> None:
+    """Add (24) on robot i from robot j to its sum."""
+    square = dx * dx + dy * dy
+    if square > rho_0 * rho_0:
+        return
+    distance = np.sqrt(square)
+    if distance < _TOGETHER:
+        dx, dy = _apart(i, j)
+        dx, dy, distance = _TOGETHER * dx, _TOGETHER * dy, _TOGETHER
+    part = _repulsion(distance, k_rep, rho_0)
+    forces[2, i, 0] += part * dx
+    forces[2, i, 1] += part * dy
 
 
-def _repulsion_at(distance: Array, k_rep: float, rho_0: float) -> Array:
-    """Return the magnitude of (24), N, at distances of at least `CONTACT_DISTANCE`."""
-    inverse = 1.0 / distance
-    return np.asarray(k_rep * np.maximum(inverse - 1.0 / rho_0, 0.0) * inverse * inverse)
+@inner_kernel
+def _apart(i: int, j: int) -> tuple[float, float]:
+    angle = _GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
+    sign = 1.0 if i < j else -1.0
+    return sign * np.cos(angle), sign * np.sin(angle)
 
 
+@kernel
 def separation(robot: IntArray, neighbour: IntArray) -> Array:
     """Return unit vectors, (m, 2), along which robots in one place are told apart.
 
     Opposite for (i, j) and (j, i), and a function of the two numbers alone.
     """
-    angle = _GOLDEN_ANGLE * (np.minimum(robot, neighbour) + 1.0) * (np.maximum(robot, neighbour) + 1.0)
-    sign = np.where(robot < neighbour, 1.0, -1.0)
-    return np.column_stack([sign * np.cos(angle), sign * np.sin(angle)])
-
-
-def attractive_potential(distance: Array, k_att: float, limit: float | None = None) -> Array:
-    """Return the attractive potential (26), J; beyond the distance where the force reaches `limit`, linear.
-
-    Parameters
-    ----------
-    distance : (n,) m
-        rho_goal, from the robot to its goal.
-    k_att : float, N/m³
-    limit : float, N, or None
-    """
-    if limit is None or k_att == 0.0:
-        return np.asarray(0.25 * k_att * distance**4)
-    knee = np.cbrt(limit / k_att)
-    near = np.minimum(distance, knee)
-    return np.asarray(0.25 * k_att * near**4 + limit * np.maximum(distance - knee, 0.0))
-
-
-def attractive_force(offset: Array, k_att: float, limit: float | None = None) -> Array:
-    """Return the attractive force (27), (n, 2) N.
-
-    Parameters
-    ----------
-    offset : (n, 2) m
-        q_goal - q: from the robot to its goal.
-    k_att : float, N/m³
-    limit : float, N, or None
-        Cap of the magnitude; None is the paper's formula.
-    """
-    square = offset[:, 0] ** 2 + offset[:, 1] ** 2
-    gain = k_att * square
-    if limit is not None:
-        gain = np.minimum(gain, limit / np.maximum(np.sqrt(square), 1e-300))
-    return np.asarray(offset * gain[:, None])
+    directions = np.empty((len(robot), 2))
+    for k in range(len(robot)):
+        directions[k, 0], directions[k, 1] = _apart(robot[k], neighbour[k])
+    return directions

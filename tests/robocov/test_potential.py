@@ -5,17 +5,48 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.potential import (
-    CONTACT_DISTANCE,
-    attractive_force,
-    attractive_potential,
-    repulsive_force,
-    repulsive_potential,
-    separation,
-)
+from robocov.observation.neighbours import NOBODY, Neighbours
+from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
 
 coordinate = st.floats(-5, 5)
 strength = st.floats(0.01, 100)
+
+
+def forces(
+    positions: np.ndarray,
+    obstacle_points: np.ndarray | None = None,
+    goals: np.ndarray | None = None,
+    k: tuple[float, ...] = (0.0, 2.0, 0.0, np.inf),
+    links: tuple[np.ndarray, np.ndarray] = (NOBODY, NOBODY),
+    reported: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return all forces, by strength and range of the repulsion, strength and limit of the attraction."""
+    points = np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points
+    reported = np.empty((0, 2)) if reported is None else reported
+    goals = positions if goals is None else goals
+    return potential_forces(positions, reported, *links, len(positions), points, goals, *k)
+
+
+def repulsive_force(offset: np.ndarray, k_rep: float, rho_0: float) -> np.ndarray:
+    return forces(offset, np.zeros_like(offset), k=(k_rep, rho_0, 0.0, np.inf))[3]
+
+
+def attractive_force(offset: np.ndarray, k_att: float, limit: float | None = None) -> np.ndarray:
+    return forces(
+        np.zeros_like(offset), goals=offset, k=(0.0, 2.0, k_att, np.inf if limit is None else limit)
+    )[1]
+
+
+def repulsive_potential(distance: np.ndarray, k_rep: float, rho_0: float) -> np.ndarray:
+    """Equation (23)."""
+    return np.where(distance < rho_0, 0.5 * k_rep * (1.0 / distance - 1.0 / rho_0) ** 2, 0.0)
+
+
+def attractive_potential(distance: np.ndarray, k_att: float, limit: float | None = None) -> np.ndarray:
+    """Equation (26), linear from where its slope is the limit."""
+    knee = np.inf if limit is None else np.cbrt(limit / k_att)
+    near = np.minimum(distance, knee)
+    return 0.25 * k_att * near**4 + (0.0 if limit is None else limit * (distance - near))
 
 
 def gradient(energy, x: float, y: float, h: float = 1e-6) -> np.ndarray:
@@ -32,7 +63,7 @@ def test_repulsion_is_minus_the_gradient_of_its_potential(
     distance = float(np.hypot(x, y))
     if distance < 0.05 or abs(distance - rho_0) < 1e-4:
         return
-    force = repulsive_force(np.array([[x, y]]), np.array([distance]), k_rep, rho_0)[0]
+    force = repulsive_force(np.array([[x, y]]), k_rep, rho_0)[0]
     expected = -gradient(lambda d: repulsive_potential(d, k_rep, rho_0), x, y)
     np.testing.assert_allclose(force, expected, rtol=2e-4, atol=1e-5 * k_rep)
 
@@ -50,7 +81,7 @@ def test_attraction_is_minus_the_gradient_of_its_potential(
 
 
 def test_equation_24_at_a_hand_computed_place() -> None:
-    force = repulsive_force(np.array([[0.5, 0.0]]), np.array([0.5]), k_rep=1.0, rho_0=2.0)
+    force = repulsive_force(np.array([[0.5, 0.0]]), k_rep=1.0, rho_0=2.0)
     np.testing.assert_allclose(force, [[(2.0 - 0.5) / 0.25, 0.0]])
     np.testing.assert_allclose(repulsive_potential(np.array([0.5]), 1.0, 2.0), [0.5 * 1.5**2])
 
@@ -62,7 +93,7 @@ def test_equation_27_at_a_hand_computed_place() -> None:
 
 def test_repulsion_is_zero_beyond_its_range_and_continuous_there() -> None:
     distance = np.array([1.999999, 2.0, 2.5, 1e9])
-    force = repulsive_force(np.column_stack([distance, 0 * distance]), distance, 1.0, 2.0)
+    force = repulsive_force(np.column_stack([distance, 0 * distance]), 1.0, 2.0)
     assert force[0, 0] == pytest.approx(0.0, abs=1e-6)
     assert (force[1:] == 0.0).all()
     assert (repulsive_potential(distance[1:], 1.0, 2.0) == 0.0).all()
@@ -70,8 +101,8 @@ def test_repulsion_is_zero_beyond_its_range_and_continuous_there() -> None:
 
 @given(distance=st.one_of(st.just(0.0), st.floats(1e-12, CONTACT_DISTANCE)))
 def test_contact_is_not_singular(distance: float) -> None:
-    at = repulsive_force(np.array([[CONTACT_DISTANCE, 0.0]]), np.array([CONTACT_DISTANCE]), 1.0, 2.0)
-    near = repulsive_force(np.array([[distance, 0.0]]), np.array([distance]), 1.0, 2.0)
+    at = repulsive_force(np.array([[CONTACT_DISTANCE, 0.0]]), 1.0, 2.0)
+    near = repulsive_force(np.array([[distance, 0.0]]), 1.0, 2.0)
     assert np.isfinite(near).all()
     if distance > 0:
         np.testing.assert_allclose(near, at, rtol=1e-9)
@@ -96,3 +127,37 @@ def test_robots_in_one_place_are_pushed_apart_in_opposite_directions(pair: list[
     i, j = np.array([pair[0]]), np.array([pair[1]])
     np.testing.assert_array_equal(separation(i, j), -separation(j, i))
     np.testing.assert_allclose(np.hypot(*separation(i, j)[0]), 1.0)
+
+
+@given(
+    n=st.integers(1, 80),
+    seed=st.integers(0, 2**32),
+    rho_0=st.floats(0.1, 4.0),
+    heard=st.sampled_from(["all", "near", "reports"]),
+)
+def test_all_forces_against_one_pair_after_the_other(n: int, seed: int, rho_0: float, heard: str) -> None:
+    rng = np.random.default_rng(seed)
+    positions, goals, points = rng.uniform(0.0, 10.0, (3, n, 2))
+    points[rng.random(n) < 0.3] = np.nan
+    neighbours = Neighbours(n) if heard == "all" else Neighbours.within(positions, rng.uniform(0, 8, n))
+    robot, other = neighbours.pairs()
+    places = positions[other] + (0.1 * rng.normal(size=(len(other), 2)) if heard == "reports" else 0.0)
+    links = (NOBODY, NOBODY) if neighbours.indptr is None else (neighbours.indptr, other)
+    found = forces(
+        positions, points, goals, (0.7, rho_0, 1.3, 5.0), links, places if heard == "reports" else None
+    )
+    expected = np.zeros((4, n, 2))
+    for i, place in zip(robot.tolist(), places, strict=True):
+        expected[2, i] += repulsive_force((positions[i] - place)[None], 0.7, rho_0)[0]
+    expected[3] = [
+        np.nan_to_num(repulsive_force((p - q)[None], 0.7, rho_0)[0])
+        for p, q in zip(positions, points, strict=True)
+    ]
+    expected[1] = attractive_force(goals - positions, 1.3, 5.0)
+    expected[0] = expected[1:].sum(axis=0)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    crowd = np.concatenate([positions, positions])
+    twins = forces(crowd, k=(0.7, rho_0, 0.0, np.inf))[2]
+    assert np.isfinite(twins).all()
+    if n == 1:
+        np.testing.assert_array_equal(twins[0], -twins[1])

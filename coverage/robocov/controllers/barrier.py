@@ -17,7 +17,7 @@ from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.potential import separation
 from robocov.robots import Team
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 _ROUNDING = 1e-3
 """Distance in metres over which the braking curve, which is vertical at the safe distance, is rounded."""
@@ -45,7 +45,7 @@ class BarrierMemory:
     team: Team
     heard: Heard | None = None
     returns: Array | None = None
-    triangulation: Triangulation | None = None
+    triangulation: Mesh | None = None
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from robocov.voronoi.weighted_cells import weighted_partition
 if TYPE_CHECKING:
     from robocov.observation import Observations
     from robocov.voronoi import VoronoiPartition
-    from robocov.voronoi.triangulation import Triangulation
+    from robocov.voronoi.delaunay import Mesh
     from robocov.voronoi.weighted_cells import WeightedCells
 
 
@@ -24,9 +24,7 @@ def choice_of_cells() -> Any:
     )
 
 
-def cells_seen(
-    seen: Observations, measure: str, warm: Triangulation | None
-) -> VoronoiPartition | WeightedCells:
+def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPartition | WeightedCells:
     """Return each robot's cell as it knows it.
 
     Parameters
@@ -35,7 +33,7 @@ def cells_seen(
     measure : "distance" or "time"
         By time the cells are multiplicatively weighted, with the speeds that robots tell each other; where
         all are equally fast, or no speed is told, they are the same as by distance, bit for bit.
-    warm : Triangulation or None
+    warm : Mesh or None
         From which to start.
     """
     if measure == "time" and seen.max_speeds is not None:

@@ -13,7 +13,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,7 +88,7 @@ class Individually:
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
-    def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
+    def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         """Ask the law for each robot's force."""
         cells = partition(
             seen.positions,

@@ -13,7 +13,7 @@ from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,12 +24,12 @@ class LloydMemory:
     ----------
     team : Team
         A robot knows its own mass, viscosity and largest speed.
-    triangulation : Triangulation or None
+    triangulation : Mesh or None
         From which the next cells start.
     """
 
     team: Team
-    triangulation: Triangulation | None = None
+    triangulation: Mesh | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.driving import summed
 from robocov.controllers.gains import gain, validate_gains
-from robocov.controllers.repulsion import repulsion_from_obstacle
+from robocov.controllers.repulsion import forces_seen
 from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -81,7 +81,7 @@ class Poduri:
         spare = reach - np.minimum(distance, _STRETCHED * reach)
         degree = np.where(critical, self.k_cover * (1.0 / self.eta - 1.0) ** 2 / spare**2, 0.0)
         apart, held = summed(robot, way * cover[:, None], n), summed(robot, way * -degree[:, None], n)
-        obstacle = repulsion_from_obstacle(seen, self.k_obs, self.rho_obs)
+        obstacle = forces_seen(seen, seen.positions, self.k_obs, self.rho_obs, from_robots=False)[3]
         return Decision(
             forces=apart + held + obstacle,
             terms={"repulsion_robots": apart, "attraction": held, "repulsion_obstacle": obstacle},

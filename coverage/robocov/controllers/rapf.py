@@ -7,13 +7,12 @@ from typing import ClassVar
 
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.gains import choice, gain, validate_gains
-from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
+from robocov.controllers.repulsion import forces_seen
 from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.potential import attractive_force
 from robocov.robots import Team
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 
 @dataclass(frozen=True)
@@ -52,15 +51,15 @@ class Rapf:
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
-    def decide(self, seen: Observations, memory: Triangulation | None) -> Decision:
+    def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         """Return the forces (25) + (27)."""
         cells = cells_seen(seen, self.cells, memory)
         goals = targets(cells, seen.density, self.target, self.height)
-        attraction = attractive_force(goals - seen.positions, self.k_att, self.attraction_limit)
-        robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
-        obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
+        forces, attraction, robots, obstacle = forces_seen(
+            seen, goals, self.k_rep, self.rho_0, self.k_att, self.attraction_limit
+        )
         return Decision(
-            forces=attraction + robots + obstacle,
+            forces=forces,
             goals=goals,
             terms={"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle},
             cells=cells,

@@ -1,4 +1,4 @@
-"""The repulsive part that RPF and RAPF share: (25)."""
+"""The forces that RPF and RAPF are made of: (25) and (27)."""
 
 from __future__ import annotations
 
@@ -6,35 +6,39 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.observation import Observations
-from robocov.potential import repulsive_force, separation
+from robocov.observation.neighbours import NOBODY
+from robocov.potential import potential_forces
 
-_TOGETHER = 1e-12
-"""Distance in metres at which two robots in one place are taken to be."""
-
-
-def repulsion_from_robots(seen: Observations, k_rep: float, rho_0: float) -> Array:
-    """Return the sum of (24) over the neighbours within `rho_0`, (n, 2) N."""
-    n = len(seen.positions)
-    robot, neighbour, offset, distance = seen.neighbours_within(rho_0)
-    if len(robot) == 0:
-        return np.zeros((n, 2))
-    if distance.min() < _TOGETHER:
-        together = distance < _TOGETHER
-        offset[together] = _TOGETHER * separation(robot[together], neighbour[together])
-        distance = np.maximum(distance, _TOGETHER)
-    force = repulsive_force(offset, distance, k_rep, rho_0)
-    total = np.empty((n, 2))
-    total[:, 0] = np.bincount(robot, force[:, 0], minlength=n)
-    total[:, 1] = np.bincount(robot, force[:, 1], minlength=n)
-    return total
+_NOT_REPORTED = np.empty((0, 2))
 
 
-def repulsion_from_obstacle(seen: Observations, k_rep: float, rho_0: float) -> Array:
-    """Return (24) from the single closest obstacle point, (n, 2) N; zero where none is sensed."""
-    offset = seen.positions - seen.obstacle_points
-    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    unseen = np.isnan(distance)
-    if unseen.any():
-        offset[unseen] = 0.0
-        distance[unseen] = rho_0
-    return repulsive_force(offset, distance, k_rep, rho_0)
+def forces_seen(
+    seen: Observations,
+    goals: Array,
+    k_rep: float,
+    rho_0: float,
+    k_att: float = 0.0,
+    limit: float | None = None,
+    *,
+    from_robots: bool = True,
+) -> tuple[Array, Array, Array, Array]:
+    """Return the sum of the forces, the attraction to the goals, the repulsion by robots, and by obstacles.
+
+    Each is (n, 2) N, by the parameters of `potential_forces`; no `limit` is None.
+    """
+    n, links = len(seen.positions), seen.neighbours
+    indptr = np.zeros(n + 1, np.intp) if not from_robots else NOBODY if links.indptr is None else links.indptr
+    total, attraction, robots, obstacle = potential_forces(
+        seen.positions,
+        _NOT_REPORTED if seen.reported_positions is None else seen.reported_positions,
+        indptr,
+        NOBODY if links.indices is None else links.indices,
+        n,
+        seen.obstacle_points,
+        goals,
+        k_rep,
+        rho_0,
+        k_att,
+        np.inf if limit is None else limit,
+    )
+    return total, attraction, robots, obstacle

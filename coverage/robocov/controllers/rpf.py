@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from robocov.controllers.gains import gain, validate_gains
-from robocov.controllers.repulsion import repulsion_from_obstacle, repulsion_from_robots
+from robocov.controllers.repulsion import forces_seen
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -38,9 +38,6 @@ class Rpf:
 
     def decide(self, seen: Observations, memory: None) -> Decision:
         """Return the forces (25)."""
-        robots = repulsion_from_robots(seen, self.k_rep, self.rho_0)
-        obstacle = repulsion_from_obstacle(seen, self.k_rep, self.rho_0)
-        return Decision(
-            forces=robots + obstacle,
-            terms={"repulsion_robots": robots, "repulsion_obstacle": obstacle},
-        )
+        forces, _, robots, obstacle = forces_seen(seen, seen.positions, self.k_rep, self.rho_0)
+        terms = {"repulsion_robots": robots, "repulsion_obstacle": obstacle}
+        return Decision(forces=forces, terms=terms)

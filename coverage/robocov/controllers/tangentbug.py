@@ -19,7 +19,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings
 from robocov.robots import Team
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 _GRAIN = 0.1
 """Side in metres of the squares in which a robot remembers what it has met."""
@@ -120,7 +120,7 @@ class TangentBugMemory:
     bugs: tuple[Bug, ...] = ()
     returns: Array | None = None
     met: tuple[ComplexArray, ...] = ()
-    triangulation: Triangulation | None = None
+    triangulation: Mesh | None = None
 
 
 @dataclass(frozen=True)

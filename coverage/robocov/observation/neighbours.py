@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import inlined_kernel, inner_kernel, kernel
 
-_BRUTE_FORCE_BELOW = 48
-"""Teams smaller than this find close pairs by all distances: cheaper than a tree."""
+NOBODY: IntArray = np.empty(0, dtype=np.intp)
+
+_BINNED_FROM = 24
+"""Points fewer than this are compared with each other, without bins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,9 +50,8 @@ class Neighbours:
         n = len(positions)
         if np.isinf(ranges).all():
             return cls(n)
-        first, second, distance = close_pairs(positions, float(min(ranges.max(), 1e12)))
-        linked = distance <= np.minimum(ranges[first], ranges[second])
-        return cls.of_pairs(n, first[linked], second[linked], ranges)
+        indptr, _, indices, _ = _pairs(positions, ranges)
+        return cls(n, ranges, indptr, indices)
 
     @classmethod
     def of_pairs(
@@ -121,21 +124,101 @@ def close_pairs(positions: Array, reach: float) -> tuple[IntArray, IntArray, Arr
     >>> close_pairs(np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]]), 2.0)
     (array([0, 1]), array([1, 0]), array([1., 1.]))
     """
-    n = len(positions)
-    if n < _BRUTE_FORCE_BELOW:
-        delta = positions[:, None, :] - positions[None, :, :]
-        square = delta[..., 0] ** 2 + delta[..., 1] ** 2
-        square[np.arange(n), np.arange(n)] = np.inf
-        first, second = np.nonzero(square <= reach * reach)
-        return first, second, np.sqrt(square[first, second])
-    # asked only once, the tree need be neither balanced nor tight
-    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
-    pairs = tree.query_pairs(reach, output_type="ndarray")
-    first = np.concatenate([pairs[:, 0], pairs[:, 1]]).astype(np.intp, copy=False)
-    second = np.concatenate([pairs[:, 1], pairs[:, 0]]).astype(np.intp, copy=False)
-    order = np.argsort(first * n + second)
-    first, second = first[order], second[order]
-    return first, second, _distances(positions, first, second)
+    _, first, second, distance = _pairs(positions, np.full(len(positions), reach))
+    return first, second, distance
+
+
+@inner_kernel
+def binned(
+    points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
+) -> tuple[float, float, float, int, int]:
+    """Sort points from `first` on into square bins, row by row, so that those in reach are in the next ones.
+
+    Parameters
+    ----------
+    starts : (2 (stop - first) + 8,), order : (stop - first,), written
+        Bin b holds the points ``order[starts[b]:starts[b + 1]]``, ascending.
+
+    Returns
+    -------
+    left, low : float, m
+        Where the bins begin.
+    scale : float, 1/m
+        Bins per metre.
+    columns, rows : int
+    """
+    count = stop - first
+    left = right = points[first, 0]
+    low = high = points[first, 1]
+    for i in range(first, stop):
+        left, right = min(left, points[i, 0]), max(right, points[i, 0])
+        low, high = min(low, points[i, 1]), max(high, points[i, 1])
+    width, height = right - left, high - low
+    # no more bins than points, and more than rounding wider than the reach
+    side = max(1.000001 * reach, np.sqrt(width * height / count), max(width, height) / count)
+    scale = 1.0 / side if count >= _BINNED_FROM and 0.0 < side < np.inf else 0.0
+    columns, rows = int(width * scale) + 1, int(height * scale) + 1
+    for b in range(columns * rows + 2):
+        starts[b] = 0
+    for i in range(first, stop):
+        starts[row_of(points[i, 1] - low, scale) * columns + row_of(points[i, 0] - left, scale) + 2] += 1
+    for b in range(columns * rows):
+        starts[b + 2] += starts[b + 1]
+    for i in range(first, stop):
+        b = row_of(points[i, 1] - low, scale) * columns + row_of(points[i, 0] - left, scale) + 1
+        order[starts[b]] = i
+        starts[b] += 1
+    return left, low, scale, columns, rows
+
+
+@inlined_kernel
+def row_of(along: float, scale: float) -> int:
+    """Return the number of the row, or the column, of bins so far from the first; 0 of no number."""
+    return int(along * scale) if along * scale > 0.0 else 0
+
+
+@kernel
+def _pairs(points: Array, ranges: Array) -> tuple[IntArray, IntArray, IntArray, Array]:
+    """Return rows, first and second points, and distances of the directed pairs in range of each other."""
+    n, reach = len(points), 0.0
+    for i in range(n):
+        reach = max(reach, ranges[i])
+    starts, order = np.empty(2 * n + 8, np.intp), np.empty(n, np.intp)
+    left, low, scale, columns, rows = (
+        binned(points, 0, n, reach, starts, order) if n else (0.0, 0.0, 0.0, 1, 1)
+    )
+    indptr, size = np.zeros(n + 1, np.intp), 8 * n
+    first, second, distance = np.empty(size, np.intp), np.empty(size, np.intp), np.empty(size)
+    total = 0
+    for i in range(n):
+        x, y = points[i, 0], points[i, 1]
+        column, row = row_of(x - left, scale), row_of(y - low, scale)
+        for r in range(max(row - 1, 0), min(row + 2, rows)):
+            b = r * columns
+            for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
+                j = order[k]
+                dx, dy, limit = points[j, 0] - x, points[j, 1] - y, min(ranges[i], ranges[j])
+                away = np.sqrt(dx * dx + dy * dy)
+                if away <= limit and j != i:
+                    if total == size:
+                        size *= 2
+                        first, second, distance = _grown(first), _grown(second), _grown(distance)
+                    # sorted in: those of one bin ascend already
+                    place = total
+                    while place > indptr[i] and second[place - 1] > j:
+                        second[place], distance[place] = second[place - 1], distance[place - 1]
+                        place -= 1
+                    first[total], second[place], distance[place] = i, j, away
+                    total += 1
+        indptr[i + 1] = total
+    return indptr, first[:total].copy(), second[:total].copy(), distance[:total].copy()
+
+
+@kernel
+def _grown(values: NDArray[Any]) -> NDArray[Any]:
+    grown = np.empty(2 * len(values), values.dtype)
+    grown[: len(values)] = values
+    return grown
 
 
 def _distances(positions: Array, first: IntArray, second: IntArray) -> Array:

@@ -27,6 +27,8 @@ class Region:
         Outward unit normals of the edges.
     offsets : (k,) m
         ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``.
+    sides : (k, 5)
+        Vertices, normals and offsets side by side.
     area : float, m²
     centroid : (2,) m
 
@@ -41,6 +43,7 @@ class Region:
     lengths: Array = field(init=False)
     normals: Array = field(init=False)
     offsets: Array = field(init=False)
+    sides: Array = field(init=False)
     area: float = field(init=False)
     centroid: Array = field(init=False)
 
@@ -54,12 +57,14 @@ class Region:
         edges = np.roll(ring, -1, axis=0) - ring
         lengths = np.hypot(edges[:, 0], edges[:, 1])
         normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[:, None]
+        offsets = np.einsum("ed,ed->e", normals, ring)
         values = {
             "vertices": frozen(ring),
             "edges": frozen(edges),
             "lengths": frozen(lengths),
             "normals": frozen(normals),
-            "offsets": frozen(np.einsum("ed,ed->e", normals, ring)),
+            "offsets": frozen(offsets),
+            "sides": frozen(np.column_stack([ring, normals, offsets])),
             "area": float(hull.area),
             "centroid": frozen(hull.centroid.coords[0]),
         }

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 from robocov.errors import InputError, shown
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi.cell_edges import CellEdges
-from robocov.voronoi.clipped_cells import clip_cells, edges_of, mass_and_centroid
-from robocov.voronoi.delaunay_cells import delaunay_cells
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.clipping import cells_of
+from robocov.voronoi.delaunay import Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.density import Density
 
-_TRIANGULATE_FROM = 7
-"""Size of team from which all cells at once, off a triangulation at hand, are quicker than one by one."""
+_TRIANGULATE_FROM = 16
+"""Size of team from which a triangulation is quicker than clipping by everybody."""
+
+_NOBODY = np.empty(0, dtype=np.intp)
+_NOT_HEARD = np.empty((0, 2))
+_NO_MESH = np.empty((2, 0), dtype=np.int32)
+_NO_EDGES = np.empty((0, 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +44,9 @@ class VoronoiPartition:
         M of equation (2): the areas of the cells where the density is 1.
     centroid : (n, 2) m
         C of equation (2). An empty cell's is its generator.
-    triangulation : Triangulation or None
-        What the next partition of slowly moving generators may start from, as its `warm`; None when the
-        cells were not read from one.
+    triangulation : Mesh or None
+        What the next partition of slowly moving generators may start from, as its `warm`; see
+        `robocov.voronoi.delaunay`. None when the cells were not read from one.
     density : Density or None
         φ of mass, centroid and moments; None for 1.
     """
@@ -49,7 +54,7 @@ class VoronoiPartition:
     generators: Array
     mass: Array
     centroid: Array
-    triangulation: Triangulation | None
+    triangulation: Mesh | None
     _find_edges: Callable[[], CellEdges]
     density: Density | None = None
 
@@ -90,7 +95,7 @@ def partition(
     generators: Array,
     region: Region,
     neighbours: Neighbours | None = None,
-    warm: Triangulation | None = None,
+    warm: Mesh | None = None,
     heard: Array | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition:
@@ -105,7 +110,7 @@ def partition(
     neighbours : Neighbours or None
         Who hears whom. Cell i is cut only by the bisectors to the robots that i hears, and depends,
         to the last bit, on nothing else. None: everybody hears everybody.
-    warm : Triangulation or None
+    warm : Mesh or None
         The triangulation of the partition before. When the generators have moved little since, this one
         takes a fraction of the time; its cells are the same, to the last bit where no four generators
         lie on a circle up to rounding.
@@ -138,27 +143,40 @@ def _partition(
     generators: Array,
     region: Region,
     neighbours: Neighbours | None,
-    warm: Triangulation | None,
+    warm: Mesh | None,
     heard: Array | None,
 ) -> VoronoiPartition:
     points = np.array(generators, dtype=np.float64, order="C")
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"generators: an array of shape {points.shape}, but (n, 2) was wanted")
-    if heard is not None:
-        if neighbours is None or neighbours.complete:
+    n, mesh = len(points), _NO_MESH
+    if neighbours is None or neighbours.indptr is None or neighbours.indices is None:
+        if heard is not None:
             raise InputError("heard: given without the neighbours that they are of")
-        return _clipped(points, region, neighbours, heard)
-    if len(points) >= _TRIANGULATE_FROM and (neighbours is None or neighbours.complete):
-        cells = delaunay_cells(points, region, warm)
-        if cells is not None:
-            return VoronoiPartition(
-                _fixed(points),
-                _fixed(cells.mass),
-                _fixed(cells.centroid),
-                cells.triangulation,
-                partial(cells.edges, points),
-            )
-    return _clipped(points, region, neighbours if neighbours is not None else Neighbours(len(points)))
+        indptr = indices = _NOBODY
+        if n >= _TRIANGULATE_FROM:
+            size = 8 * n + 4
+            mesh = np.full((2, size), -1, np.int32) if warm is None or warm.shape[1] != size else warm.copy()
+    else:
+        indptr, indices = neighbours.indptr, neighbours.indices
+    known = _NOT_HEARD if heard is None else np.ascontiguousarray(heard)
+    mass, centroid = np.empty(n), np.empty((n, 2))
+    count = cells_of(points, region.sides, known, indptr, indices, n, mesh, mass, centroid, _NO_EDGES)
+    if count < 0:
+        bad = -1 - count
+        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
+    edges = partial(_edges, points, region.sides, known, indptr, indices, mesh, count)
+    triangulation = _fixed(mesh) if mesh.shape[1] and mesh[0, 0] >= 0 else None
+    return VoronoiPartition(_fixed(points), _fixed(mass), _fixed(centroid), triangulation, edges)
+
+
+def _edges(
+    points: Array, sides: Array, known: Array, indptr: IntArray, indices: IntArray, mesh: Mesh, count: int
+) -> CellEdges:
+    n, edges = len(points), np.empty((count, 6))
+    mesh = mesh.copy() if mesh.shape[1] and mesh[0, 0] >= 0 else _NO_MESH
+    cells_of(points.copy(), sides, known, indptr, indices, n, mesh, np.empty(n), np.empty((n, 2)), edges)
+    return CellEdges(edges[:, :2], edges[:, 2:4], *edges[:, 4:].T.astype(np.intp))
 
 
 def _weighted(cells: VoronoiPartition, density: Density) -> VoronoiPartition:
@@ -176,18 +194,6 @@ def _same(edges: CellEdges) -> CellEdges:
     return edges
 
 
-def _clipped(
-    points: Array, region: Region, neighbours: Neighbours, heard: Array | None = None
-) -> VoronoiPartition:
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        bad = int(np.argmin(finite))
-        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
-    cells = clip_cells(points, region, neighbours, heard)
-    mass, centroid = mass_and_centroid(cells, points)
-    return VoronoiPartition(_fixed(points), _fixed(mass), _fixed(centroid), None, partial(edges_of, cells))
-
-
-def _fixed(values: Array) -> Array:
+def _fixed(values: NDArray[Any]) -> Any:
     values.setflags(write=False)
     return values

@@ -27,7 +27,7 @@ from robocov.voronoi.arcs import Arcs, rings
 from robocov.voronoi.bisectors import Curves, Pieces, boundaries, in_reach
 from robocov.voronoi.bounded_cells import VoronoiPartition, partition
 from robocov.voronoi.cell_edges import REGION, CellEdges
-from robocov.voronoi.triangulation import Triangulation
+from robocov.voronoi.delaunay import Mesh
 
 if TYPE_CHECKING:
     from robocov.density import Density
@@ -68,7 +68,7 @@ class WeightedCells:
     centroid: Array
     pieces: Pieces
     region: Region
-    triangulation: Triangulation | None = None
+    triangulation: Mesh | None = None
     density: Density | None = None
 
     @cached_property
@@ -129,7 +129,7 @@ def weighted_partition(
     speeds: Array,
     region: Region,
     neighbours: Neighbours | None = None,
-    warm: Triangulation | None = None,
+    warm: Mesh | None = None,
     heard: Array | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition | WeightedCells:
@@ -146,7 +146,7 @@ def weighted_partition(
     neighbours : Neighbours or None
         Who hears whom. Cell i is cut only against the robots that i hears, and depends, to the last bit, on
         their places and speeds and its own. None: everybody hears everybody.
-    warm : Triangulation or None
+    warm : Mesh or None
         As `partition` takes it.
     heard : (m, 2) m or None
         Where robots know their neighbours to be, in the order of ``neighbours.indices``.
