@@ -81,7 +81,7 @@ def command(options: Arguments) -> None:
 def measure(saved: Saved, options: Arguments) -> Measured:
     """Measure one run."""
     from robocov.metrics.run_metrics import run_metrics
-    from robocov.record.moments import nearest_moments
+    from robocov.record import nearest_moments
     from robocov_app.plots.metrics import Measured
     from robocov_app.progress import progress
 

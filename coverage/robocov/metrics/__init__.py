@@ -15,8 +15,7 @@ from robocov.cost import CoverageCost
 from robocov.cost.momentary_cost import MomentaryCost
 from robocov.drawing import Drawable
 from robocov.errors import counted
-from robocov.record import Record
-from robocov.record.moments import nearest_moments
+from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
 

@@ -13,7 +13,7 @@ from robocov.errors import ParameterError, counted, shown
 from robocov.metrics import clearances, robot_gaps
 from robocov.metrics.sight import Covered, Walls, covered
 from robocov.observation.neighbours import Neighbours
-from robocov.record.moments import nearest_moments
+from robocov.record import nearest_moments
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -1,7 +1,379 @@
-"""The record of a run: taken while it goes on, thinned, saved in one folder and read back."""
+"""The record of a run: all of it as arrays, thinned, saved in one folder and read back."""
 
 from __future__ import annotations
 
-from robocov.record.run_record import ARRAYS, Record, versions
+import json
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["ARRAYS", "Record", "versions"]
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.conditions import Conditions
+from robocov.controllers import short_name
+from robocov.drawing import Drawable
+from robocov.environment import Environment
+from robocov.errors import InputError, OutputError, ParameterError, counted, shown
+from robocov.extras import extra
+from robocov.files.array_file import opened_arrays
+from robocov.files.atomic import written
+from robocov.files.result_folder import settle
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.robots import Team
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from robocov.controllers.gains import Value
+
+_COLUMNS = {
+    "positions": ("x_m", "y_m"),
+    "velocities": ("vx_m_s", "vy_m_s"),
+    "forces": ("fx_N", "fy_N"),
+    "goals": ("goal_x_m", "goal_y_m"),
+    "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
+}
+"""What the columns of data frames are called."""
+
+ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+
+_LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
+"""Largest numbers in the arrays that are finite throughout, s, m, m/s and N."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Drawable):
+    """A whole run.
+
+    Attributes
+    ----------
+    environment : Environment
+    team : Team
+    controller : str
+        Its name, as `make_controller` takes it.
+    label : str
+        The same as shown to people.
+    gains : dict of name to value
+    start : str or None
+        Name of the start, None where positions were given.
+    seed : int or None
+    dt : float, s
+        The control period. Moments lie that far apart, and farther where the record was thinned.
+    time : (T,) s
+    positions : (T, n, 2) m
+    velocities : (T, n, 2) m/s
+    forces : (T, n, 2) N
+        The controller's force at that state, before any limit, viscosity apart.
+    goals : (T, n, 2) m
+        nan where none.
+    obstacle_points : (T, n, 2) m
+        The nearest obstacle point that each robot sensed, nan where none.
+    session : dict
+        Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`.
+    conditions : Conditions or None
+        None: ideal ones.
+    """
+
+    _drawn_as = "record"
+
+    environment: Environment
+    team: Team
+    controller: str
+    label: str
+    gains: Mapping[str, Value]
+    start: str | None
+    seed: int | None
+    dt: float
+    time: Array
+    positions: Array
+    velocities: Array
+    forces: Array
+    goals: Array
+    obstacle_points: Array
+    session: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Conditions | None = None
+
+    @cached_property
+    def working(self) -> BoolArray:
+        """Which robots were there and had not failed, (T, n) bool; read-only."""
+        return self._of_robots(Conditions.working)
+
+    @cached_property
+    def present(self) -> BoolArray:
+        """Which robots were there, whether they worked or had failed, (T, n) bool; read-only."""
+        return self._of_robots(Conditions.present)
+
+    def _of_robots(self, which: Callable[[Conditions, Array, int], BoolArray]) -> BoolArray:
+        there = np.ones(self.positions.shape[:2], dtype=bool)
+        if self.conditions is not None:
+            there = which(self.conditions, self.time, len(self.team))
+        there.setflags(write=False)
+        return there
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        robots = counted(len(self.team), "robot")
+        return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
+
+    @property
+    def by_time(self) -> bool:
+        """Whether the law divided the region by the time to a place, and that differs from by distance."""
+        return self.gains.get("cells") == "time" and self.team.mixed_speeds
+
+    def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
+        """Return the cells of the robots that worked at moment number `k`, everybody heard.
+
+        The region is divided by travel time where the law's gain ``cells`` says so, else by distance.
+        """
+        working = slice(None) if self.conditions is None else self.working[k]
+        positions, environment = self.positions[k][working], self.environment
+        if self.by_time:
+            speeds = self.team.max_speed[working]
+            return weighted_partition(positions, speeds, environment.region, density=environment.density)
+        return partition(positions, environment.region, density=environment.density)
+
+    def snapshot(self, k: int) -> Snapshot:
+        """Return the moment number `k` as far as it was recorded: without force terms and cells."""
+        positions = self.positions[k]
+        working = None if self.conditions is None else self.working[k]
+        neighbours = Neighbours.within(positions, self.team.communication_range)
+        seen = Observations(
+            positions=positions,
+            velocities=self.velocities[k],
+            neighbours=neighbours if working is None else neighbours.among(working),
+            obstacle_points=self.obstacle_points[k],
+            region=self.environment.region,
+            time=float(self.time[k]),
+            max_speeds=self.team.max_speed,
+            density=self.environment.density,
+        )
+        goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
+        cells = self.cells(k) if self.by_time else None
+        return Snapshot(seen, Decision(forces=self.forces[k], goals=goals, cells=cells), working=working)
+
+    def at(self, time: float) -> Snapshot:
+        """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
+
+        Raises
+        ------
+        ParameterError
+            When the time is before the first moment or after the last by more than a control period.
+        """
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first - self.dt <= time <= last + self.dt:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {first:g} to {last:g} s was wanted"
+            )
+        return self.snapshot(int(np.abs(self.time - time).argmin()))
+
+    def until(self, time: float) -> Record:
+        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then.
+
+        Raises
+        ------
+        ParameterError
+            When that is before the first moment.
+        """
+        # half a microsecond forgives the rounding of sums of steps
+        if not time >= float(self.time[0]) - 5e-7:
+            raise ParameterError(
+                f"time: {shown(time)} s, but a number from {float(self.time[0]):g} s was wanted"
+            )
+        return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
+
+    def thinned(self, rate: float) -> Record:
+        """Return the record at `rate` moments a second, Hz; 0 leaves the first moment and the last.
+
+        Those moments stay that are nearest to multiples of 1/rate seconds from the first, of two as near
+        the earlier; and so does the last. Where the record is sparser than that, it stays as it is.
+
+        Raises
+        ------
+        ParameterError
+            When the rate is negative or not finite.
+        """
+        if not 0.0 <= rate < np.inf:
+            raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+        return self._only(nearest_moments(self.time, rate))
+
+    def _only(self, moments: slice | IntArray) -> Record:
+        """Return the record of some of the moments; its arrays are copies."""
+        return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
+
+    def to_pandas(self) -> DataFrame:
+        """Return the run as a tidy data frame: one row for each moment and robot, by time, then robot.
+
+        The columns are time_s, robot (from 0; pictures number robots from 1), x_m, y_m, vx_m_s, vy_m_s, fx_N,
+        fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m: the arrays of the record.
+
+        Raises
+        ------
+        RobocovError
+            When pandas is not installed: it comes with ``robocov[pandas]``.
+        """
+        pandas = extra("pandas", "pandas")
+        moments, robots = self.positions.shape[:2]
+        columns: dict[str, Array | IntArray] = {
+            "time_s": np.repeat(self.time, robots),
+            "robot": np.tile(np.arange(robots), moments),
+        }
+        for array, names in _COLUMNS.items():
+            columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
+        frame: DataFrame = pandas.DataFrame(columns)
+        return frame
+
+    def to_json(
+        self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> dict[str, Any]:
+        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary.
+
+        `lattice` is the one on which the summary's cost was evaluated.
+        """
+        from robocov.mapfile import to_json
+
+        return {
+            "format": "robocov-run",
+            "version": 1,
+            "map": to_json(self.environment),
+            "controller": {"name": self.controller, "gains": dict(self.gains)},
+            "team": self.team.to_dict(),
+            "start": self.start,
+            "starts_m": self.positions[0].tolist(),
+            "seed": self.seed,
+            "dt_s": self.dt,
+            "duration_s": float(self.time[-1]),
+            "lattice": lattice,
+            **({"conditions": self.conditions.to_dict()} if self.conditions else {}),
+            **({"session": dict(self.session)} if self.session else {}),
+            "versions": versions(),
+            "summary": dict(summary or {}),
+        }
+
+    def save(
+        self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> None:
+        """Write ``record.npz`` and ``run.json`` to `folder`, made where missing; each whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            When they cannot be written.
+        """
+        folder = Path(folder)
+        settle(folder)
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from error
+        with written(folder / "record.npz") as part, part.open("wb") as file:
+            np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
+        with written(folder / "run.json") as part:
+            text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
+            part.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Record:
+        """Return the record that `save` wrote to `folder`; the controller is not loaded, only named.
+
+        Raises
+        ------
+        InputError
+            When the folder holds no run, or one that cannot be read: the file, the place in it, the value and
+            what was wanted.
+        """
+        from robocov.mapfile import from_json
+        from robocov.record.run_document import read_run
+
+        folder = Path(folder)
+        settle(folder)
+        for file in ("run.json", "record.npz"):
+            if not (folder / file).is_file():
+                raise InputError(f"{folder}: not the folder of a run (there is no {file})")
+        path = folder / "run.json"
+        run = read_run(path)
+        environment = from_json(run.map, f"{path}: map")
+        conditions = None
+        try:
+            team = Team.from_dict(run.team.model_dump())
+            if run.conditions is not None:
+                conditions = Conditions.from_dict(run.conditions.model_dump())
+                conditions.check_team(len(team))
+        except ParameterError as error:
+            raise InputError(f"{path}: {error}") from error
+        return cls(
+            environment=environment,
+            team=team,
+            controller=run.controller.name,
+            label=short_name(run.controller.name),
+            gains=run.controller.gains,
+            start=run.start,
+            seed=run.seed,
+            dt=run.dt_s,
+            session=run.session.model_dump(exclude_unset=True),
+            conditions=conditions,
+            **_arrays_of(folder / "record.npz", len(team)),
+        )
+
+
+def nearest_moments(time: Array, rate: float) -> IntArray:
+    """Return which times of (T,) s are nearest to multiples of 1/rate seconds from the first, and the last.
+
+    >>> nearest_moments(np.arange(8) * 0.1, rate=4.0).tolist()
+    [0, 2, 5, 7]
+    """
+    last = len(time) - 1
+    if float(np.diff(time).min(initial=np.inf)) * rate >= 1.0:
+        return np.arange(last + 1)
+    turns = (time - time[0]) * rate
+    nearest = np.rint(turns)
+    # sums of steps are rounded: what is a millionth of a turn nearer is as near
+    order = np.lexsort([np.round(np.abs(turns - nearest), 6), nearest])
+    first_of_each = np.flatnonzero(np.diff(nearest[order], prepend=-1.0))
+    return np.union1d(order[first_of_each], [0, last])
+
+
+def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
+    """Return the arrays of a record of so many robots, which are checked before and after they are read."""
+    with path.open("rb") as file, opened_arrays(file, str(path)) as saved:
+        for name in ARRAYS:
+            if name not in saved.headers:
+                raise InputError(f"{path}: there is no array {name}")
+            (shape, dtype), moments = saved.headers[name], saved.headers["time"].shape
+            wanted = moments if name == "time" else (*moments, robots, 2)
+            if dtype != np.float64 or shape != wanted or len(moments) != 1 or moments == (0,):
+                shape_wanted = "(T,)" if name == "time" else wanted
+                found, needed = f"{shape} of {dtype}", f"{shape_wanted} of float64"
+                raise InputError(f"{path}: {name} has shape {found}, but {needed} was wanted")
+        arrays = {name: saved.read(name) for name in ARRAYS}
+    for name, largest in _LARGEST.items():
+        values = arrays[name]
+        good = np.abs(values) <= largest
+        if not good.all():
+            raise InputError(
+                f"{path}: {name}: {values[~good][0]:g}, but finite numbers up to {largest:g} were wanted"
+            )
+    if (np.diff(arrays["time"]) <= 0.0).any():
+        raise InputError(f"{path}: time: ascending numbers were wanted")
+    return arrays
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    found = {"python": platform.python_version()}
+    for name in ("robocov", "numpy", "scipy", "shapely", "pymunk"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found

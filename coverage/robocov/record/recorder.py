@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.controllers import gain_values
 from robocov.errors import ParameterError, shown
-from robocov.record.run_record import ARRAYS, Record
+from robocov.record import ARRAYS, Record
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
@@ -23,17 +23,8 @@ if TYPE_CHECKING:
 class Recorder:
     """Collects snapshots into a `Record`; what was collected can be had at any time.
 
-    Parameters
-    ----------
-    environment : Environment
-    team : Team
-    controller : Controller
-    dt : float, s
-    name : str
-        The controller's name where it is not its own: ``mine.py:MyController``.
-    start : str, seed : int
-        Where the starts came from.
-    conditions : Conditions or None
+    The parameters are attributes of the record; `name` is the controller's where it is not its own, as in
+    ``mine.py:MyController``.
     """
 
     def __init__(

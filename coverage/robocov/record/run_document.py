@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from robocov.conditions import LIMITS as CONDITION_LIMITS
 from robocov.files.documents import Document, read_document, wanted
-from robocov.robots.team import LIMITS, json_key
+from robocov.robots import LIMITS, json_key
 from robocov.robots.teamfile import MOST_ROBOTS
 
 if TYPE_CHECKING:

@@ -1,7 +1,176 @@
-"""The team: what the robots are and what they can do; files that say so."""
+"""The team: what the robots are and what they can do, one row for each robot."""
 
 from __future__ import annotations
 
-from robocov.robots.team import DEFAULT_RADIUS, UNITS, Team
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["DEFAULT_RADIUS", "UNITS", "Team"]
+import numpy as np
+
+from robocov.arrays import Array, frozen
+from robocov.errors import ParameterError, counted, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+DEFAULT_RADIUS = 0.1
+"""Radius of a robot in metres where nothing else is said."""
+
+LIMITS: dict[str, tuple[float, float, bool]] = {
+    # name: smallest, largest, may be infinite
+    "radius": (1e-3, 1e3, False),
+    "mass": (1e-6, 1e6, False),
+    "max_speed": (1e-6, 1e3, False),
+    "max_acceleration": (1e-6, 1e6, False),
+    "viscosity": (0.0, 1e6, False),
+    "sensing_range": (0.0, 1e5, True),
+    "communication_range": (0.0, 1e5, True),
+}
+"""What each parameter may be."""
+UNITS = {
+    "radius": "m",
+    "mass": "kg",
+    "max_speed": "m/s",
+    "max_acceleration": "m/s²",
+    "viscosity": "N s/m",
+    "sensing_range": "m",
+    "communication_range": "m",
+}
+_KEY_UNITS = {"m": "m", "kg": "kg", "m/s": "m_per_s", "m/s²": "m_per_s2", "N s/m": "n_s_per_m"}
+
+
+def json_key(name: str) -> str:
+    """Return what a parameter is called in ``run.json``, with its unit."""
+    return f"{name}_{_KEY_UNITS[UNITS[name]]}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Team:
+    """Bodies, limits and ranges of n robots, each (n,).
+
+    Attributes
+    ----------
+    radius : m
+        Robots are discs.
+    mass : kg
+        The paper's virtual mass, 1 there.
+    max_speed : m/s
+    max_acceleration : m/s²
+        The kinematic limits, the same for every controller.
+    viscosity : N s/m
+        nu of equation (28), with the sign that takes energy out.
+    sensing_range : m
+        How far the range sensor sees obstacles, from the robot's centre.
+    communication_range : m
+        Two robots are neighbours when both are in range of each other. Infinite: everybody hears everybody.
+
+    Raises
+    ------
+    ParameterError
+        On a value out of range; the message names the attribute and the value.
+    """
+
+    radius: Array
+    mass: Array
+    max_speed: Array
+    max_acceleration: Array
+    viscosity: Array
+    sensing_range: Array
+    communication_range: Array
+
+    def __post_init__(self) -> None:
+        size = np.atleast_1d(np.asarray(self.radius, dtype=float)).shape[0]
+        for field in fields(self):
+            values = frozen(np.atleast_1d(np.asarray(getattr(self, field.name), dtype=float)))
+            low, high, infinite = LIMITS[field.name]
+            if values.shape != (size,):
+                raise ParameterError(
+                    f"team.{field.name}: {values.shape} values, but one for each of {size} robots was wanted"
+                )
+            good = (values >= low) & (values <= high)
+            if infinite:
+                good |= values == np.inf
+            if not good.all():
+                bad = float(values[~good][0])
+                also = " or null for no limit" if infinite else ""
+                raise ParameterError(
+                    f"team.{field.name}: {shown(bad)} {UNITS[field.name]}, "
+                    f"but a number from {low:g} to {high:g}{also} was wanted"
+                )
+            object.__setattr__(self, field.name, values)
+
+    @classmethod
+    def homogeneous(
+        cls,
+        n: int,
+        *,
+        radius: float = DEFAULT_RADIUS,
+        mass: float = 1.0,
+        max_speed: float = 1.0,
+        max_acceleration: float = 2.0,
+        viscosity: float = 2.0,
+        sensing_range: float = 3.0,
+        communication_range: float = np.inf,
+    ) -> Team:
+        """Return a team of `n` equal robots (the paper's: 1 kg, at most 1 m/s).
+
+        >>> Team.homogeneous(6).max_speed
+        array([1., 1., 1., 1., 1., 1.])
+        """
+        if n < 1:
+            raise ParameterError(f"robots: {shown(n)}, but a whole number of at least 1 was wanted")
+        values = (radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range)
+        return cls(*(np.full(n, value, dtype=float) for value in values))
+
+    @classmethod
+    def joined(cls, teams: Sequence[Team]) -> Team:
+        """Return the robots of several teams as one team, in their order."""
+        if not teams:
+            raise ParameterError("robots: 0, but a whole number of at least 1 was wanted")
+        columns = [[getattr(team, field.name) for team in teams] for field in fields(cls)]
+        return cls(*(np.concatenate(column) for column in columns))
+
+    @property
+    def mixed_speeds(self) -> bool:
+        """Whether some robots are faster than others, so that the nearest may not be there first."""
+        return bool((self.max_speed != self.max_speed[0]).any())
+
+    def __len__(self) -> int:
+        return int(self.radius.shape[0])
+
+    def __repr__(self) -> str:
+        parts = []
+        for field in fields(self):
+            values = getattr(self, field.name)
+            low, high = float(values.min()), float(values.max())
+            span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            parts.append(f"{field.name} {span} {UNITS[field.name]}")
+        return f"<Team of {counted(len(self), 'robot')}: {', '.join(parts)}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the team as plain JSON: None is "no limit", and a value that all share is written once."""
+        plain: dict[str, Any] = {"robots": len(self)}
+        for field in fields(self):
+            values = [None if np.isinf(x) else float(x) for x in getattr(self, field.name)]
+            plain[json_key(field.name)] = values[0] if len(set(values)) == 1 else values
+        return plain
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Team:
+        """Return the team that `to_dict` wrote.
+
+        Raises
+        ------
+        ParameterError
+            When a key is missing or a value is not a number.
+        """
+        try:
+            n = int(plain["robots"])
+            arrays = []
+            for field in fields(cls):
+                value = plain[json_key(field.name)]
+                column = value if isinstance(value, list) else [value] * n
+                arrays.append(np.array([np.inf if x is None else float(x) for x in column]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ParameterError(f"team: cannot be read ({error!r})") from error
+        return cls(*arrays)

@@ -21,7 +21,7 @@ import numpy as np
 
 from robocov.errors import InputError, ParameterError, is_number, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse, read_bytes
-from robocov.robots.team import Team
+from robocov.robots import Team
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,12 +40,7 @@ _RANGES = ("sensing_range", "communication_range")
 def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = None) -> Team:
     """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
 
-    Parameters
-    ----------
-    path : Path or str
-    defaults : dict of name to value
-        What is said of the robots of groups that say nothing of it; by default as `Team.homogeneous`. None is
-        a range without limit.
+    What a group leaves open is as in `defaults`, then `Team.homogeneous`; None is a range without limit.
 
     Raises
     ------
@@ -73,14 +68,7 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
 def team_of_groups(
     groups: object, path: tuple[str | int, ...], defaults: Mapping[str, float | None] | None = None
 ) -> Team:
-    """Return the team of groups as they stand in a file; see `read_team`.
-
-    Parameters
-    ----------
-    groups : list of dict
-    path : keys
-        Where in the file.
-    defaults : dict of name to value
+    """Return the team of groups as they stand in a file at a path of keys; see `read_team`.
 
     Raises
     ------

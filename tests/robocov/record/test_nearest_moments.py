@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.record.moments import nearest_moments
+from robocov.record import nearest_moments
 
 
 @given(st.integers(1, 300), st.floats(1e-3, 0.5), st.floats(0.0, 60.0), st.sampled_from([0.0, 12.5]))
