@@ -35,35 +35,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 __all__ = [
-    "CONTROLLERS",
-    "FLAGSHIP",
-    "Atlas",
-    "AtlasShared",
-    "Barrier",
-    "Controller",
-    "Dispersion",
-    "GeodesicLloyd",
-    "Howard",
-    "IndividualController",
-    "Individually",
-    "Information",
-    "Lloyd",
-    "OwnView",
-    "Poduri",
-    "RangeLimited",
-    "Rapf",
-    "Rpf",
-    "TangentBug",
-    "controller_kind",
-    "controller_kinds",
-    "gain_values",
-    "gains_of",
-    "information_of",
-    "informed",
-    "make_controller",
-    "remembers",
-    "short_name",
-]
+    "CONTROLLERS", "FLAGSHIP", "Atlas", "AtlasShared", "Barrier", "Controller", "Dispersion", "GeodesicLloyd",
+    "Howard", "IndividualController", "Individually", "Information", "Lloyd", "OwnView", "Poduri",
+    "RangeLimited", "Rapf", "Rpf", "TangentBug", "controller_kind", "controller_kinds", "gain_values",
+    "gains_of", "information_of", "informed", "make_controller", "remembers", "short_name",
+]  # fmt: skip
 
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
@@ -129,12 +105,8 @@ def _named(kind: type[Any], name: str) -> type[Any]:
 def controller_kind(name: str, *, source: Source | None = None) -> type[Any]:
     """Return the controller class called `name`, or the class of ``file.py:ClassName``; this runs its code.
 
-    `source` is the file with the modules that it imports, which then need not be there.
-
-    Raises
-    ------
-    ParameterError
-        When there is none; the message gives the nearest name, or what is wrong with the file.
+    `source` is the file with the modules that it imports, which then need not be there. A ParameterError
+    gives the nearest name, or what is wrong with the file.
     """
     if ".py:" in name or name.endswith(".py"):
         return _named(class_in_file(name, source), name.rpartition(":")[2])
@@ -151,18 +123,13 @@ def make_controller(
 ) -> Controller:
     """Return the controller called `name` with the given gains, all others at their defaults.
 
-    `source` is as in `controller_kind`.
+    `source` is as in `controller_kind`. A ParameterError names an unknown controller or gain (with
+    the nearest name), or a gain out of range.
 
     >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
     0.3
-
-    Raises
-    ------
-    ParameterError
-        On an unknown controller or gain (with the nearest name), or a gain out of range.
     """
-    kind = controller_kind(name, source=source)
-    controller = with_gains(kind, gains or {})
+    controller = with_gains(controller_kind(name, source=source), gains or {})
     if isinstance(controller, IndividualController) and not hasattr(controller, "decide"):
         return Individually(controller)
     return controller  # type: ignore[no-any-return]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,14 +17,12 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.placement import CoverageDemand, Table, own_place, team_places
+from robocov.planning.placement import CoverageDemand, OwnPlace, Table, own_place, team_places
 from robocov.planning.wayfinding import Ways, Window
 from robocov.robots import Team
 
-FINEST_CELL = 0.1
+FINEST_CELL, MOST_CELLS = 0.1, 250_000
 """Side of a cell of the discovered maps in metres, larger where a region is very large."""
-
-MOST_CELLS = 250_000
 
 TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350
 """Nodes of the lattices on which a robot plans: for its whole team, for itself, and for itself in a crowd."""
@@ -39,32 +37,24 @@ STILL_FOR, STILL_WITHIN = 3.0, 0.1
 _HARDLY = 0.1
 """Part of the spacing of the nodes that others may move before a plan is made anew."""
 
-_ARRIVED = 0.35
-"""Metres from a place at which it counts as reached, for looking around."""
+_ARRIVED, _TURN = 0.35, 0.2
+"""Metres from a place at which it counts as reached, for looking around, and for the next way-point."""
 
-_TURN = 0.2
-"""Metres from a way-point at which the next one is headed for."""
-
-_HEEDED = 1.5
-"""Metres up to which other robots matter to the velocity."""
-
-_BRAKING = 0.4
-"""Part of the acceleration that is counted on: less than half of it, for the lag of the drive."""
+_BRAKING, _FOR_TURNING = 0.4, 0.7
+"""Parts of the acceleration: what is counted on for braking, less than half for the lag of the drive, and
+what is spent on where to go; the rest is left for not running into anything."""
 
 _MARGIN, _APART = 0.02, 0.04
 """Gaps that are left to walls and to other robots, m."""
 
+_EAGERNESS = 10.0
+"""Speed in 1/s with which the distance to what is close may fall to its gap."""
+
 _CREEP = 0.15
 """Speed at which a robot moves along what it is closest to, m/s; the more room, the faster."""
 
-_ASIDE = 0.3
-"""Largest speed, m/s, at which robots that stand in each other's way pass on the left."""
-
-_EAGERNESS = 10.0
-"""Speed in 1/s with which the distance to what is close may fall to its clearance."""
-
-_FOR_TURNING = 0.7
-"""Part of the acceleration that is spent on where to go; the rest is left for not running into anything."""
+_ASIDE, _HEEDED = 0.3, 1.5
+"""Largest speed, m/s, at which robots in each other's way, so many metres away, pass on the left."""
 
 _TOGETHER = 1.5
 """A robot plans for its whole team as long as it takes to cross the region so many times."""
@@ -105,7 +95,7 @@ class PlannerState:
     tracker : RestTracker
     planned, ways, table : DiscoveredMap, Ways and Table, or None
         The map when the last plan was made, and what was computed of it.
-    situation, crew : (k, 2) m and (k,), or None
+    situation, group : (k, 2) m and (k,), or None
         Where the robots were at the last plan, this one first, and who they were.
     quiet : bool
         Whether all others rested then.
@@ -127,7 +117,7 @@ class PlannerState:
     table: Table | None = None
     planned: DiscoveredMap | None = None
     situation: Array | None = None
-    crew: IntArray | None = None
+    group: IntArray | None = None
     quiet: bool = False
     places: Array | None = None
     own: Array | None = None
@@ -168,14 +158,6 @@ class AtlasMemory:
     def maps(self) -> tuple[DiscoveredMap, ...]:
         """The map that each robot has discovered."""
         return tuple(state.known for state in self.states)
-
-
-class Relocation(NamedTuple):
-    """When a robot relocates: parts of the cost that it must save, and whether among what is known alone."""
-
-    threshold: float
-    nearby: float
-    sure: bool
 
 
 @dataclass(frozen=True)
@@ -238,22 +220,17 @@ class Atlas:
         empty = DiscoveredMap.nothing(Raster(region, cell))
         nobody = RestTracker(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
         n = len(team)
-        return AtlasMemory(
-            team,
-            # the robots do not all plan at the same moment
-            tuple(
-                PlannerState(empty, self.period * _STAGGERED * (i * _GOLDEN % 1.0), nobody) for i in range(n)
-            ),
-            (np.full((1, 2), np.nan),) * n,
-            np.zeros(n, dtype=np.intp),
-        )
+        # the robots do not all plan at the same moment
+        first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) for i in range(n)]
+        states = tuple(PlannerState(empty, due, nobody) for due in first)
+        return AtlasMemory(team, states, (np.full((1, 2), np.nan),) * n, np.zeros(n, dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces that lead each robot on its way."""
-        states = list(memory.states)
-        if seen.scans is not None:
+        states, scans = list(memory.states), seen.scans
+        if scans is not None:
             maps = [
-                state.known.scanned(seen.positions[i], seen.scans.distances[i], seen.scans.hit[i])
+                state.known.scanned(seen.positions[i], scans.distances[i], scans.hit[i])
                 for i, state in enumerate(states)
             ]
             maps = self._exchanged(maps, seen)
@@ -278,130 +255,121 @@ class Atlas:
         self, seen: Observations, team: Team, state: PlannerState, i: int
     ) -> tuple[PlannerState, Array | None]:
         """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
-        place = seen.positions[i]
+        place, raster, fastest = seen.positions[i], state.known.raster, float(team.max_speed[i])
         others, at = seen.neighbours.of(i), seen.neighbour_positions(i)
         tracker = state.tracker.updated(others, at, seen.time)
+        still = seen.time - tracker.since >= STILL_FOR
+        quiet = bool(still.all())
         crowd = len(others) >= MAX_PLANNING_GROUP
+        reach = math.inf
         if crowd:
-            near = np.sort(
-                np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: MAX_PLANNING_GROUP - 1]
-            )
-            others, at = others[near], at[near]
-        reach = 1.1 * float(np.sqrt(((at - place) ** 2).sum(axis=1).max())) if crowd else math.inf
-        most = CROWD_NODES if crowd else OWN_NODES
-        window = Window.around(state.known.raster, place, reach, most)
-        spacing = window.stride * state.known.raster.cell
+            away = np.sqrt(((at - place) ** 2).sum(axis=1))
+            near = np.sort(np.argsort(away, kind="stable")[: MAX_PLANNING_GROUP - 1])
+            others, at, reach = others[near], at[near], 1.1 * float(away[near].max())
+        window = Window.around(raster, place, reach, CROWD_NODES if crowd else OWN_NODES)
+        spacing = window.stride * raster.cell
         # nobody gets farther than to the next node meanwhile
-        period = max(self.period, spacing / float(team.max_speed[i]))
+        period = max(self.period, spacing / fastest)
         first = state.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         # a team that has changed may have much to do again
-        same = np.array_equal(state.tracker.robots, tracker.robots)
-        since = state.since if same and not first else seen.time
-        state = replace(state, due=due, tracker=tracker, since=since)
-        still = seen.time - tracker.since >= STILL_FOR
-        situation, crew = np.vstack([place, at]), np.concatenate([[i], others])
-        if (
-            state.idle
-            and state.planned is state.known
-            and state.ways is not None
-            and state.ways.window == window
-        ):
-            same = state.crew is not None and np.array_equal(state.crew, crew)
-            same = same and np.abs(situation - state.situation).max() < _HARDLY * spacing
-            if same and state.quiet == bool(still.all()):
+        changed = first or not np.array_equal(state.tracker.robots, tracker.robots)
+        since = seen.time if changed else state.since
+        before = state
+        state = replace(state, due=due, tracker=tracker, since=since, quiet=quiet)
+        situation, group = np.vstack([place, at]), np.concatenate([[i], others])
+        same = before.idle and before.planned is before.known and before.quiet == quiet
+        if same and before.ways is not None and before.ways.window == window:
+            assert before.group is not None and before.situation is not None
+            same = np.array_equal(before.group, group)
+            if same and np.abs(situation - before.situation).max() < _HARDLY * spacing:
                 return state, None
-        state = self._mapped(state, window, float(team.radius[i]) + self.clearance)
-        ways = state.ways
-        assert ways is not None
-        state = replace(state, planned=state.known, situation=situation, crew=crew, quiet=bool(still.all()))
-        settling = 2.0 ** min((seen.time - state.since) / self.settling, 60.0)
+        state = replace(state, planned=state.known, situation=situation, group=group)
+        state, ways = self._mapped(state, window, float(team.radius[i]) + self.clearance)
         demand = CoverageDemand(state.known, window, seen.density)
-        together = seen.time - state.since <= _TOGETHER * seen.region.diameter / float(team.max_speed[i])
+        settling = 2.0 ** min((seen.time - since) / self.settling, 60.0)
         if crowd:
             begin = ways.standing(place) if state.node < 0 else state.node
-            elsewhere = at
         else:
+            together = seen.time - since <= _TOGETHER * seen.region.diameter / fastest
             threshold = min(1.0, self.threshold * settling)
             if not together:
                 # from now on each decides for itself alone, and nobody goes elsewhere while others do
-                threshold = threshold if still.all() else 1.0
+                threshold = threshold if quiet else 1.0
                 still[:] = True
+            nearby = min(1.0, self.nearby * settling)
             # who is there already does not leave for what may not be there
-            moving = Relocation(threshold, min(1.0, self.nearby * settling), sure=not together)
-            state, begin, elsewhere = self._plan_for_all(state, seen, still, at, moving)
+            state, places = self._plan_for_all(state, seen, still, threshold, nearby, sure=not together)
+            begin = ways.nearest(places[0])
+            at = np.where(still[:, None], at, places[1:])
         if begin < 0:
             return replace(state, own=place, idle=False), place
         former = np.full(2, np.nan) if state.own is None else state.own
         rest, steps = min(1.0, self.rest * settling), 3 if crowd else 6
-        own = own_place(ways, demand.weights, elsewhere, begin, former, rest, steps)
+        own = own_place(ways, demand.weights, at, begin, former, rest, steps)
         state = replace(state, own=own.goal, node=own.node)
-        return self._looking(state, demand, own.mine, own.cost, place, period)
+        return self._looking(state, ways, demand, own, place, period)
 
-    def _mapped(self, state: PlannerState, window: Window, clearance: float) -> PlannerState:
+    def _mapped(self, state: PlannerState, window: Window, clearance: float) -> tuple[PlannerState, Ways]:
         """Return a state with the ways of the present map; where no wall is new these are the former ones."""
-        ways = state.ways
-        blocked = window.cut(state.known.blocked, True)
-        same = ways is not None and ways.window == window
-        if ways is not None and same and np.array_equal(ways.blocked, blocked):
-            return state
+        ways, blocked = state.ways, window.cut(state.known.blocked, True)
         # nodes of another window have other numbers
-        node = state.node if same else -1
-        return replace(
-            state, ways=Ways(state.known.raster, window, blocked, clearance), table=None, node=node
-        )
+        node = state.node if ways is not None and ways.window == window else -1
+        if ways is None or ways.window != window or not np.array_equal(ways.blocked, blocked):
+            ways = Ways(state.known.raster, window, blocked, clearance)
+            state = replace(state, ways=ways, table=None, node=node)
+        return state, ways
 
     def _plan_for_all(
-        self, state: PlannerState, seen: Observations, still: BoolArray, at: Array, moving: Relocation
-    ) -> tuple[PlannerState, int, Array]:
-        """Return the state with a plan for the team, the node of the own place, and those of the others."""
-        known, ways, situation, crew = state.known, state.ways, state.situation, state.crew
-        assert ways is not None and situation is not None and crew is not None
+        self,
+        state: PlannerState,
+        seen: Observations,
+        still: BoolArray,
+        threshold: float,
+        nearby: float,
+        *,
+        sure: bool,
+    ) -> tuple[PlannerState, Array]:
+        """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
+        known, ways, situation, group = state.known, state.ways, state.situation, state.group
+        assert ways is not None and situation is not None and group is not None
         table = state.table
         if table is None:
             window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
             blocked = window.cut(known.blocked, True)
             table = Table.of(Ways(known.raster, window, blocked, ways.clearance))
-        weights = CoverageDemand(known, table.ways.window, seen.density, moving.sure).weights
+        weights = CoverageDemand(known, table.ways.window, seen.density, sure).weights
         fixed = np.concatenate([[False], still])
         begin = situation.copy()
         if state.places is not None:
             robots, places = state.places[:, 0].astype(np.intp), state.places[:, 1:]
-            _, here, there = np.intersect1d(crew, robots, return_indices=True)
+            _, here, there = np.intersect1d(group, robots, return_indices=True)
             free = ~fixed[here]
             begin[here[free]] = places[there[free]]
-        places = team_places(table, weights, situation, begin, fixed, moving.threshold, moving.nearby)
-        state = replace(state, table=table, places=np.column_stack([crew, places]))
-        near = ((ways.nodes - places[0]) ** 2).sum(axis=1)
-        near[~ways.roomy] = np.inf
-        node = int(near.argmin()) if ways.roomy.any() else -1
-        return state, node, np.where(still[:, None], at, places[1:])
+        places = team_places(table, weights, situation, begin, fixed, threshold, nearby)
+        return replace(state, table=table, places=np.column_stack([group, places])), places
 
     def _looking(
         self,
         state: PlannerState,
+        ways: Ways,
         demand: CoverageDemand,
-        mine: Array,
-        cost: float,
+        own: OwnPlace,
         place: Array,
         period: float,
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
-        ways, own = state.ways, state.own
-        assert ways is not None and own is not None
-        former = state.former
+        former, look, node = state.former, None, ways.standing(place)
         if state.look is not None and math.dist(state.look, place) < _ARRIVED:
             former = (*former, state.look)
-        if state.look is None and math.dist(own, place) > _ARRIVED:
-            return replace(state, idle=False), own
-        least = self.stake * cost * 2.0 ** min(state.looked / self.patience, 60.0)
-        node = ways.standing(place)
-        look = None
+        if state.look is None and math.dist(own.goal, place) > _ARRIVED:
+            return replace(state, idle=False), own.goal
         if node >= 0 and self.stake < 1.0:
-            look = demand.viewpoint(mine, ways.distances(node), ways.tight, least, former)
+            least = self.stake * own.cost * 2.0 ** min(state.looked / self.patience, 60.0)
+            look = demand.viewpoint(own.mine, ways.distances(node), ways.tight, least, former)
         looked = state.looked + period * (look is not None)
         state = replace(state, look=look, former=former, looked=looked, idle=look is None)
-        return state, own if look is None else look
+        return state, own.goal if look is None else look
 
     def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces towards the way-points, kept off walls and other robots."""

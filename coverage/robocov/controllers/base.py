@@ -67,10 +67,7 @@ def information_of(controller: Any) -> Information:
 def informed(controller: Controller, environment: Environment) -> Controller:
     """Return the controller as it decides on one map: one that goes by the whole map gets to know it.
 
-    Raises
-    ------
-    ParameterError
-        When a law is told the map that does not say so.
+    A ParameterError tells of a law that asks for the map and does not say so.
     """
     information = information_of(controller)
     tell = getattr(controller, "informed", None)

@@ -46,10 +46,8 @@ class Gain:
         if not (is_number(value) and self.low <= value <= min(self.high, sys.float_info.max)):
             unit = f" {self.unit}" if self.unit else ""
             also = ", or null for no limit," if self.optional else ""
-            raise ParameterError(
-                f"{where}.{self.name}: {shown(value)}, but a number from {self.low:g} to {self.high:g}{unit}"
-                f"{also} was wanted"
-            )
+            wanted = f"a number from {self.low:g} to {self.high:g}{unit}{also} was wanted"
+            raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {wanted}")
         return float(value)
 
 
@@ -68,11 +66,10 @@ class Option:
         """Return `value` when it is one of the words, or raise a ParameterError that names `where`."""
         if isinstance(value, str) and value in self.words:
             return value
-        said = f"{shown(value)}, but one of {', '.join(self.words)} was wanted"
-        raise ParameterError(
-            f"{where}.{self.name}: "
-            f"{unknown_name('word', value, self.words) if isinstance(value, str) else said}"
-        )
+        told = f"{shown(value)}, but one of {', '.join(self.words)} was wanted"
+        if isinstance(value, str):
+            told = unknown_name("word", value, self.words)
+        raise ParameterError(f"{where}.{self.name}: {told}")
 
 
 def gain(
@@ -101,14 +98,7 @@ def response_time_gain() -> Any:
 
 
 def choice(default: str, words: Sequence[str], meaning: str) -> Any:
-    """Declare a gain that is one of several words as a dataclass field.
-
-    >>> @dataclass(frozen=True)
-    ... class Mine:
-    ...     side: str = choice("left", ("left", "right"), "where to pass each other")
-    >>> gains_of(Mine)["side"].words
-    ('left', 'right')
-    """
+    """Declare a gain that is one of several words as a dataclass field."""
     if default not in words:
         raise ValueError(f"default {default!r}, but one of {', '.join(words)} was wanted")
     return field(default=default, metadata={"gain": Option("", default, tuple(words), meaning)})
@@ -147,10 +137,7 @@ def validate_gains(controller: Any) -> None:
 def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     """Return an instance of the controller class `kind` with the given gains.
 
-    Raises
-    ------
-    ParameterError
-        On an unknown gain (with the nearest name), a value out of range, or a class that raises something.
+    A ParameterError tells of an unknown gain (with the nearest name), a value out of range, or a fault in it.
     """
     known, where = gains_of(kind), getattr(kind, "name", kind.__name__)
     for name in values:

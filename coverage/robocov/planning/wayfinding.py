@@ -197,6 +197,11 @@ class Ways:
         new = np.arange(size, size + len(counts))
         return np.asarray(dijkstra(joined, directed=True, indices=new, min_only=True))[:size]
 
+    def nearest(self, place: Array) -> int:
+        """Return the roomy node nearest to a place; -1 for none."""
+        away = np.where(self.roomy, ((self.nodes - place) ** 2).sum(axis=1), np.inf)
+        return int(away.argmin()) if self.roomy.any() else -1
+
     def standing(self, place: Array) -> int:
         """Return the node where somebody stands: the nearest roomy one in sight, or at all; -1 for none."""
         near = self._closest(place, self.roomy)
