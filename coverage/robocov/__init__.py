@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from robocov.robots import Team
     from robocov.robots.teamfile import read_team
     from robocov.sensor import RangeSensor
+    from robocov.simulating import simulate_many
     from robocov.simulation import Simulation
     from robocov.voronoi import VoronoiPartition, partition
     from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
@@ -96,6 +97,7 @@ _NAMES = {
     "robots": "Team",
     "robots.teamfile": "read_team",
     "sensor": "RangeSensor",
+    "simulating": "simulate_many",
     "simulation": "Simulation",
     "voronoi": "VoronoiPartition partition",
     "voronoi.weighted_cells": "WeightedCells weighted_partition",
@@ -116,7 +118,8 @@ __all__ = [
     "Snapshot", "StartError", "Team", "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle",
     "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "bundled_maps", "check_map", "choice",
     "cost_history", "gain", "generated_map", "load_map", "make_controller", "map_schema", "partition",
-    "read_results", "read_team", "run_metrics", "save_map", "settled_at", "summarise",
+    "read_results", "read_team", "run_metrics", "save_map", "settled_at",
+    "simulate_many", "summarise",
     "weighted_partition",
 ]
 # fmt: on

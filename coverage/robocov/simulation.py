@@ -54,6 +54,9 @@ class Simulation:
         At the beginning.
     conditions : Conditions or None
         What goes wrong, or changes, during the run; None: nothing does.
+    runs : int
+        So many runs at once, of equal teams, with one row for each robot of the first, of the second, and so
+        on. Robots of different runs know nothing of each other. See `robocov.simulate_many`.
 
     Raises
     ------
@@ -87,6 +90,7 @@ class Simulation:
         velocities: Array | None = None,
         time: float = 0.0,
         conditions: Conditions | None = None,
+        runs: int = 1,
     ) -> None:
         positions = np.array(starts, dtype=float)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
@@ -96,6 +100,13 @@ class Simulation:
         self.team = Team.homogeneous(len(positions)) if team is None else team
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
+        each, rest = divmod(len(positions), runs)
+        if runs > 1 and (rest or environment.moves or conditions is not None):
+            raise ParameterError(
+                f"runs: {runs} of {len(positions)} robots, but equal teams, no conditions and "
+                f"obstacles that stand still were wanted"
+            )
+        self._each_run = [slice(k * each, (k + 1) * each) for k in range(runs)]
         check_dt(dt)
         if isinstance(controller, type) or not isinstance(controller, Controller):
             raise ParameterError(
@@ -113,7 +124,8 @@ class Simulation:
         # who moves may lean on something, and sink in a little
         slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
         there = None if conditions is None else conditions.working(time, len(positions))
-        check_starts(environment.at(time), positions, self.team, slack, there)
+        for run in self._each_run:
+            check_starts(environment.at(time), positions[run], self.team[run], slack, there)
         self.environment = environment
         self.controller = controller
         self._built_in = type(controller) in CONTROLLERS.values()
@@ -128,12 +140,12 @@ class Simulation:
                 conditions, environment, walls, moving, self.team, positions, velocities, time=time
             )
         else:
-            self._world = World(walls, self.team, positions, velocities, movers=moving)
+            self._world = World(walls, self.team, positions, velocities, movers=moving, runs=runs)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
         self._inbox = None if self._perception is None else self._perception.begin()
-        self._everybody = (
-            Neighbours(len(positions)) if np.isinf(self.team.communication_range).all() else None
-        )
+        self._everybody = None
+        if np.isinf(self.team.communication_range).all():
+            self._everybody = Neighbours.beside([Neighbours(each)] * runs)
         self._began = time
         self._steps = 0
         self._law = self._asked(informed, controller, environment.static)
@@ -235,7 +247,9 @@ class Simulation:
         points.setflags(write=False)
         neighbours = self._everybody
         if neighbours is None:
-            neighbours = Neighbours.within(positions, team.communication_range)
+            ranges = team.communication_range
+            parts = [Neighbours.within(positions[run], ranges[run]) for run in self._each_run]
+            neighbours = Neighbours.beside(parts)
         return Observations(
             positions=positions,
             velocities=self._world.velocities,
@@ -304,6 +318,20 @@ class Simulation:
         self._world.step(forces, self.dt, external_forces, time=snapshot.seen.time)
         self._memory, self._inbox = decision.memory, snapshot.inbox
         self._steps += 1
+        self._begin_step()
+
+    def restart(self, run: int, positions: Array) -> None:
+        """Put the robots of a run to other places, at rest; time goes on.
+
+        Raises
+        ------
+        StartError
+            When a robot would start in a wall or in another robot of that run.
+        """
+        rows = self._each_run[run]
+        check_starts(self.environment.at(self.time), positions, self.team[rows], 1e-6, None)
+        assert isinstance(self._world, World)
+        self._world.place(run, positions)
         self._begin_step()
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:

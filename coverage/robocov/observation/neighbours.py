@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +62,16 @@ class Neighbours:
         indptr = np.zeros(count + 1, dtype=np.intp)
         np.cumsum(np.bincount(robot, minlength=count), out=indptr[1:])
         return cls(count, ranges, indptr, neighbour)
+
+    @classmethod
+    def beside(cls, parts: Sequence[Neighbours]) -> Neighbours:
+        """Return who hears whom among robots of several runs, in their order: nobody those of another run."""
+        if len(parts) == 1:
+            return parts[0]
+        begins = np.cumsum([0, *(part.count for part in parts)])
+        pairs = [np.stack(part.pairs()) + begin for part, begin in zip(parts, begins[:-1], strict=True)]
+        robot, neighbour = np.concatenate(pairs, axis=1)
+        return cls.of_pairs(int(begins[-1]), robot, np.ascontiguousarray(neighbour))
 
     @property
     def complete(self) -> bool:

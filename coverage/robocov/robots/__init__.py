@@ -135,6 +135,10 @@ class Team:
         """Whether some robots are faster than others, so that the nearest may not be there first."""
         return bool((self.max_speed != self.max_speed[0]).any())
 
+    def __getitem__(self, robots: slice) -> Team:
+        """Return some of the robots as a team."""
+        return Team(*(getattr(self, field.name)[robots] for field in fields(self)))
+
     def __len__(self) -> int:
         return int(self.radius.shape[0])
 

@@ -104,6 +104,14 @@ class World:
         """Velocities, (n, 2) m/s; read-only."""
         return self._velocities
 
+    def place(self, run: int, positions: Array) -> None:
+        """Put the robots of a run to other places, (n / runs, 2) m, at rest."""
+        rows = self._rows(run)
+        state = np.array([self._positions, self._velocities])
+        state[0, rows], state[1, rows] = positions, 0.0
+        self._set_state(state)
+        self._write_state(self._engine, run)
+
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
         twin = object.__new__(World)
@@ -182,12 +190,15 @@ class World:
             self._write_state(engine, run)
         return engine
 
+    def _rows(self, run: int) -> slice:
+        each = len(self.team) // self._runs
+        return slice(run * each, (run + 1) * each)
+
     def _write_state(self, engine: Engine, run: int) -> None:
         begin, state = len(self._movers), engine.states[run]
-        each = len(self.team) // self._runs
-        mine = slice(run * each, (run + 1) * each)
+        rows = self._rows(run)
         state[:begin] = self._moving
-        state[begin:-1, :2], state[begin:-1, 2:] = self._positions[mine], self._velocities[mine]
+        state[begin:-1, :2], state[begin:-1, 2:] = self._positions[rows], self._velocities[rows]
         engine.write(STATES, run)
 
     def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
@@ -213,7 +224,7 @@ class World:
         touched = {row // each for row in touching}
         for run in touched:
             rows = np.array([row for row in touching if row // each == run])
-            self._resolve_contacts(rows, slice(run * each, (run + 1) * each), state, dt, limit)
+            self._resolve_contacts(rows, self._rows(run), state, dt, limit)
         self._set_state(state)
         for run in touched:
             self._write_state(engine, run)
