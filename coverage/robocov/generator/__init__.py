@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from numbers import Integral
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import shapely
 
-from robocov.environment import Environment
+from robocov.environment import Environment, Obstacle
 from robocov.environment.passages import narrowest_gap
 from robocov.environment.starts import DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, checked, is_number, shown, unknown_name
@@ -22,50 +23,25 @@ from robocov.generator.request import SIDES, Request
 from robocov.generator.rooms import building
 from robocov.mapfile.rules import check_rules
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
+"""Returns obstacles that leave the disc of the start in the corner free; None where a draw leads nowhere."""
 
-    from robocov.environment import Obstacle
-
-    Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], "list[Obstacle] | None"]
-
-_ATTEMPTS = 40
-"""Layouts that are drawn before the parameters count as impossible."""
-
-_TEAM = 0.6
-"""Radius in metres of a start in which some robots of the usual size find room."""
-
-_DISC = 0.25, 0.1
-"""Radius of a start, in sides of a square for each obstacle, and at most, in shorter sides of the map."""
-
-_LEAST = 0.4
-"""Part of that radius that is left at least where walls are near."""
-
-_MARGIN = 0.02
-"""Distance of the disc in a corner from the boundary, in shorter sides of the map."""
-
-_OFF = 0.3
-"""How far the disc near the middle may be from there, in shorter sides of the map."""
+_ATTEMPTS = 40  # layouts that are drawn before the parameters count as impossible
+_TEAM = 0.6  # radius in metres of a start in which some robots of the usual size find room
+_DISC = (
+    0.25,
+    0.1,
+)  # radius of a start, in sides of a square per obstacle, and at most, in shorter sides of the map
+_LEAST = 0.4  # part of that radius that is left at least where walls are near
+_MARGIN = 0.02  # distance of the disc in a corner from the boundary, in shorter sides of the map
+_OFF = 0.3  # how far the disc near the middle may be from there, in shorter sides of the map
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of generated maps.
+    """A kind of generated maps, with its usual number of obstacles and its usual area.
 
-    Attributes
-    ----------
-    layout : callable
-        Returns the obstacles for a `Request`, with the disc of the start in the corner left free, by
-        random numbers of a generator alone; None where that draw leads nowhere.
-    description : str
-        One line.
-    counted : str
-        What `obstacles` counts, in the plural.
-    obstacles : int
-    area : float
-        What is taken where nothing else is asked for.
-    about : bool
-        A map has about as many of them as are asked for, not exactly.
+    `counted` is what they are, in the plural; a map has `about` as many as are asked for, or exactly.
     """
 
     layout: Layout
@@ -111,21 +87,15 @@ def generated_map(
     seed : int
     kind : str
         One of `GENERATORS`. ``polygons``: obstacles that keep `gap` from each other and from the
-        boundary, convex, L-shaped or U-shaped (`robocov.generator.polygons.MIX`). ``blocks``: blocks between
-        streets, which are at least `gap` wide, also along the boundary. ``rooms``: rooms, each with a way
-        to all others through doors that are at least `gap` wide, and furniture. ``mazes``: corridors of
-        one width, at least `gap`, between walls on a grid. ``caves``: chambers and tunnels that are at
-        least `gap` wide, in rock that leaves nothing free along the boundary.
+        boundary, convex, L-shaped or U-shaped. ``blocks``: blocks between streets, also along the boundary.
+        ``rooms``: rooms with doors, and furniture. ``mazes``: corridors of one width, on a grid.
+        ``caves``: chambers and tunnels in rock that leaves nothing free along the boundary.
     obstacles : int
-        How many obstacles, blocks, or rooms; of mazes about how many cells, of caves chambers. By default
-        as many as the kind says.
+        How many obstacles, blocks or rooms; of mazes about how many cells, of caves chambers.
     area : float
-        Blocked area as a part of the map's; by default as the kind says.
-    gap : float, m
-    side : float, m
-        Of a square map.
-    width, height : float, m
-        Of a rectangular map, in place of `side`.
+        Blocked area as a part of the map's; this and their number are by default what suits the kind.
+    gap, side, width, height : float, m
+        A map is square, or a rectangle where width and height are given.
 
     Raises
     ------
@@ -155,14 +125,9 @@ def generated_map(
         rng = np.random.default_rng([int(seed), attempt])
         corner = _corner(request, rng)
         layout = of_kind.layout(request, corner, rng)
-        if layout is None:
-            continue
-        environment = _environment(int(seed), kind, request, layout)
-        if _fulfils(environment, request):
-            starts = _starts(environment, request, corner)
-            environment = replace(environment, starts=starts)
-            if starts and _is_valid(environment):
-                return environment
+        environment = None if layout is None else _environment(int(seed), kind, request, layout, corner)
+        if environment is not None:
+            return environment
     raise ParameterError(
         f"area: {request.area:g}, but no layout of {request.obstacles} {of_kind.counted} was found that "
         f"blocks it on {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m; "
@@ -170,54 +135,47 @@ def generated_map(
     )
 
 
-def _radius(request: Request) -> float:
-    """Return the radius of a start's disc, where there is room for it."""
-    of_obstacle, of_map = _DISC
-    return request.floor(
-        min(of_map * min(request.width, request.height), max(of_obstacle * request.unit, _TEAM))
-    )
-
-
 def _corner(request: Request, rng: np.random.Generator) -> DiscStart:
     """Return a disc in one of the corners."""
     right, top = rng.integers(0, 2, 2).tolist()
-    radius = _radius(request)
-    off = radius + _MARGIN * min(request.width, request.height)
+    side = min(request.width, request.height)
+    radius = request.floor(min(_DISC[1] * side, max(_DISC[0] * request.unit, _TEAM)))
+    off = radius + _MARGIN * side
     x, y = (request.width - off if right else off), (request.height - off if top else off)
     return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
 
 
-def _environment(seed: int, kind: str, request: Request, layout: list[Obstacle]) -> Environment:
-    """Return the map without its starts."""
+def _environment(
+    seed: int, kind: str, request: Request, layout: list[Obstacle], corner: DiscStart
+) -> Environment | None:
+    """Return the map with its starts; None if it is not valid, or not as it was asked for."""
     width, height = float(request.width), float(request.height)
     of_kind = GENERATORS[kind]
     about = "about " if of_kind.about else ""
-    return Environment(
+    words = {"kind": kind, "seed": seed, "obstacles": int(request.obstacles), "area": float(request.area)}
+    words |= {"gap_m": float(request.gap), "width_m": width, "height_m": height}
+    starts: dict[str, StartSpec] = {}
+    environment = Environment(
         f"{kind} {seed}",
         ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         tuple(layout),
-        description=f"Generated with seed {seed}: {about}{request.obstacles} {of_kind.counted}, "
+        starts,
+        f"Generated with seed {seed}: {about}{request.obstacles} {of_kind.counted}, "
         f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide.",
-        extra={
-            "generator": {
-                "kind": kind,
-                "seed": seed,
-                "obstacles": int(request.obstacles),
-                "area": float(request.area),
-                "gap_m": float(request.gap),
-                "width_m": width,
-                "height_m": height,
-            }
-        },
+        {"generator": words},
     )
-
-
-def _starts(environment: Environment, request: Request, corner: DiscStart) -> dict[str, StartSpec]:
-    """Return the starts, none if there is no room for one of them."""
-    within, centre = _within(environment, request, corner), _centre(environment, request)
-    if within is None or centre is None:
-        return {}
-    return {"corner": within, "centre": centre, "uniform": UniformStart()}
+    try:
+        if not _fulfils(environment, request):
+            return None
+        within, centre = _within(environment, request, corner), _centre(environment, request, corner)
+        if within is None or centre is None:
+            return None
+        # only now: they depend on the free space, which is to be derived once
+        starts |= {"corner": within, "centre": centre, "uniform": UniformStart()}
+        check_rules(environment, environment.name)
+    except (MapError, shapely.GEOSException):
+        return None
+    return environment
 
 
 def _within(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
@@ -233,8 +191,8 @@ def _within(environment: Environment, request: Request, corner: DiscStart) -> Di
     return None
 
 
-def _centre(environment: Environment, request: Request) -> DiscStart | None:
-    """Return a disc near the middle with as much room as there is, None for none."""
+def _centre(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+    """Return a disc near the middle, at most about as large, with as much room as there is; None for none."""
     reach = _OFF * min(request.width, request.height)
     offset = np.stack(np.meshgrid(*[np.linspace(-reach, reach, 41)] * 2), axis=-1).reshape(-1, 2)
     place = request.rounded(offset + np.array([request.width, request.height]) / 2.0)
@@ -243,7 +201,7 @@ def _centre(environment: Environment, request: Request) -> DiscStart | None:
         return None
     place, offset = place[inside], offset[inside]
     room = shapely.distance(environment.free.boundary, shapely.points(place))
-    largest = 0.8 * _radius(request)
+    largest = 0.8 * corner.radius
     score = np.minimum(room, largest) - 0.2 * np.hypot(offset[:, 0], offset[:, 1])
     best = int(np.round(score, 9).argmax())
     radius = request.floor(min(max(float(room[best]), _LEAST * largest), largest))
@@ -251,22 +209,11 @@ def _centre(environment: Environment, request: Request) -> DiscStart | None:
 
 
 def _fulfils(environment: Environment, request: Request) -> bool:
-    """Return whether a map without starts is valid, and as it was asked for."""
-    if not _is_valid(environment):
-        return False
     share = 1.0 - environment.free_area / environment.area
     if abs(share - request.area) > AREA_TOLERANCE or len(environment.free.geoms) != 1:
         return False
-    # where a disc as wide as the gap may be must hang together
-    if not isinstance(environment.free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon):
-        return False
     narrowest = narrowest_gap(environment.free)
-    return narrowest is None or narrowest.width >= request.gap - 1e-6
-
-
-def _is_valid(environment: Environment) -> bool:
-    try:
-        check_rules(environment, environment.name)
-    except MapError:
+    if narrowest is not None and narrowest.width < request.gap - 1e-6:
         return False
-    return True
+    # where a disc as wide as the gap may be must hang together
+    return isinstance(environment.free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon)

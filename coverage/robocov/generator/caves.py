@@ -1,123 +1,45 @@
 """Maps of the kind `caves`: chambers and tunnels between smooth walls of rock, and pillars.
 
-Where the middle of a robot may be is what a random field leaves below a level (`robocov.generator.contours`),
-raised along the boundary. Its parts are joined by tunnels, and all of it is widened by a radius of at
-least half the gap (a dilation: J. Serra, *Image Analysis and Mathematical Morphology*, 1982), so that a disc
-of that radius gets everywhere. Where two parts of it then meet in a window that is narrower, a tunnel is led
-through that.
+Where the middle of a robot may be is what a random field leaves below a level, raised along the boundary.
+Its parts are joined by tunnels, and all of it is widened by a radius of at least half the gap (a dilation:
+J. Serra, *Image Analysis and Mathematical Morphology*, 1982), so that a disc of that radius gets everywhere.
+Where two parts of it then meet in a window that is narrower, a tunnel is led through that.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import combinations
-from typing import TYPE_CHECKING
+import math
 
 import numpy as np
 import shapely
+from scipy.cluster.hierarchy import DisjointSet
 from shapely import LineString, MultiPolygon, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import PolygonObstacle
-from robocov.environment.passages import narrowest_gap
-from robocov.generator.contours import Field
-from robocov.generator.request import AREA_TOLERANCE
+from robocov.arrays import Array
+from robocov.environment import Obstacle, PolygonObstacle
+from robocov.environment.passages import Gap, gaps_narrower
+from robocov.environment.starts import DiscStart
+from robocov.generator.request import AREA_TOLERANCE, Request
 
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.environment import Obstacle
-    from robocov.environment.passages import Gap
-    from robocov.environment.starts import DiscStart
-    from robocov.generator.request import Request
-
-_RIM = 0.012
-"""Least thickness of rock at the boundary, in shorter sides of the map; the disc of the start keeps more."""
-
-_SHORE, _RAISED = 0.35, 3.0
-"""Width of the belt along the boundary where rock is likelier, in sides of a usual chamber, and how much."""
-
-_HALL, _LOWERED = 0.35, 1.5
-"""Radius of the place around the start where it is less likely, and how much."""
-
+_WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber
+# steps of the mesh: in the side of a usual chamber, at most in the longer side of the map, but at least
+_FINENESS, _MOST, _COARSEST = 12, 160, 6
+_RIM = (
+    0.012  # least thickness of rock at the boundary, in shorter sides of the map; a start's disc keeps more
+)
+_SHORE, _RAISED = 0.35, 3.0  # belt where rock is likelier, in sides of a usual chamber, and how much
+_HALL, _LOWERED = 0.35, 1.5  # radius around the start where it is less likely, and how much
+# walls are simplified by so much: in sides of a usual chamber, and at most in shorter sides of the map
 _FINE, _FINEST = 0.008, 0.0027
-"""Walls are simplified by so much: in sides of a usual chamber, and at most in shorter sides of the map."""
-
+# least area of a part of the field that becomes a chamber, and of a pillar, in squares of usual chambers
 _CHAMBER, _PILLAR = 0.03, 0.02
-"""Least area of a part of the field that becomes a chamber, and of a pillar, in squares of usual chambers."""
-
-_SPIKE = 0.05
-"""Spikes of rock of half that thickness are rounded off, in sides of a usual chamber."""
-
-_BEND = 0.25
-"""Tunnels bend by at most so much of their length."""
-
-_USUAL, _WIDEST = 1.2, 2.0
-"""Radius by which the level is chosen, and the largest, in the least ones."""
-
-_LEVELS, _RADII, _WINDOWS = 8, 12, 12
-"""Halvings of the level and of the radius, and windows that are widened before a draw is given up."""
-
-_CLOSE = 0.5
-"""Part of the tolerance of the blocked area that is made use of; rounding takes of the rest."""
-
-
-@dataclass(frozen=True)
-class _Site:
-    """What a cave is made to fit.
-
-    Attributes
-    ----------
-    request : Request
-    fine : float, m
-        By so much walls are simplified.
-    radius : float, m
-        Least radius by which is widened where the middle may be: half a gap, and what is lost of it when
-        walls are simplified and rounded.
-    start : Polygon
-        The disc of the start, and a little more, so that the disc is left of it then.
-    """
-
-    request: Request
-    fine: float
-    radius: float
-    start: Polygon
-
-    @classmethod
-    def of(cls, request: Request, corner: DiscStart) -> _Site:
-        """Return that of what was asked for, with the start in the corner."""
-        fine = min(_FINE * request.unit, _FINEST * min(request.width, request.height))
-        lost = fine + 2.0 * request.step
-        start = Point(corner.center).buffer(corner.radius + 2.0 * lost)
-        site = cls(request, fine, request.gap / 2.0 + lost, start)
-        return replace(site, start=start.intersection(site.inside(0.0)))
-
-    def inside(self, distance: float) -> Polygon:
-        """Return the map without what is nearer to the boundary than its rim and a distance, m."""
-        off = _RIM * min(self.request.width, self.request.height) + distance
-        return shapely.box(off, off, self.request.width - off, self.request.height - off)
-
-    def core(self, below: BaseGeometry, rng: np.random.Generator) -> BaseGeometry:
-        """Return where the middle of a robot may be: what is below the level, in one piece."""
-        unit = self.request.unit
-        inside = self.inside(self.radius)
-        below = shapely.simplify(below, self.fine).intersection(inside)
-        parts = [part for part in shapely.get_parts(below) if part.area >= _CHAMBER * unit**2]
-        start = self.start.buffer(-self.radius)
-        whole = shapely.union_all([*parts, self.start.centroid if start.is_empty else start])
-        return shapely.union_all([whole, *_tunnels([*shapely.get_parts(whole)], rng)])
-
-    def free(self, core: BaseGeometry, radius: float) -> Polygon:
-        """Return the free space: what is nearer to the core than a radius, with smooth walls."""
-        unit = self.request.unit
-        spike = _SPIKE * unit
-        wide = core.buffer(radius + spike).buffer(-spike).intersection(self.inside(0.0)) | self.start
-        outer = max(shapely.get_parts(wide), key=lambda part: float(part.area))
-        pillars = [ring for ring in outer.interiors if Polygon(ring).area >= _PILLAR * unit**2]
-        return shapely.simplify(Polygon(outer.exterior, pillars), self.fine)
-
-    def blocked(self, free: Polygon) -> float:
-        """Return the area that is not free, as a part of the map's."""
-        return 1.0 - float(free.area) / (self.request.width * self.request.height)
+_SPIKE = 0.05  # spikes of rock of half that thickness are rounded off, in sides of a usual chamber
+_BEND = 0.25  # tunnels bend by at most so much of their length
+_USUAL, _WIDEST = 1.2, 2.0  # radius by which the level is chosen, and the largest, in the least ones
+_LEVELS, _RADII = 8, 12  # halvings of the level, and of the radius
+_ROUNDS, _PER_ROUND = 12, 0.005  # of widening windows, before a draw is given up; windows per chamber in each
+_CLOSE = 0.5  # part of the tolerance of the blocked area that is made use of; rounding takes of the rest
 
 
 def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -126,67 +48,147 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
     The level is chosen first, by halving, so that about as much is blocked as is wanted, then the radius
     so that it is.
     """
-    site = _Site.of(request, corner)
-    if site.inside(2.0 * site.radius).is_empty:
+    unit, width, height = request.unit, float(request.width), float(request.height)
+    fine = min(_FINE * unit, _FINEST * min(width, height))
+    # what is lost when walls are simplified and rounded
+    lost = fine + 2.0 * request.step
+    least = request.gap / 2.0 + lost
+
+    def inside(distance: float) -> Polygon:
+        off = _RIM * min(width, height) + distance
+        return shapely.box(off, off, width - off, height - off)
+
+    if inside(2.0 * least).is_empty:
         return None
-    field = Field.drawn(request, rng).raised(_SHORE * request.unit, _RAISED)
-    field = field.lowered(corner.center, _HALL * request.unit, _LOWERED)
+    start = Point(corner.center).buffer(corner.radius + 2.0 * lost).intersection(inside(0.0))
+    points, values = random_field(request, rng)
+    off = np.minimum(points, points[-1, -1] - points).min(axis=-1)
+    values += _RAISED * np.exp(-((off / (_SHORE * unit)) ** 2))
+    off = np.hypot(*np.moveaxis(points - np.array(corner.center), -1, 0))
+    values -= _LOWERED * np.exp(-((off / (_HALL * unit)) ** 2))
     seed = int(rng.integers(2**32))
 
     def core(level: float) -> BaseGeometry:
-        return site.core(field.below(level), np.random.default_rng(seed))
+        """Return where the middle of a robot may be: what is below a level, in one piece."""
+        low = shapely.simplify(below(points, values - level), fine).intersection(inside(least))
+        parts = [part for part in shapely.get_parts(low) if part.area >= _CHAMBER * unit**2]
+        hall = start.buffer(-least)
+        whole = shapely.union_all([*parts, start.centroid if hall.is_empty else hall])
+        return shapely.union_all([whole, *tunnels(shapely.get_parts(whole), np.random.default_rng(seed))])
 
-    low, high = field.range
+    def free(core: BaseGeometry, radius: float) -> Polygon:
+        """Return what is nearer to the core than a radius, with smooth walls."""
+        spike = _SPIKE * unit
+        wide = core.buffer(radius + spike).buffer(-spike).intersection(inside(0.0)) | start
+        outer = max(shapely.get_parts(wide), key=lambda part: float(part.area))
+        pillars = [ring for ring in outer.interiors if Polygon(ring).area >= _PILLAR * unit**2]
+        return shapely.simplify(Polygon(outer.exterior, pillars), fine)
+
+    def blocked(space: Polygon) -> float:
+        return 1.0 - float(space.area) / (width * height)
+
+    low, high = float(values.min()), float(values.max())
     for _ in range(_LEVELS):
         level = (low + high) / 2.0
-        more = site.blocked(site.free(core(level), _USUAL * site.radius)) > request.area
+        more = blocked(free(core(level), _USUAL * least)) > request.area
         low, high = (level, high) if more else (low, level)
     middle = core((low + high) / 2.0)
-    for _ in range(_WINDOWS):
-        radius = _radius(site, middle)
-        free = _rounded(request, site.free(middle, radius))
-        if abs(site.blocked(free) - request.area) > _CLOSE * AREA_TOLERANCE:
+    for _ in range(_ROUNDS):
+        low, high = least, _WIDEST * least
+        for _ in range(_RADII):
+            radius = (low + high) / 2.0
+            low, high = (radius, high) if blocked(free(middle, radius)) > request.area else (low, radius)
+        radius = (low + high) / 2.0
+        space = free(middle, radius)
+        outline, *pillars = (
+            request.ring(shapely.get_coordinates(ring)[:-1]) for ring in (space.exterior, *space.interiors)
+        )
+        space = Polygon(outline, pillars)
+        if abs(blocked(space) - request.area) > _CLOSE * AREA_TOLERANCE:
             return None
-        gap = narrowest_gap(MultiPolygon([free]))
-        if gap is None or gap.width >= request.gap:
-            return _rock(request, free)
-        middle = shapely.union_all([middle, _through(gap, middle, radius)])
+        narrow = [gap for gap in gaps_narrower(MultiPolygon([space]), request.gap) if gap.width < request.gap]
+        if not narrow:
+            around = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+            rock = PolygonObstacle(around, (outline,), "rock")
+            return [rock, *(PolygonObstacle(ring, name="pillar") for ring in pillars)]
+        count = math.ceil(_PER_ROUND * request.obstacles)
+        middle = shapely.union_all([middle, *(through(gap, middle, radius) for gap in narrow[:count])])
     return None
 
 
-def _radius(site: _Site, core: BaseGeometry) -> float:
-    """Return the radius by which a core is to be widened so that as much is blocked as is wanted, m."""
-    low, high = site.radius, _WIDEST * site.radius
-    for _ in range(_RADII):
-        radius = (low + high) / 2.0
-        more = site.blocked(site.free(core, radius)) > site.request.area
-        low, high = (radius, high) if more else (low, radius)
-    return (low + high) / 2.0
+def random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return a field of mean 0 and variance 1 that varies over the length of a usual chamber.
+
+    It is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis, *Simulation of
+    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
+
+    Returns
+    -------
+    points : (rows, columns, 2) m
+        The mesh, up to the edges of the map.
+    values : (rows, columns)
+    """
+    sides = request.width, request.height
+    step = max(request.unit / _FINENESS, min(max(sides) / _MOST, request.unit / _COARSEST))
+    x, y = (np.linspace(0.0, side, math.ceil(side / step) + 1) for side in sides)
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    length = request.unit * rng.uniform(*_LENGTHS, _WAVES)
+    angle, phase = rng.uniform(0.0, 2.0 * np.pi, (2, _WAVES))
+    values = np.zeros(points.shape[:2])
+    for k in range(_WAVES):
+        along = points[..., 0] * math.cos(angle[k]) + points[..., 1] * math.sin(angle[k])
+        values += np.cos(2.0 * np.pi / length[k] * along + phase[k])
+    return points, values * math.sqrt(2.0 / _WAVES)
 
 
-def _tunnels(parts: list[BaseGeometry], rng: np.random.Generator) -> list[LineString]:
+def below(points: Array, values: Array) -> BaseGeometry:
+    """Return the polygons where a field on a mesh is below 0; the edge of the mesh counts as above it.
+
+    Contours are those of the linear interpolation on triangles ("marching triangles", two to each square of
+    the mesh): there are no cases in which it is left open what hangs together.
+    """
+    inner = values[1:-1, 1:-1]
+    values = np.maximum(values, 1.0)
+    values[1:-1, 1:-1] = inner
+    # the edges from each point to the right, upwards, and to the point above the right one
+    right = _crossed(points[:, :-1], points[:, 1:], values[:, :-1], values[:, 1:])
+    up = _crossed(points[:-1], points[1:], values[:-1], values[1:])
+    aslant = _crossed(points[:-1, :-1], points[1:, 1:], values[:-1, :-1], values[1:, 1:])
+    triangles = ((right[:-1], up[:, 1:], aslant), (aslant, right[1:], up[:, :-1]))
+    edges = np.concatenate([np.stack(three, axis=2).reshape(-1, 3, 2) for three in triangles])
+    # a contour that enters a triangle leaves it
+    segments = edges[~np.isnan(edges[..., 0])].reshape(-1, 2, 2)
+    return shapely.build_area(shapely.multilinestrings(shapely.linestrings(segments)))
+
+
+def _crossed(start: Array, end: Array, here: Array, there: Array) -> Array:
+    """Return where edges cross the level 0, (..., 2) m, nan where they do not."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where((here < 0.0) != (there < 0.0), here / (here - there), np.nan)
+    return np.asarray(start + (end - start) * part[..., None])
+
+
+def tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
     """Return lines that join all parts, as short as can be, with a bend in each: a spanning tree."""
-    group = list(range(len(parts)))
-    pairs = list(combinations(range(len(parts)), 2))
-    lines = [shapely.shortest_line(parts[i], parts[j]) for i, j in pairs]
-    tunnels = []
-    for k in sorted(range(len(pairs)), key=lambda k: float(lines[k].length)):
-        i, j = pairs[k]
-        if group[i] != group[j]:
-            tunnels.append(_bent(lines[k], rng.uniform(-_BEND, _BEND)))
-            group = [group[i] if number == group[j] else number for number in group]
-    return tunnels
+    found: list[LineString] = []
+    tree, joined = shapely.STRtree(parts), DisjointSet(range(len(parts)))
+    left, bottom, right, top = shapely.total_bounds(parts).tolist()
+    reach = max(right - left, top - bottom) / len(parts)
+    while joined.n_subsets > 1:
+        i, j = tree.query(parts, "dwithin", reach)
+        i, j = i[i < j], j[i < j]
+        lines = shapely.shortest_line(parts[i], parts[j])
+        length = shapely.length(lines)
+        short = [k for k in np.lexsort((j, i, length)).tolist() if joined.merge(i[k], j[k])]
+        for begin, end in shapely.get_coordinates(lines[short]).reshape(-1, 2, 2):
+            along = end - begin
+            bend = rng.uniform(-_BEND, _BEND) * np.array([-along[1], along[0]])
+            found.append(LineString([begin, (begin + end) / 2.0 + bend, end]))
+        reach *= 2.0
+    return found
 
 
-def _bent(line: LineString, bend: float) -> LineString:
-    """Return a line with its middle moved sideways by a part of its length."""
-    begin, end = np.asarray(line.coords)
-    along = end - begin
-    middle = (begin + end) / 2.0 + bend * np.array([-along[1], along[0]])
-    return LineString([begin, middle, end])
-
-
-def _through(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
+def through(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
     """Return a line through a window between two parts of a core, or its middle where there are no two."""
     one, other = np.array(gap.between)
     middle = (one + other) / 2.0
@@ -203,19 +205,3 @@ def _through(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
             return Point(middle)
         ends.append(shapely.shortest_line(Point(middle), near).coords[-1])
     return LineString([ends[0], middle, ends[1]])
-
-
-def _rounded(request: Request, free: Polygon) -> Polygon:
-    rings = [request.ring(shapely.get_coordinates(ring)[:-1]) for ring in (free.exterior, *free.interiors)]
-    return Polygon(rings[0], rings[1:])
-
-
-def _rock(request: Request, free: Polygon) -> list[Obstacle]:
-    """Return what is not free: the rock all around, with the cave as its hole, and the pillars."""
-    width, height = float(request.width), float(request.height)
-    around = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
-    outline, *inner = (
-        request.ring(shapely.get_coordinates(ring)[:-1]) for ring in (free.exterior, *free.interiors)
-    )
-    pillars = [PolygonObstacle(ring, name="pillar") for ring in inner]
-    return [PolygonObstacle(around, (outline,), "rock"), *pillars]

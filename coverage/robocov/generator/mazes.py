@@ -4,6 +4,9 @@ The passages are a spanning tree of the grid, grown cell by cell ("growing tree"
 Programmers*, 2015, chapter 11): from the newest cell it makes long winding corridors, as a depth-first
 search does, from any cell many short ones; each maze mixes the two. In a tree there is one way from place
 to place. So some walls are opened after that, those at dead ends first ("braiding").
+
+Walls are a boolean array (columns + 1, rows + 1, 2): whether one leads from a post, where lines of the grid
+cross, upwards (0) and to the right (1).
 """
 
 from __future__ import annotations
@@ -11,91 +14,26 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import shapely
 
-from robocov.environment import WallObstacle
-from robocov.generator.request import AREA_TOLERANCE
-
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle
-    from robocov.environment.starts import DiscStart
-    from robocov.generator.request import Request
+from robocov.arrays import BoolArray
+from robocov.environment import Obstacle, WallObstacle
+from robocov.environment.starts import DiscStart
+from robocov.generator.request import AREA_TOLERANCE, Request
 
 Cell: TypeAlias = tuple[int, int]
-"""Column and row."""
-
 Post: TypeAlias = tuple[int, int]
-"""Where lines of the grid cross: the numbers of the vertical and of the horizontal one."""
 
-Piece: TypeAlias = tuple[Post, Post]
-"""A wall between two neighbouring posts, the lower first."""
-
+# what cells that are longer than wide count, against a number of cells that is not the one asked for
 _OBLONG = 0.5
-"""What cells that are longer than wide count, against a number of cells that is not the one asked for."""
-
-_NEWEST = 0.6, 0.98
-"""Least and largest chance with which a maze grows from its newest cell."""
-
+_NEWEST = 0.6, 0.98  # least and largest chance with which a maze grows from its newest cell
+# least and largest part of the walls that are opened, and the most where the blocked area wants it
 _OPENED, _MOST_OPENED = (0.04, 0.12), 0.4
-"""Least and largest part of the walls that are opened, and the most where the blocked area wants it."""
-
-_DEAD_END = 0.7
-"""Chance that the wall to be opened is one at a dead end."""
-
-_CLOSE = 0.8
-"""Part of the tolerance of the blocked area that is made use of."""
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """The lines of a maze.
-
-    Attributes
-    ----------
-    x, y : tuple of float, m
-        Of the vertical and the horizontal ones; the first and the last are the boundary.
-    thickness : float, m
-        Of the walls on them.
-    """
-
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    thickness: float
-
-    @classmethod
-    def of(cls, request: Request, shape: Cell, thickness: float) -> _Grid:
-        """Return the grid whose corridors are as wide as each other, also those along the boundary."""
-
-        def lines(length: float, count: int) -> tuple[float, ...]:
-            inner = np.arange(1, count, dtype=np.float64) * ((length + thickness) / count) - thickness / 2.0
-            return (0.0, *request.rounded(inner).tolist(), float(length))
-
-        return cls(lines(request.width, shape[0]), lines(request.height, shape[1]), thickness)
-
-    @property
-    def narrowest(self) -> float:
-        """The width of the narrowest corridor, m."""
-        half = self.thickness / 2.0
-        faces = []
-        for first, *inner, last in (self.x, self.y):
-            low, high = [first, *(at + half for at in inner)], [*(at - half for at in inner), last]
-            faces += [end - begin for begin, end in zip(low, high, strict=True)]
-        return min(faces)
-
-    def walls(self, pieces: set[Piece]) -> list[WallObstacle]:
-        """Return the walls, each as long as can be."""
-        return [
-            WallObstacle(tuple((self.x[i], self.y[k]) for i, k in trail), self.thickness)
-            for trail in _trails(pieces)
-        ]
-
-    def blocked(self, pieces: set[Piece]) -> float:
-        """Return the area that they block, m²."""
-        return float(shapely.union_all([wall.polygon for wall in self.walls(pieces)]).area)
+_DEAD_END = 0.7  # chance that the wall to be opened is one at a dead end
+_CLOSE = 0.8  # part of the tolerance of the blocked area that is made use of
 
 
 def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -106,23 +44,43 @@ def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
     centimetres, goes by opening some more. No wall stands in the disc of the start.
     """
     shape = _shape(request)
-    pieces = _walls(shape, _tree(shape, rng))
-    least = (1.0 - _MOST_OPENED) * len(pieces)
-    for _ in range(round(len(pieces) * rng.uniform(*_OPENED))):
-        _open(pieces, shape, rng)
+    walls = inner_walls(shape) & ~tree_passages(shape, rng)
+    least = (1.0 - _MOST_OPENED) * walls.sum()
+    for _ in range(round(walls.sum() * rng.uniform(*_OPENED))):
+        _open(walls, rng)
     disc = shapely.Point(corner.center).buffer(corner.radius)
     enough = _CLOSE * AREA_TOLERANCE * request.width * request.height
-    while pieces and len(pieces) >= least:
-        grid = _fitted(request, shape, pieces)
-        if grid.narrowest < request.gap - 1e-9:
+    while walls.any() and walls.sum() >= least:
+        lines = list(trails(walls))
+
+        def built(steps: int, lines: list[list[Post]] = lines) -> list[WallObstacle]:
+            wide = round(steps * request.step, request.digits)
+            x, y = _grid(request, shape, wide)
+            return [WallObstacle(tuple((x[i], y[k]) for i, k in line), wide) for line in lines]
+
+        # the thickness whose blocked area is nearest to what is wanted
+        low, high = 1, math.ceil(min(request.width / shape[0], request.height / shape[1]) / request.step)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if _area(built(middle)) < request.blocked else (low, middle)
+        found = min(map(built, (low, high)), key=lambda each: abs(_area(each) - request.blocked))
+        thickness = found[0].width
+        x, y = _grid(request, shape, thickness)
+        # the boundary has no thickness
+        centred = ([-thickness / 2.0, *line[1:-1], line[-1] + thickness / 2.0] for line in (x, y))
+        if min(np.diff(line).min() for line in centred) - thickness < request.gap - 1e-9:
             return None
-        inside = {piece for piece in pieces if grid.walls({piece})[0].polygon.intersects(disc)}
-        if inside:
-            pieces -= inside
-        elif abs(grid.blocked(pieces) - request.blocked) <= enough:
-            return [*grid.walls(pieces)]
+        at = np.argwhere(walls)
+        begin = np.column_stack([np.take(x, at[:, 0]), np.take(y, at[:, 1])])
+        end = np.column_stack([np.take(x, at[:, 0] + at[:, 2]), np.take(y, at[:, 1] + 1 - at[:, 2])])
+        beside = thickness / 2.0 * np.column_stack([1 - at[:, 2], at[:, 2]])
+        inside = shapely.intersects(shapely.box(*(begin - beside).T, *(end + beside).T), disc)
+        if inside.any():
+            walls[tuple(at[inside].T)] = False
+        elif abs(_area(found) - request.blocked) <= enough:
+            return [*found]
         else:
-            _open(pieces, shape, rng)
+            _open(walls, rng)
     return None
 
 
@@ -138,94 +96,87 @@ def _shape(request: Request) -> Cell:
     return min(((c, r) for c in range(1, most + 1) for r in range(1, 2 * most // c + 1)), key=badness)
 
 
-def _fitted(request: Request, shape: Cell, pieces: set[Piece]) -> _Grid:
-    """Return the grid with the thickness whose blocked area is nearest to what is wanted."""
-
-    def grid(steps: int) -> _Grid:
-        return _Grid.of(request, shape, round(steps * request.step, request.digits))
-
-    low, high = 1, math.ceil(min(request.width / shape[0], request.height / shape[1]) / request.step)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if grid(middle).blocked(pieces) < request.blocked else (low, middle)
-    return min(map(grid, (low, high)), key=lambda each: abs(each.blocked(pieces) - request.blocked))
+def _grid(request: Request, shape: Cell, thickness: float) -> list[list[float]]:
+    """Return the x and y of the lines, m; the corridors are as wide as each other, along the boundary too."""
+    lines = []
+    for length, count in zip((request.width, request.height), shape, strict=True):
+        inner = np.arange(1, count, dtype=np.float64) * ((length + thickness) / count) - thickness / 2.0
+        lines.append([0.0, *request.rounded(inner).tolist(), float(length)])
+    return lines
 
 
-def _neighbours(cell: Cell, shape: Cell) -> list[Cell]:
-    column, row = cell
-    around = [(column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)]
-    return [(c, r) for c, r in around if 0 <= c < shape[0] and 0 <= r < shape[1]]
+def _area(walls: list[WallObstacle]) -> float:
+    return float(shapely.union_all([wall.polygon for wall in walls]).area)
 
 
-def _tree(shape: Cell, rng: np.random.Generator) -> set[Piece]:
+def inner_walls(shape: Cell) -> BoolArray:
+    """Return all walls between cells, those of the boundary not."""
+    walls = np.zeros((shape[0] + 1, shape[1] + 1, 2), dtype=bool)
+    walls[1:-1, :-1, 0] = walls[:-1, 1:-1, 1] = True
+    return walls
+
+
+def tree_passages(shape: Cell, rng: np.random.Generator) -> BoolArray:
     """Return where walls are missing so that there is one way from each cell to each other."""
     newest = rng.uniform(*_NEWEST)
     first = (int(rng.integers(shape[0])), int(rng.integers(shape[1])))
-    growing, reached, passages = [first], {first}, set()
+    growing, reached, passages = [first], {first}, np.zeros_like(inner_walls(shape))
     while growing:
         at = len(growing) - 1 if rng.random() < newest else int(rng.integers(len(growing)))
-        fresh = [cell for cell in _neighbours(growing[at], shape) if cell not in reached]
+        column, row = growing[at]
+        around = (column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)
+        fresh = [
+            (c, r) for c, r in around if 0 <= c < shape[0] and 0 <= r < shape[1] and (c, r) not in reached
+        ]
         if not fresh:
             growing.pop(at)
             continue
         cell = fresh[int(rng.integers(len(fresh)))]
-        passages.add(_between(growing[at], cell))
+        passages[(*max(growing[at], cell), int(column == cell[0]))] = True
         reached.add(cell)
         growing.append(cell)
     return passages
 
 
-def _between(one: Cell, other: Cell) -> Piece:
-    """Return where the wall between two neighbouring cells is."""
-    column, row = max(one, other)
-    return (column, row), ((column, row + 1) if one[1] == other[1] else (column + 1, row))
-
-
-def _around(cell: Cell, shape: Cell) -> set[Piece]:
-    """Return where walls to neighbouring cells are."""
-    return {_between(cell, other) for other in _neighbours(cell, shape)}
-
-
-def _walls(shape: Cell, passages: set[Piece]) -> set[Piece]:
-    every = (_around((column, row), shape) for column in range(shape[0]) for row in range(shape[1]))
-    return set().union(*every) - passages
-
-
-def _open(pieces: set[Piece], shape: Cell, rng: np.random.Generator) -> None:
+def _open(walls: BoolArray, rng: np.random.Generator) -> None:
     """Take away a wall, one at a dead end if there is any and chance has it.
 
     If possible it is one that joins others, or joins them to the boundary: then there is a way round what
     it held. To take the end of a wall makes none.
     """
-    arms = _arms(pieces)
-    joining = {piece for piece in pieces if all(len(arms[post]) > 1 or _outer(post, shape) for post in piece)}
-    candidates = joining or pieces
+    meeting = walls.sum(axis=2)
+    meeting[:, 1:] += walls[:, :-1, 0]
+    meeting[1:] += walls[:-1, :, 1]
+    held = meeting > 1
+    held[[0, -1]] = held[:, [0, -1]] = True
+    joining = walls & held[..., None]
+    joining[:, :-1, 0] &= held[:, 1:]
+    joining[:-1, :, 1] &= held[1:]
+    candidates = joining if joining.any() else walls
     if rng.random() < _DEAD_END:
-        around = [_around((column, row), shape) for column in range(shape[0]) for row in range(shape[1])]
-        at_dead_ends = [each & candidates for each in around if len(each - pieces) == 1]
-        candidates = set().union(*at_dead_ends) or candidates
-    pieces.remove(sorted(candidates)[int(rng.integers(len(candidates)))])
+        passages = inner_walls((walls.shape[0] - 1, walls.shape[1] - 1)) & ~walls
+        around = passages[:-1, :-1].sum(axis=2) + passages[1:, :-1, 0] + passages[:-1, 1:, 1]
+        at_dead_ends = np.zeros_like(walls)
+        at_dead_ends[:-1, :-1] = (around == 1)[..., None]
+        at_dead_ends[1:, :-1, 0] |= around == 1
+        at_dead_ends[:-1, 1:, 1] |= around == 1
+        if (candidates & at_dead_ends).any():
+            candidates = candidates & at_dead_ends
+    places = np.flatnonzero(candidates)
+    walls.flat[places[int(rng.integers(len(places)))]] = False
 
 
-def _outer(post: Post, shape: Cell) -> bool:
-    return post[0] in (0, shape[0]) or post[1] in (0, shape[1])
-
-
-def _arms(pieces: set[Piece]) -> defaultdict[Post, set[Post]]:
-    """Return the posts to which walls lead from each."""
-    arms: defaultdict[Post, set[Post]] = defaultdict(set)
-    for one, other in pieces:
-        arms[one].add(other)
-        arms[other].add(one)
-    return arms
-
-
-def _trails(pieces: set[Piece]) -> Iterator[list[Post]]:
-    """Yield poly-lines that have every piece once, with their ends and bends.
+def trails(walls: BoolArray) -> Iterator[list[Post]]:
+    """Yield poly-lines that have every wall once, by the posts at their ends and bends.
 
     They go straight on where they can, and round a corner where nothing else meets there.
     """
-    arms = _arms(pieces)
+    arms: defaultdict[Post, set[Post]] = defaultdict(set)
+    for i, k, right in np.argwhere(walls).tolist():
+        one, other = (i, k), (i + right, k + 1 - right)
+        arms[one].add(other)
+        arms[other].add(one)
+    done: set[tuple[Post, Post]] = set()
 
     def onward(before: Post, here: Post) -> Post | None:
         straight = (2 * here[0] - before[0], 2 * here[1] - before[1])
@@ -234,14 +185,13 @@ def _trails(pieces: set[Piece]) -> Iterator[list[Post]]:
             return straight
         return next(iter(others)) if len(others) == 1 else None
 
-    left = set(pieces)
     for begin in sorted(arms):
         for step in sorted(arms[begin]):
-            if onward(step, begin) is not None or tuple(sorted((begin, step))) not in left:
+            if onward(step, begin) is not None or (begin, step) in done:
                 continue
             trail, before, here = [begin], begin, step
             while True:
-                left.discard((min(before, here), max(before, here)))
+                done |= {(before, here), (here, before)}
                 following = onward(before, here)
                 if following is None:
                     break

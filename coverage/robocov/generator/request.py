@@ -4,55 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.arrays import Array
+from robocov.environment import Ring
 from robocov.environment.starts import GAP
 from robocov.errors import checked
 from robocov.robots import DEFAULT_RADIUS
 
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.environment import Ring
-
-LEAST_GAP = 0.21
-"""Narrowest passage in metres that may be asked for: robots of the usual size pass it."""
-
+LEAST_GAP = 0.21  # m; robots of the usual size pass it
 assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + GAP)
 
 AREA_TOLERANCE = 0.005
 """Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""
 
-MOST_OBSTACLES = 200
-
-SIDES = 1.0, 1000.0
-"""Least and largest side of a map, in metres."""
-
-_WIDE = 0.5
-"""From gaps of so many metres on a centimetre is fine enough, below a millimetre."""
+MOST_OBSTACLES = 100_000
+SIDES = 1.0, 1000.0  # m
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a map is to be like.
-
-    Attributes
-    ----------
-    obstacles : int
-        How many; what is counted depends on the kind.
-    area : float
-        Blocked area as a part of the map's.
-    gap : float, m
-        Least width of every passage.
-    width, height : float, m
-        Of the map, a rectangle from [0, 0].
-
-    Raises
-    ------
-    ParameterError
-        When one of them is out of range.
-    """
+    """What a map is to be like, see `robocov.generator.generated_map`."""
 
     obstacles: int
     area: float
@@ -79,8 +52,8 @@ class Request:
 
     @property
     def digits(self) -> int:
-        """Digits after the point of all coordinates."""
-        return 2 if self.gap >= _WIDE else 3
+        """Digits after the point of all coordinates: centimetres, millimetres where gaps are narrow."""
+        return 2 if self.gap >= 0.5 else 3
 
     @property
     def step(self) -> float:

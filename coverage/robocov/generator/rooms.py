@@ -1,48 +1,101 @@
-"""Maps of the kind `rooms`: a building with doors and furniture."""
+"""Maps of the kind `rooms`: a building, that is a rectangle divided into rooms, with doors and furniture."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import TYPE_CHECKING
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import shapely
+from scipy.cluster.hierarchy import DisjointSet
+from shapely import Polygon
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.generator.floorplan import Box, floor_plan
+from robocov.environment import CircleObstacle, Obstacle, PolygonObstacle, WallObstacle
+from robocov.environment.starts import DiscStart
+from robocov.generator.request import Request
 
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle
-    from robocov.environment.starts import DiscStart
-    from robocov.generator.floorplan import FloorPlan
-    from robocov.generator.request import Request
-
+_CORRIDOR, _MANY = 0.5, 5  # chance of a corridor across a plan, and the least number of rooms for one
+_NARROWEST = 1.5  # least side of a room, in gaps
+_UNEVEN = 0.3  # a wall is off the even division by at most so much of one room's share
+_DOORS = 1.06, 1.6  # least and largest width of a door, in gaps
+_LOOPS = 0.3  # chance of a door that is not needed
+_STUB = 0.05  # least length of a piece of wall beside a door, in sides of a usual room
+# part of the blocked area that walls take: the least, the most, and the most where rooms are small
 _WALLS = 0.3, 0.5, 0.9
-"""Part of the blocked area that walls take: the least, the most, and the most where rooms are small."""
-
+# sides of usual rooms that are small, and very small, in gaps: furniture finds less and less room there
 _SMALL, _SMALLEST = 6.0, 3.0
-"""Sides of usual rooms that are small, and very small, in gaps: furniture finds less and less room there."""
-
+# length of the walls of a room, about, in its sides: without doors, each wall counted half for each room
 _LENGTH = 1.5
-"""Length of the walls of a room, about, in its sides: without doors, each wall counted half for each room."""
-
-_THICKEST = 0.06
-"""Largest thickness of walls, in sides of a usual room."""
-
-_PIECES = 2.2
-"""Pieces of furniture in a room, on average."""
-
-_TRIES = 32
-"""Places that are tried for one piece, and pieces in a row that find none before that is given up."""
-
+_THICKEST = 0.06  # largest thickness of walls, in sides of a usual room
+_PIECES = 2.2  # pieces of furniture in a room, on average
+_TRIES = 32  # places that are tried for one piece, and pieces in a row that find none before that is given up
+# each piece that finds no place makes the next smaller by this factor, down to the smallest
 _SHRINKING, _SHRUNK = 0.92, 0.2
-"""Each piece that finds no place makes the next smaller by this factor, down to the smallest."""
+_DENSEST = 0.35  # part of the rooms that furniture fills at most: more finds no place
+_ENOUGH = 0.001  # what is left to be blocked, as a part of the map, which is too little for a piece
 
-_DENSEST = 0.35
-"""Part of the rooms that furniture fills at most: more finds no place."""
 
-_ENOUGH = 0.001
-"""What is left to be blocked, as a part of the map, which is too little for a piece."""
+class Box(NamedTuple):
+    """A rectangle along the axes, m."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Its width and height."""
+        return self.right - self.left, self.top - self.bottom
+
+
+class Wall(NamedTuple):
+    """A wall from `begin` to `end` on one axis, with its middle line `at` (m) on the axis that it crosses."""
+
+    across: int
+    at: float
+    begin: float
+    end: float
+
+    def part(self, begin: float, end: float, thickness: float) -> WallObstacle:
+        """Return a part of the wall."""
+        upright = self.across == 0
+        ends = ((self.at, begin), (self.at, end)) if upright else ((begin, self.at), (end, self.at))
+        return WallObstacle(ends, thickness)
+
+
+class Door(NamedTuple):
+    """An opening in a wall, between two rooms by their numbers."""
+
+    wall: Wall
+    begin: float
+    end: float
+    rooms: tuple[int, int]
+
+
+@dataclass
+class FloorPlan:
+    """Rooms, up to the middle lines of their walls, and the walls and doors between them."""
+
+    thickness: float
+    rooms: list[Box] = field(default_factory=list)
+    walls: list[Wall] = field(default_factory=list)
+    doors: list[Door] = field(default_factory=list)
+
+    def solid(self) -> list[WallObstacle]:
+        """Return the walls with their doors left out."""
+        openings: defaultdict[Wall, list[float]] = defaultdict(list)
+        for door in sorted(self.doors):
+            openings[door.wall] += door.begin, door.end
+        pieces = []
+        for wall in self.walls:
+            ends = [wall.begin, *openings[wall], wall.end]
+            for begin, end in zip(ends[::2], ends[1::2], strict=True):
+                pieces.append(wall.part(begin, end, self.thickness))
+        return pieces
 
 
 def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -51,52 +104,125 @@ def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> l
     Furniture stands against walls, or at least `gap` away from them; from doors and other furniture
     it keeps that in any case.
     """
-    thickness = _thickness(request, rng)
-    plan = floor_plan(request, thickness, rng)
-    if plan is None:
-        return None
-    walls: list[Obstacle] = [*plan.solid(thickness)]
-    whole = shapely.box(0.0, 0.0, request.width, request.height)
-    built = shapely.union_all([wall.polygon for wall in walls]).intersection(whole).area if walls else 0.0
-    furniture = _furniture(request, corner, plan, thickness, request.blocked - built, rng)
-    return None if furniture is None else [*walls, *furniture]
-
-
-def _thickness(request: Request, rng: np.random.Generator) -> float:
-    """Return how thick walls are, m, so that their faces have rounded coordinates."""
     least, most, of_small = _WALLS
     small = min(max((_SMALL - request.unit / request.gap) / (_SMALL - _SMALLEST), 0.0), 1.0)
     part = rng.uniform(least, most + (of_small - most) * small)
     half = min(part * request.area / _LENGTH, _THICKEST) * request.unit / 2.0
-    return 2.0 * max(request.floor(half), request.step)
+    # so that the faces of walls have rounded coordinates
+    thickness = 2.0 * max(request.floor(half), request.step)
+    plan = floor_plan(request, thickness, rng)
+    if plan is None:
+        return None
+    walls: list[Obstacle] = [*plan.solid()]
+    whole = shapely.box(0.0, 0.0, request.width, request.height)
+    built = shapely.union_all([wall.polygon for wall in walls]).intersection(whole).area if walls else 0.0
+    furniture = _furniture(request, corner, plan, request.blocked - built, rng)
+    return None if furniture is None else [*walls, *furniture]
+
+
+def floor_plan(request: Request, thickness: float, rng: np.random.Generator) -> FloorPlan | None:
+    """Return a plan with as many rooms as are wanted; None if they become too small."""
+    plan = FloorPlan(thickness)
+    waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.obstacles))]
+    corridor = None
+    if request.obstacles >= _MANY and rng.random() < _CORRIDOR:
+        corridor = _with_corridor(request, plan, waiting, rng)
+    least = _NARROWEST * request.gap + thickness
+    while waiting:
+        box, count = waiting.pop()
+        if count == 1:
+            plan.rooms.append(box)
+            continue
+        across = int(box.sides[1] > box.sides[0])
+        some = count // 2 if rng.random() < 0.5 else count - count // 2
+        part = some / count + rng.uniform(-_UNEVEN, _UNEVEN) / count
+        low, high = box[across] + least, box[across + 2] - least
+        if low > high:
+            return None
+        at = round(min(max(box[across] + part * box.sides[across], low), high), request.digits)
+        plan.walls.append(Wall(across, at, box[1 - across], box[3 - across]))
+        first, second = list(box), list(box)
+        first[across + 2] = second[across] = at
+        waiting += [(Box(*first), some), (Box(*second), count - some)]
+    return plan if _add_doors(request, plan, corridor, rng) else None
+
+
+def _with_corridor(
+    request: Request, plan: FloorPlan, waiting: list[tuple[Box, int]], rng: np.random.Generator
+) -> int | None:
+    """Divide the plan by a corridor along its longer side; return its number, None if there is no room."""
+    whole, count = waiting[0]
+    across = int(whole.sides[0] >= whole.sides[1])
+    wide = rng.uniform(1.6, 2.2) * request.gap + plan.thickness
+    begin = (whole.sides[across] - wide) * rng.uniform(0.38, 0.62)
+    begin, end = round(begin, request.digits), round(begin + wide, request.digits)
+    if min(begin, whole.sides[across] - end) < 2.0 * _NARROWEST * request.gap:
+        return None
+    below, above, middle = list(whole), list(whole), list(whole)
+    below[across + 2] = middle[across] = begin
+    above[across] = middle[across + 2] = end
+    share = begin / (whole.sides[across] - wide)
+    some = min(max(round((count - 1) * share), 1), count - 2)
+    waiting[:] = [(Box(*below), some), (Box(*above), count - 1 - some)]
+    plan.walls += [Wall(across, at, whole[1 - across], whole[3 - across]) for at in (begin, end)]
+    plan.rooms.append(Box(*middle))
+    return len(plan.rooms) - 1
+
+
+def _add_doors(request: Request, plan: FloorPlan, corridor: int | None, rng: np.random.Generator) -> bool:
+    """Add doors so that all rooms hang together, and some more; return whether that is possible."""
+    joined = DisjointSet(range(len(plan.rooms)))
+    stub = _STUB * request.unit + plan.thickness / 2.0
+    # the rooms by each of their four edges: its axis, whether the room ends there, and where
+    beside: defaultdict[tuple[int, int, float], list[int]] = defaultdict(list)
+    for number, room in enumerate(plan.rooms):
+        for axis, ends in itertools.product((0, 1), (0, 1)):
+            beside[axis, ends, room[axis + 2 * ends]].append(number)
+    between = [
+        (wall, i, j)
+        for wall in plan.walls
+        for i, j in itertools.product(beside[wall.across, 1, wall.at], beside[wall.across, 0, wall.at])
+    ]
+    key, loop, place = rng.random((3, len(between)))
+    widths = request.gap * rng.uniform(*_DOORS, len(between))
+    # doors to the corridor come first
+    for k in sorted(range(len(between)), key=lambda k: (corridor not in between[k][1:], key[k])):
+        wall, i, j = between[k]
+        one, other, side = plan.rooms[i], plan.rooms[j], 1 - wall.across
+        # the end is before the begin where the wall does not lie between the two
+        low, high = max(wall.begin, one[side], other[side]), min(wall.end, one[side + 2], other[side + 2])
+        wide = request.floor(min(float(widths[k]), high - low - 2.0 * stub))
+        if wide < request.gap + request.step or (joined.connected(i, j) and loop[k] > _LOOPS):
+            continue
+        begin = round(low + stub + (high - low - 2.0 * stub - wide) * float(place[k]), request.digits)
+        plan.doors.append(Door(wall, begin, round(begin + wide, request.digits), (i, j)))
+        joined.merge(i, j)
+    return joined.n_subsets == 1
 
 
 def _furniture(
-    request: Request,
-    corner: DiscStart,
-    plan: FloorPlan,
-    thickness: float,
-    area: float,
-    rng: np.random.Generator,
+    request: Request, corner: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
     """Return furniture that blocks so much, None if it finds no place."""
     enough = _ENOUGH * request.width * request.height
     if area < -enough:
         return None
     clear = shapely.Point(corner.center).buffer(corner.radius)
-    inner = [_inner(request, box, thickness) for box in plan.rooms]
+    inner = [_inner(request, box, plan.thickness) for box in plan.rooms]
     sizes = np.array([box.sides[0] * box.sides[1] for box in inner])
-    kept: list[list[shapely.Polygon]] = [
-        [door.box(thickness) for door in plan.doors if k in door.rooms] for k in range(len(inner))
-    ]
+    kept: list[list[Polygon]] = [[] for _ in inner]
+    for door in plan.doors:
+        for number in door.rooms:
+            kept[number].append(door.wall.part(door.begin, door.end, plan.thickness).polygon)
     if area > _DENSEST * sizes.sum():
         return None
+    chances = np.cumsum(sizes / sizes.sum())
     # pieces are as large as a few of them for each room must be
     usual = area / (_PIECES * len(inner))
     furniture: list[Obstacle] = []
     missed = 0
     while area > enough:
-        room = int(rng.choice(len(inner), p=sizes / sizes.sum()))
+        room = int(np.searchsorted(chances / chances[-1], rng.random(), side="right"))
         wanted = min(area, usual * rng.uniform(0.5, 1.5) * max(_SHRUNK, _SHRINKING**missed))
         piece = _piece(request, inner[room], kept[room], clear, wanted, rng)
         if piece is None:
@@ -113,19 +239,16 @@ def _furniture(
 
 def _inner(request: Request, room: Box, thickness: float) -> Box:
     """Return a room up to the faces of its walls; the boundary has none."""
-    low = [0.0 if edge == 0.0 else edge + thickness / 2.0 for edge in room[:2]]
-    ends = zip(room[2:], (request.width, request.height), strict=True)
-    high = [edge if edge == end else edge - thickness / 2.0 for edge, end in ends]
-    return Box(*(round(edge, request.digits) for edge in (*low, *high)))
+    bounds = (0.0, 0.0, request.width, request.height)
+    inward = (thickness / 2.0, thickness / 2.0, -thickness / 2.0, -thickness / 2.0)
+    faces = (
+        edge if edge == bound else edge + off for edge, bound, off in zip(room, bounds, inward, strict=True)
+    )
+    return Box(*(round(face, request.digits) for face in faces))
 
 
 def _piece(
-    request: Request,
-    room: Box,
-    others: list[shapely.Polygon],
-    clear: shapely.Polygon,
-    area: float,
-    rng: np.random.Generator,
+    request: Request, room: Box, others: list[Polygon], clear: Polygon, area: float, rng: np.random.Generator
 ) -> CircleObstacle | PolygonObstacle | None:
     """Return a piece of furniture of about that area at a free place of a room, None if there is none."""
     kind = str(rng.choice(["cabinet", "table", "round table"], p=[0.5, 0.3, 0.2]))

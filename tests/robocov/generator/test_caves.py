@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
+from shapely.geometry.base import BaseGeometry
 
+from robocov.arrays import Array
 from robocov.environment import PolygonObstacle
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.generator import generated_map
-from robocov.generator.caves import _through, _tunnels
+from robocov.generator.caves import below, random_field, through, tunnels
+from robocov.generator.request import Request
 
 SEEDS = range(10)
 
@@ -88,9 +93,9 @@ def test_tunnels_join_everything_and_there_are_no_more_than_that_takes(
 ) -> None:
     parts = [Point(place).buffer(0.01) for place in places]
     parts = [*shapely.get_parts(shapely.union_all(parts))]
-    tunnels = _tunnels(parts, np.random.default_rng(0))
-    assert len(tunnels) == len(parts) - 1
-    whole = shapely.union_all([*parts, *tunnels]).buffer(1e-6)
+    found = tunnels(np.array(parts), np.random.default_rng(0))
+    assert len(found) == len(parts) - 1
+    whole = shapely.union_all([*parts, *found]).buffer(1e-6)
     assert whole.geom_type == "Polygon"
 
 
@@ -98,10 +103,64 @@ def test_a_window_is_passed_from_side_to_side() -> None:
     # two parts side by side; when they are widened by 1, they meet above each other in a window
     core = shapely.union_all([LineString([(0, 0), (0, 4)]), LineString([(1.8, 0), (1.8, 4)])])
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    line = shapely.get_coordinates(_through(gap, core, 1.0))
+    line = shapely.get_coordinates(through(gap, core, 1.0))
     np.testing.assert_allclose(line[line[:, 0].argsort()], [[0.0, 1.95], [0.9, 1.95], [1.8, 1.95]])
 
 
 def test_where_there_is_nothing_on_one_side_the_window_itself_is_made_room_in() -> None:
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    assert _through(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
+    assert through(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
+
+
+REQUEST = Request(9, 0.4, 0.6, 12.0, 9.0)
+
+
+def under(function: Callable[[Array, Array], Array], level: float) -> BaseGeometry:
+    points = np.stack(np.meshgrid(*[np.linspace(0.0, 10.0, 101)] * 2), axis=-1)
+    return below(points, function(points[..., 0], points[..., 1]) - level)
+
+
+def test_a_disc() -> None:
+    (disc,) = shapely.get_parts(under(lambda x, y: np.hypot(x - 5.0, y - 4.0), 2.0))
+    assert disc.area == pytest.approx(4.0 * np.pi, rel=2e-3)
+    assert disc.hausdorff_distance(shapely.Point(5, 4).buffer(2.0, quad_segs=64)) < 0.01
+
+
+def test_rings_have_holes_and_what_is_in_a_hole_is_apart() -> None:
+    waves = under(lambda x, y: np.cos(np.hypot(x - 5.0, y - 5.0) * 3.0), 0.0)
+    # below zero from pi/6 to 3 pi/6, from 5 pi/6 to 7 pi/6, and from 9 pi/6 on
+    parts = sorted(shapely.get_parts(waves), key=lambda part: part.area)
+    rings = [part for part in parts if part.interiors]
+    for ring, (low, high) in zip(rings, ((1, 3), (5, 7)), strict=False):
+        assert len(ring.interiors) == 1
+        assert ring.area == pytest.approx(np.pi * (high**2 - low**2) * (np.pi / 6.0) ** 2, rel=0.01)
+
+
+def test_the_edge_of_the_mesh_is_above_every_level() -> None:
+    (whole,) = shapely.get_parts(under(lambda x, y: x * 0.0 - 5.0, 0.0))
+    low_x, low_y, high_x, high_y = whole.bounds
+    assert 0.0 < low_x < 0.1 and 9.9 < high_y < 10.0
+    assert 0.0 < low_y < 0.1 and 9.9 < high_x < 10.0
+    assert under(lambda x, y: x * 0.0 - 5.0, -6.0).is_empty
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32), st.floats(-1.0, 1.0))
+def test_points_of_the_mesh_are_on_their_side(seed: int, level: float) -> None:
+    points, values = random_field(REQUEST, np.random.default_rng(seed))
+    low = below(points, values - level)
+    assert low.is_valid
+    inner = points[1:-1, 1:-1].reshape(-1, 2)
+    inside = shapely.contains_xy(low, inner[:, 0], inner[:, 1])
+    np.testing.assert_array_equal(inside, values[1:-1, 1:-1].ravel() < level)
+
+
+def test_a_field_has_mean_zero_and_variance_one_and_is_smooth() -> None:
+    fields = [random_field(REQUEST, np.random.default_rng(seed)) for seed in range(40)]
+    values = np.stack([each for _, each in fields])
+    assert abs(values.mean()) < 0.1
+    assert values.var() == pytest.approx(1.0, abs=0.15)
+    assert fields[0][0][-1, -1].tolist() == [12.0, 9.0]
+    # the shortest waves are eight steps of the mesh long
+    assert np.abs(np.diff(values, axis=2)).std() < 0.5
+    assert fields[0][1].min() < -1.0 and fields[0][1].max() > 1.0

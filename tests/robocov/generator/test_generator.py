@@ -97,6 +97,13 @@ def test_a_map_is_what_was_asked_for(words):
     assert all(value == round(value, digits) for value in coordinates(environment))
 
 
+@pytest.mark.parametrize("kind", ["polygons", "blocks", "rooms", "mazes"])
+def test_maps_may_be_large(kind):
+    environment = generated_map(0, kind=kind, obstacles=250, side=50.0)
+    assert len(environment.free.geoms) == 1
+    assert len(environment.obstacles) > 50
+
+
 @settings(max_examples=20)
 @given(asked())
 def test_files_hold_the_same_map(tmp_path_factory, words):
@@ -236,7 +243,7 @@ def test_rooms_have_walls_doors_and_furniture():
         ({"seed": True}, "seed: True, but"),
         ({"kind": "polygon"}, "unknown kind of map 'polygon': did you mean 'polygons'?"),
         ({"kind": ["rooms"]}, "unknown kind of map"),
-        ({"obstacles": 0}, "obstacles: 0, but a whole number from 1 to 200 was wanted"),
+        ({"obstacles": 0}, "obstacles: 0, but a whole number from 1 to 100000 was wanted"),
         ({"obstacles": 2.5}, "obstacles: 2.5, but"),
         ({"area": 0.95}, "area: 0.95, but a number from 0.01 to 0.9 was wanted"),
         ({"area": float("nan")}, "area: nan, but"),

@@ -14,7 +14,7 @@ from shapely import Point
 from robocov.environment import Environment, WallObstacle
 from robocov.environment.passages import narrowest_gap
 from robocov.generator import generated_map
-from robocov.generator.mazes import _trails, _tree, _walls
+from robocov.generator.mazes import inner_walls, trails, tree_passages
 
 
 def components(count: int, pairs: list[tuple[int, int]]) -> int:
@@ -27,16 +27,16 @@ def components(count: int, pairs: list[tuple[int, int]]) -> int:
 @settings(max_examples=60)
 @given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32))
 def test_a_tree_leads_to_every_cell_in_one_way(columns: int, rows: int, seed: int) -> None:
-    passages = _tree((columns, rows), np.random.default_rng(seed))
-    walls = _walls((columns, rows), passages)
-    # inner edges of the grid
-    assert len(passages) + len(walls) == 2 * columns * rows - columns - rows
-    assert len(passages) == columns * rows - 1
+    passages = tree_passages((columns, rows), np.random.default_rng(seed))
+    inner = inner_walls((columns, rows))
+    assert inner.sum() == 2 * columns * rows - columns - rows
+    assert not (passages & ~inner).any()
+    assert passages.sum() == columns * rows - 1
     number = {cell: k for k, cell in enumerate(itertools.product(range(columns), range(rows)))}
     pairs = []
-    for (i, k), (_, above) in passages:
-        # an upright piece is between a cell and the one to its left
-        other = (i - 1, k) if above > k else (i, k - 1)
+    for i, k, right in np.argwhere(passages).tolist():
+        # an upright wall is between a cell and the one to its left
+        other = (i, k - 1) if right else (i - 1, k)
         pairs.append((number[i, k], number[other]))
     assert components(columns * rows, pairs) == 1
 
@@ -53,7 +53,10 @@ def test_trails_have_every_piece_of_a_forest_once(drawn: set[tuple[int, int, boo
         if components(len(posts), pairs) == len(posts) - len(pairs):
             forest.add(piece)
     found = []
-    for trail in _trails(forest):
+    walls = np.zeros((7, 7, 2), dtype=bool)
+    for (x, y), (u, _) in forest:
+        walls[x, y, u - x] = True
+    for trail in trails(walls):
         for (x, y), (u, v) in itertools.pairwise(trail):
             assert (x == u) != (y == v)
             steps = max(abs(u - x), abs(v - y))

@@ -110,7 +110,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ),
         ("--seed -1", "--seed: -1, but a whole number of at least 0 was wanted"),
         ("--seed x", "--seed: 'x', but a whole number was wanted"),
-        ("--obstacles 0", "--obstacles: 0, but a whole number from 1 to 200 was wanted"),
+        ("--obstacles 0", "--obstacles: 0, but a whole number from 1 to 100000 was wanted"),
         ("--area 2", "--area: 2.0, but a number from 0.01 to 0.9 was wanted"),
         ("--area nan", "--area: nan, but a number from"),
         ("--area 0.8", "--area: 0.8, but no layout of 6 obstacles was found"),

@@ -6,8 +6,8 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robocov.generator.floorplan import floor_plan
 from robocov.generator.request import Request
+from robocov.generator.rooms import floor_plan
 
 THICKNESS = 0.1
 
@@ -29,10 +29,10 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
         reached |= {room for door in plan.doors for room in door.rooms if reached & set(door.rooms)}
     assert len(reached) == count
 
-    solid = shapely.union_all([wall.polygon for wall in plan.solid(THICKNESS)])
+    solid = shapely.union_all([wall.polygon for wall in plan.solid()])
     for door in plan.doors:
         assert door.end - door.begin >= gap
-        opening = door.box(THICKNESS)
+        opening = door.wall.part(door.begin, door.end, THICKNESS).polygon
         assert opening.area == pytest.approx((door.end - door.begin) * THICKNESS)
         assert opening.intersection(solid).area < 1e-9
         one, other = (rooms[k] for k in door.rooms)
@@ -40,7 +40,7 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
         assert opening.intersection(one).area == pytest.approx(opening.area / 2)
         assert opening.intersection(other).area == pytest.approx(opening.area / 2)
     # but for doors the rooms are apart
-    openings = [door.box(THICKNESS).buffer(1e-9) for door in plan.doors]
+    openings = [door.wall.part(door.begin, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors]
     closed = shapely.box(0, 0, width, 12) - shapely.union_all([solid.buffer(1e-9), *openings])
     assert len(shapely.get_parts(closed)) == count
 

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.generator.outlines import convex, l_shape, u_shape
+from robocov.generator.polygons import convex, l_shape, u_shape
 
 SEEDS = st.integers(0, 2**32)
 AREAS = st.floats(0.05, 20.0)
