@@ -58,6 +58,15 @@ class Simulation:
         So many runs at once, of equal teams, with one row for each robot of the first, of the second, and so
         on. Robots of different runs know nothing of each other. See `robocov.simulate_many`.
 
+    Attributes
+    ----------
+    sensor : RangeSensor
+        For ray scans of the present.
+    memory : object
+        What the controller remembers.
+    inbox : Inbox or None
+        The messages that the robots have; None where they know the others as they are.
+
     Raises
     ------
     StartError
@@ -130,26 +139,27 @@ class Simulation:
         self.controller = controller
         self._built_in = type(controller) in CONTROLLERS.values()
         self.dt = dt
-        self._conditions = conditions
+        self.conditions = conditions
         walls, moving = solid_pieces(environment), movers(environment)
-        self._moving = bool(moving)
-        self._sensor = RangeSensor(walls, moving)
+        changes = conditions is not None and conditions.team_changes
+        self._obstacles_change = bool(moving) or changes
+        self.sensor = RangeSensor(walls, moving)
         self._world: World | ChangingWorld
-        if conditions is not None and conditions.team_changes:
+        if conditions is not None and changes:
             self._world = ChangingWorld(
                 conditions, environment, walls, moving, self.team, positions, velocities, time=time
             )
         else:
             self._world = World(walls, self.team, positions, velocities, movers=moving, runs=runs)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
-        self._inbox = None if self._perception is None else self._perception.begin()
+        self.inbox = None if self._perception is None else self._perception.begin()
         self._everybody = None
         if np.isinf(self.team.communication_range).all():
             self._everybody = Neighbours.beside([Neighbours(each)] * runs)
         self._began = time
         self._steps = 0
         self._law = self._asked(informed, controller, environment.static)
-        self._memory = self._asked(self._law.begin, environment.region, self.team)
+        self.memory = self._asked(self._law.begin, environment.region, self.team)
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
         if not isinstance(self._scanning, Scanning | None):
             raise ParameterError(
@@ -178,31 +188,9 @@ class Simulation:
         return self._world.velocities
 
     @property
-    def sensor(self) -> RangeSensor:
-        """The range sensor of the robots, for ray scans of the present."""
-        return self._sensor
-
-    @property
-    def conditions(self) -> Conditions | None:
-        """What goes wrong, or changes, during the run; None where nothing does."""
-        return self._conditions
-
-    @property
     def working(self) -> BoolArray:
         """Which robots are there and have not failed, (n,) bool."""
-        if isinstance(self._world, ChangingWorld):
-            return self._world.working
-        return np.ones(len(self.team), dtype=bool)
-
-    @property
-    def inbox(self) -> Inbox | None:
-        """The messages that the robots have; None where they know the others as they are."""
-        return self._inbox
-
-    @property
-    def memory(self) -> Any:
-        """What the controller remembers; not to be changed."""
-        return self._memory
+        return self._world.working
 
     def observe(self) -> Observations:
         """Return what each robot knows now."""
@@ -225,10 +213,8 @@ class Simulation:
     def _begin_step(self) -> None:
         """Turn to the present: nothing is observed or decided yet, and the sensor's obstacles move on."""
         self._observation = self._snapshot = None
-        if isinstance(self._world, ChangingWorld):
-            self._sensor.show(self.time, self._world.failed_robots)
-        elif self._moving:
-            self._sensor.show(self.time)
+        if self._obstacles_change:
+            self.sensor.show(self.time, self._world.failed_robots)
 
     def _observed(self) -> tuple[Observations, Inbox | None]:
         """Return what each robot knows now, and the messages that it then has."""
@@ -237,13 +223,13 @@ class Simulation:
             if self._perception is None:
                 self._observation = seen, None
             else:
-                self._observation = self._perception.known(seen, self._inbox, self.working)
+                self._observation = self._perception.known(seen, self.inbox, self.working)
         return self._observation
 
     def _sensed(self) -> Observations:
         """Return what each robot would know now if nothing went wrong."""
         team, environment, positions = self.team, self.environment, self._world.positions
-        points = self._sensor.nearest(positions, team.sensing_range)
+        points = self.sensor.nearest(positions, team.sensing_range)
         points.setflags(write=False)
         neighbours = self._everybody
         if neighbours is None:
@@ -266,7 +252,7 @@ class Simulation:
         """Return a scan of each robot, in the steps in which the controller wants one."""
         if self._steps % scanning.every(self.dt):
             return None
-        distances, hit = self._sensor.scans(positions, scanning.rays, self.team.sensing_range)
+        distances, hit = self.sensor.scans(positions, scanning.rays, self.team.sensing_range)
         distances.setflags(write=False)
         hit.setflags(write=False)
         return Scans(distances, hit)
@@ -274,9 +260,9 @@ class Simulation:
     def _decided(self, seen: Observations) -> Decision:
         count, name = len(self.team), self.controller.name
         if self._built_in:
-            return checked_decision(self._law.decide(seen, self._memory), count, name, seen.time)
+            return checked_decision(self._law.decide(seen, self.memory), count, name, seen.time)
         # a user's controller may change what it is given, and use again what it gave
-        memory = _copied(self._memory) if remembers(self.controller) else self._memory
+        memory = _copied(self.memory) if remembers(self.controller) else self.memory
         made = self._asked(self._law.decide, replace(seen), memory)
         return detached(checked_decision(made, count, name, seen.time), name)
 
@@ -298,10 +284,9 @@ class Simulation:
         Parameters
         ----------
         external_forces : (n, 2) N or None
-            Forces from outside, as by a hand, beside the controller's; see `World.step`. A record does
-            not know of them.
+            As by a hand, beside the controller's; see `World.step`. A record does not know of them.
         forces : (n, 2) N or None
-            What drives the robots in place of the controller's forces, as by one who learns.
+            In place of the controller's, as by one who learns.
 
         Raises
         ------
@@ -316,7 +301,7 @@ class Simulation:
             external_forces = given_forces(external_forces, count, "external_forces")
         forces = decision.forces if forces is None else given_forces(forces, count, "forces")
         self._world.step(forces, self.dt, external_forces, time=snapshot.seen.time)
-        self._memory, self._inbox = decision.memory, snapshot.inbox
+        self.memory, self.inbox = decision.memory, snapshot.inbox
         self._steps += 1
         self._begin_step()
 
@@ -353,13 +338,8 @@ class Simulation:
     ) -> Record:
         """Run for `duration` seconds and return the whole of it.
 
-        Parameters
-        ----------
-        duration : float, s
-        start : str, seed : int
-            Where the starts came from, kept in the record.
-        on_snapshot : callable
-            Called with every snapshot, for progress.
+        `start` and `seed` say where the starts came from, for the record; `on_snapshot` is called with every
+        snapshot, for progress.
         """
         recorder = Recorder(
             self.environment,
@@ -381,20 +361,14 @@ class Simulation:
         twin = object.__new__(Simulation)
         twin.__dict__.update(self.__dict__)
         twin._world = self._world.copy()
-        twin._memory = deepcopy(self._memory)
-        if self._moving or isinstance(self._world, ChangingWorld):
-            twin._sensor = self._sensor.copy()
+        twin.memory = deepcopy(self.memory)
+        if self._obstacles_change:
+            twin.sensor = self.sensor.copy()
         twin._begin_step()  # a snapshot holds the memory that the step after it will hand on
         return twin
 
     def with_density(self, environment: Environment) -> Simulation:
-        """Return a simulation that goes on from here by another density; this one stays as it is.
-
-        Parameters
-        ----------
-        environment : Environment
-            The same place as this one's, else `changed` is what is wanted.
-        """
+        """Return a simulation that goes on from here in the same place by another density."""
         twin = self.copy()
         twin.environment = environment
         twin._law = twin._asked(informed, twin.controller, environment.static)
@@ -402,18 +376,13 @@ class Simulation:
         return twin
 
     def remembering(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
-        """Return a simulation in the same state whose controller remembers something else.
+        """Return a simulation in the same state whose controller remembers what another `memory` was.
 
-        Parameters
-        ----------
-        memory : object
-            What the `memory` of a simulation was, of the same controller and number of robots.
-        inbox : Inbox or None
-            What its `inbox` was; None: as it is.
+        `inbox` is the same of messages; None: as it is.
         """
         twin = self.copy()
-        twin._inbox = self._inbox if inbox is None else inbox
-        twin._memory = deepcopy(memory)
+        twin.inbox = self.inbox if inbox is None else inbox
+        twin.memory = deepcopy(memory)
         return twin
 
     def changed(
@@ -428,15 +397,8 @@ class Simulation:
     ) -> Simulation:
         """Return a simulation that goes on from here with something else; this one stays as it is.
 
-        What the controller remembers is kept as long as neither it nor the number of robots changes; and
-        the messages that robots have, as long as neither that number nor the conditions do.
-
-        Parameters
-        ----------
-        environment, controller, team, conditions
-            By default the same.
-        positions, velocities : (n, 2) m and m/s
-            By default the present ones.
+        What the controller remembers is kept as long as neither it nor the number of robots changes; the
+        messages that robots have, as long as neither that number nor the conditions do.
 
         Raises
         ------
@@ -453,12 +415,12 @@ class Simulation:
             self.dt,
             velocities=self.velocities if velocities is None else velocities,
             time=self.time,
-            conditions=self._conditions if conditions is None else conditions,
+            conditions=self.conditions if conditions is None else conditions,
         )
         if conditions is None and len(twin.team) == len(self.team):
-            twin._inbox = self._inbox
+            twin.inbox = self.inbox
         if controller is None and len(twin.team) == len(self.team):
-            twin._memory = deepcopy(self._memory)
+            twin.memory = deepcopy(self.memory)
         return twin
 
 

@@ -4,6 +4,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov.conditions import Conditions
 from robocov.controllers import Controller, Lloyd, Rapf, Rpf
 from robocov.cost import CoverageCost
-from robocov.environment import Environment, PolygonObstacle
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
@@ -442,3 +445,45 @@ def test_it_is_short_in_words(empty: Environment) -> None:
     simulation = Simulation(empty, Rapf(), empty.start().sample(3), dt=0.05)
     simulation.step()
     assert repr(simulation) == "<Simulation rapf on empty, 3 robots, at 0.05 s>"
+
+
+CART = CircleObstacle((2, 1), 0.6, "cart", ObstaclePath(((2, 1), (8, 1)), 0.5, "back-and-forth"))
+BUSY = Environment("busy", ((0, 0), (10, 0), (10, 6), (0, 6)), (CART,))
+TROUBLE = Conditions(delay=0.05, sensing_noise=0.01, failures=((2, 0.2),), joins=((3, 0.4),))
+
+
+def busy() -> Simulation:
+    return Simulation(BUSY, Rapf(), [[4.0, 2.0], [4.0, 3.0], [6.0, 3.0]], conditions=TROUBLE)
+
+
+def test_asking_changes_nothing() -> None:
+    asked, left = busy(), busy()
+    for _ in range(40):
+        assert asked.snapshot is asked.snapshot
+        assert asked.observe() is asked.snapshot.seen
+        assert asked.sensor is asked.sensor
+        inbox = asked.inbox
+        assert asked.copy().snapshot.inbox is not inbox is asked.inbox
+        asked.step()
+        left.step()
+    assert asked.positions.tobytes() == left.positions.tobytes()
+    assert asked.snapshot.seen.obstacle_points.tobytes() == left.snapshot.seen.obstacle_points.tobytes()
+
+
+@pytest.mark.parametrize("made", [busy, TestChanges().moving], ids=["everything changes", "rooms"])
+def test_a_copy_shares_nothing_that_is_changed(made: Callable[[], Simulation]) -> None:
+    simulation = made()
+    simulation.step()
+    twin, places, ranges = simulation.copy(), simulation.positions, simulation.team.sensing_range
+    before = simulation.positions.tobytes(), simulation.sensor.nearest(places, ranges).tobytes()
+    for _ in range(60):
+        twin.step()
+    assert (simulation.positions.tobytes(), simulation.sensor.nearest(places, ranges).tobytes()) == before
+    assert simulation.working.all() or simulation.working.tolist() == [True, True, False]
+    for _ in range(60):
+        simulation.step()
+    assert simulation.positions.tobytes() == twin.positions.tobytes()
+    places = twin.positions
+    assert (
+        simulation.sensor.nearest(places, ranges).tobytes() == twin.sensor.nearest(places, ranges).tobytes()
+    )

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inner_kernel, kernel
 from robocov.errors import ParameterError
 from robocov.observation.neighbours import close_pairs
@@ -77,7 +77,7 @@ class World:
         runs: int = 1,
     ) -> None:
         self.team, self._runs = team, runs
-        self._pieces, self._movers, self._failed_robots = pieces, movers, failed_robots
+        self._pieces, self._movers, self.failed_robots = pieces, movers, failed_robots
         light, heavy = float(team.mass.min()), float(team.mass.max())
         if heavy > MAX_MASS_RATIO * light:
             most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
@@ -111,6 +111,11 @@ class World:
         state[0, rows], state[1, rows] = positions, 0.0
         self._set_state(state)
         self._write_state(self._engine, run)
+
+    @property
+    def working(self) -> BoolArray:
+        """All robots, (n,) bool: those that do not work are in no `World`."""
+        return np.ones(len(self.team), dtype=bool)
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
@@ -176,7 +181,7 @@ class World:
         each = len(self.team) // self._runs
         for row, (place, mass, radius) in enumerate(zip(*columns, strict=True)):
             if row % each == 0:
-                space = obstacle_space(self._pieces, self._movers, self._failed_robots)
+                space = obstacle_space(self._pieces, self._movers, self.failed_robots)
                 space.iterations = space.collision_persistence = 1
                 space.collision_bias = 1.0
                 spaces.append(space)
@@ -249,7 +254,7 @@ class World:
         solver = self._contacts
         self._contacts = None  # it is of no use once it was interrupted
         if solver is None:
-            solver = ContactSolver(self._pieces, self.team, self._movers, self._failed_robots)
+            solver = ContactSolver(self._pieces, self.team, self._movers, self.failed_robots)
         each, radius, positions = run.stop - run.start, self.team.radius[run], free[0, run].copy()
         net = self._engine.robots[run.start // each]
         resolved = np.zeros(each, dtype=bool)
