@@ -26,6 +26,7 @@ def test_the_format_is_ruffs() -> None:
     passes("-m", "ruff", "format", "--check", ".")
 
 
+@pytest.mark.slow
 def test_types_are_strict() -> None:
     passes("-m", "mypy")
 
@@ -110,10 +111,15 @@ def test_asking_for_help_loads_nothing_heavy() -> None:
 def test_ci_runs_the_readmes_test_command_and_then_what_is_slow() -> None:
     readme = (ROOT / "README.md").read_text()
     script = (ROOT / ".ci/run").read_text().splitlines()
-    *others, command, slow = [line for line in script if line and not line.startswith("#")]
+    *others, command, slow, interpreted, paper = [
+        line for line in script if line and not line.startswith("#")
+    ]
     assert command in readme.splitlines()
-    assert slow.startswith(".venv-test/bin/python -m pytest ")
-    assert (ROOT / slow.split()[-1]).is_file()
-    assert others[:2] == ["set -eu", 'cd "$(dirname "$0")/.."']
+    assert slow == ".venv-test/bin/python -m pytest -m slow"
+    assert interpreted.startswith("NUMBA_DISABLE_JIT=1 .venv-test/bin/python -m pytest ")
+    assert paper.startswith(".venv-test/bin/python -m pytest ")
+    named = [word for line in (interpreted, paper) for word in line.split() if word.startswith("tests/")]
+    assert len(named) > 2 and all((ROOT / word).exists() for word in named)
+    assert others[:3] == ["set -eu", 'cd "$(dirname "$0")/.."', "unset PYTHONDONTWRITEBYTECODE"]
     # what is beside it brings a screen and hands for the tests that can do without, and may fail
-    assert all(line.endswith("|| true") for line in others[2:])
+    assert all(line.endswith("|| true") for line in others[3:])

@@ -20,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "tests/notebooks/coverage.ipynb"
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.xdist_group("notebook"),  # executed once, by one worker
     # what pyzmq says on Windows, where it helps itself
     pytest.mark.filterwarnings("ignore:Proactor event loop does not implement:RuntimeWarning"),

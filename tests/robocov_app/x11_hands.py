@@ -17,6 +17,7 @@ from PIL import Image
 
 MISSING = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
 MARKS = [
+    pytest.mark.slow,
     pytest.mark.xdist_group("x11"),
     pytest.mark.skipif(sys.platform != "linux", reason="X11"),
     pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),

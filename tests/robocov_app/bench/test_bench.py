@@ -156,6 +156,8 @@ def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")
     small(monkeypatch)
+    for other in (step, render, window, start):
+        monkeypatch.setattr(other, "cases", lambda quick: [])
     assert main(["bench", "all", "--quick", "--json"]) == 0
     said = capsys.readouterr()
     assert "pip install 'robocov[bench]'" in said.err

@@ -38,7 +38,7 @@ from robocov_app.paper.pages import Image
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.task import tasks_of
 
-pytestmark = pytest.mark.xdist_group("tiny-beyond")
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-beyond")]
 
 PLAN = replace(TINY, duration=3.0, generated=(1,), beyond=TINY_BEYOND)
 

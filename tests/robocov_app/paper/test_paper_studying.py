@@ -30,7 +30,7 @@ from robocov_app.paper.words import arrival, seen
 from robocov_app.paper.writing import page, save_claims, save_page, save_pictures
 from robocov_app.sweep.task import tasks_of
 
-pytestmark = pytest.mark.xdist_group("tiny-paper")
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
 
 @pytest.fixture(scope="module")

@@ -27,6 +27,7 @@ from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.view.theme import DARK, LIGHT
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.xdist_group("browser"),
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver"),
 ]

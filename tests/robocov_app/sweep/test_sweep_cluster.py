@@ -25,7 +25,7 @@ from robocov_app.sweep.task import tasks_of
 
 distributed = pytest.importorskip("distributed")
 
-pytestmark = pytest.mark.xdist_group("cluster")
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("cluster")]
 
 
 @contextmanager

@@ -376,6 +376,7 @@ def runs(pid: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 @TOGETHER
 @LINUX
 def test_a_sweep_that_is_killed_goes_on(longer: tuple[Path, list[bytes]], tmp_path: Path) -> None:
@@ -395,6 +396,7 @@ def test_a_sweep_that_is_killed_goes_on(longer: tuple[Path, list[bytes]], tmp_pa
     assert tables(tmp_path / "out") == expected
 
 
+@pytest.mark.slow
 @TOGETHER
 @LINUX
 def test_a_worker_that_is_killed_is_replaced(longer: tuple[Path, list[bytes]], tmp_path: Path) -> None:
@@ -408,6 +410,7 @@ def test_a_worker_that_is_killed_is_replaced(longer: tuple[Path, list[bytes]], t
     assert tables(tmp_path / "out") == expected
 
 
+@pytest.mark.slow
 @TOGETHER
 @POSIX
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
