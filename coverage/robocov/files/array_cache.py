@@ -21,7 +21,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
-from robocov.files.array_file import opened_arrays
+from robocov.files.array_file import read_arrays
 from robocov.files.atomic import written
 
 _SUFFIX = ".robocov"
@@ -93,8 +93,7 @@ class ArrayCache:
             return None
         # what was written whole can be read, except by a numpy that knows less than the writer's
         try:
-            with opened_arrays(io.BytesIO(payload), path.name, self.limit) as file:
-                arrays = {name: file.read(name) for name in file.headers}
+            arrays = read_arrays(io.BytesIO(payload), path.name, self.limit)
         except InputError:
             return None
         for array in arrays.values():

@@ -31,11 +31,8 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
     switched off, as for one of many frames, the file is on the disk before it gets its name. Through a
     link, the file that it points to is replaced, not the link; its permissions stay.
 
-    Raises
-    ------
-    OutputError
-        When the file cannot be written (no permission, no space, no such folder), or `target` is something
-        else than a file; the message names `target`.
+    Raises `OutputError` when the file cannot be written (no permission, no space, no such folder), or
+    `target` is something else than a file; the message names `target`.
     """
     real = writable(target)
     suffix = target.suffix if len(target.suffix) < _LONGEST_SUFFIX else ""
@@ -58,10 +55,8 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
 def writable(target: Path) -> Path:
     """Return the file that is replaced where `target` is written: `target`, or what it is a link to.
 
-    Raises
-    ------
-    OutputError
-        When it is there and is no regular file, or a link that leads nowhere, or cannot be looked at.
+    Raises `OutputError` when it is there and is no regular file, or a link that leads nowhere, or cannot be
+    looked at.
     """
     try:
         real = target.resolve(strict=True) if target.is_symlink() else target

@@ -46,10 +46,7 @@ def wanted(words: str) -> WrapValidator:
 def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind:
     """Return the content of a JSON file that robocov wrote, of that ``format`` and ``version``.
 
-    Raises
-    ------
-    MapError
-        One line: the file, the JSON path, the value and what was wanted.
+    Raises `MapError`: one line: the file, the JSON path, the value and what was wanted.
     """
     where = str(path)
     document = parse(read_bytes(path), where)
@@ -63,9 +60,7 @@ def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind
 def check_header(document: object, where: str, form: str, version: int) -> None:
     """Refuse what is not of a format, or is of another version, before its content is looked at.
 
-    Raises
-    ------
-    MapError
+    Raises `MapError`.
     """
     if not isinstance(document, dict):
         kind = f"a JSON object with a {form.removeprefix('robocov-')}"

@@ -17,10 +17,7 @@ def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterat
 
     The file `name` in it is locked, and removed afterwards where `remove` is given.
 
-    Raises
-    ------
-    OutputError
-        When another process has it, or the folder cannot be written to.
+    Raises `OutputError` when another process has it, or the folder cannot be written to.
     """
     path = folder / name
     while True:

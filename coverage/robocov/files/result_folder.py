@@ -123,13 +123,9 @@ def results(
     parts : names
         Of the folders of a comparison's runs.
 
-    Raises
-    ------
-    InputError
-        When the folder is not empty and `overwrite` is not given, or what is in it is no result.
-    OutputError
-        When it cannot be made or written to, another process is at work in it, or a file of somebody else
-        has the name of a file of the result.
+    Raises `InputError` when the folder is not empty and `overwrite` is not given, or what is in it is no
+    result, and `OutputError` when it cannot be made or written to, another process is at work in it, or a
+    file of somebody else has the name of a file of the result.
     """
     with _telling(folder):
         existed = folder.exists()
@@ -172,12 +168,8 @@ def extended(folder: Path) -> Iterator[ResultFolder]:
 def settle(folder: Path) -> None:
     """Complete the commit of a result that was interrupted; to be called before the result is read.
 
-    Raises
-    ------
-    InputError
-        When it cannot be known what is left to be done.
-    OutputError
-        When it cannot be done, as another process is at work in the folder or nobody may write to it.
+    Raises `InputError` when it cannot be known what is left to be done, and `OutputError` when it cannot be
+    done, as another process is at work in the folder or nobody may write to it.
     """
     if os.path.lexists(folder / _JOURNAL):
         with locked(folder, _LOCK, remove=True), _telling(folder):

@@ -54,10 +54,7 @@ class _Object(dict[str, Any]):
 def read_bytes(path: Path) -> bytes:
     """Return the content of the file at `path`.
 
-    Raises
-    ------
-    MapError
-        When there is no such file, it cannot be read, or it is larger than `MAX_BYTES`.
+    Raises `MapError` when there is no such file, it cannot be read, or it is larger than `MAX_BYTES`.
     """
     where = one_line(path)
     try:
@@ -83,11 +80,8 @@ def parse(text: str | bytes, where: str) -> Any:
     where : str
         What messages call the text: a file's name.
 
-    Raises
-    ------
-    MapError
-        When the text is not UTF-8 or not JSON, or has a number that is not finite, a key twice in one
-        object, or lists nested deeper than `MAX_DEPTH`; with line and column.
+    Raises `MapError` when the text is not UTF-8 or not JSON, or has a number that is not finite, a key twice
+    in one object, or lists nested deeper than `MAX_DEPTH`; with line and column.
     """
     where = one_line(where)
     _require_size(text, where)
@@ -137,10 +131,7 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
 def require_json(value: object, where: str) -> None:
     """Check that `value` is made of what JSON has: finite numbers, text, lists and objects.
 
-    Raises
-    ------
-    MapError
-        On anything else; the message names the JSON path.
+    Raises `MapError` on anything else; the message names the JSON path.
     """
     mistake = _first_mistake(value, ())
     if mistake is not None:

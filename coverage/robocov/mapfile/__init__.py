@@ -72,10 +72,7 @@ def load_map(source: str | Path) -> Environment:
 def map_file(source: str | Path) -> Path:
     """Return the file of the map that `load_map` returns for the same source; it need not be there.
 
-    Raises
-    ------
-    MapError
-        For an unknown name.
+    Raises `MapError` for an unknown name.
     """
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
@@ -106,10 +103,7 @@ def bundled_maps() -> dict[str, Path]:
 def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
     """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures.
 
-    Raises
-    ------
-    MapError
-        As `load_map`.
+    It raises as `load_map`.
     """
     document = parse(text, where)
     try:
@@ -121,10 +115,7 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
 def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
     """Return the map in a parsed JSON `document`; messages call it `where`, and `folder` holds its pictures.
 
-    Raises
-    ------
-    MapError
-        As `load_map`.
+    It raises as `load_map`.
     """
     where = one_line(where)
     require_json(document, where)
@@ -135,12 +126,7 @@ def density_of(value: object, boundary: Ring, where: str = "map", folder: Path |
     """Return the density that the JSON value at a map's ``density`` stands for.
 
     A raster that does not say what it covers covers the bounding box of the boundary, [x, y] in m; messages
-    call the map `where`, and `folder` holds its pictures.
-
-    Raises
-    ------
-    MapError
-        As `load_map`.
+    call the map `where`, and `folder` holds its pictures. It raises as `load_map`.
     """
     return density_from(validate_density(value, where), boundary, folder, where)
 

@@ -51,10 +51,7 @@ def density_from(model: DensityModel, boundary: Ring, folder: Path | None, where
     where : str
         What messages call the map.
 
-    Raises
-    ------
-    MapError
-        When a rule is broken that the model alone does not know, or a picture cannot be used.
+    Raises `MapError` when a rule is broken that the model alone does not know, or a picture cannot be used.
     """
     found = list(_mistakes(model))
     if found:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 FORMAT = "robocov-map"
 VERSION = 1
+
 SLOWEST = 1e-3
 """Smallest speed of an obstacle in m/s."""
 FASTEST = 10.0
@@ -350,46 +351,34 @@ def map_schema() -> dict[str, Any]:
     starts = schema["properties"]["starts"]
     ((pattern, start),) = starts.pop("patternProperties").items()
     starts["additionalProperties"] = start
-    starts["propertyNames"] = {
-        "type": "string",
-        "pattern": pattern,
-        "minLength": 1,
-        "maxLength": LONGEST_LABEL,
-    }
+    label = {"type": "string", "pattern": pattern, "minLength": 1, "maxLength": LONGEST_LABEL}
+    starts["propertyNames"] = label
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def validate(document: object, where: str) -> MapModel:
-    """Return `document` as a model.
-
-    Raises
-    ------
-    MapError
-        One line with the first structural error, and how many more there are.
-    """
+    """Return `document` as a model; the `MapError` tells of structural mistakes."""
     check_header(document, where, FORMAT, VERSION)
-    try:
-        return MapModel.model_validate(document)
-    except ValidationError as error:
-        raise refused(error, where, _mistake) from None
+    return _validated(MapModel, document, where)
 
 
 def validate_density(value: object, where: str) -> DensityModel:
-    """Return the value at a map's ``density`` as a model.
+    """Return the value at a map's ``density`` as a model, likewise."""
+    return _validated(_WithDensity, {"density": value}, where).density
 
-    Raises
-    ------
-    MapError
-        As `validate`.
-    """
+
+class _WithDensity(Model):
+    density: DensityModel
+
+
+_Kind = TypeVar("_Kind", bound=Model)
+
+
+def _validated(kind: type[_Kind], document: object, where: str) -> _Kind:
     try:
-        return _Weighed.model_validate({"density": value}).density
+        return kind.model_validate(document)
     except ValidationError as error:
         raise refused(error, where, _mistake) from None
-
-
-class _Weighed(Model):
-    density: DensityModel
 
 
 def _kinds(union: Any) -> dict[str, type[Model]]:
@@ -408,44 +397,40 @@ _PARTS: dict[str, type[Model]] = {"path": PathModel, "peaks": PeakModel, "areas"
 
 _POINT = "a point [x, y] in metres"
 _COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
-_SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
 _RING = "a list of at least 3 points [x, y]"
 _LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
 _WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
 
 
-_WANTED: dict[str, tuple[str, ...]] = {
-    # what is wanted at a key, in its items, in their items, ...
-    "boundary": (_RING, _POINT, _COORDINATE),
-    "vertices": (_RING, _POINT, _COORDINATE),
-    "holes": ("a list of rings", _RING, _POINT, _COORDINATE),
-    "points": ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
-    "positions": ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
-    "center": (_POINT, _COORDINATE),
-    "radius": (_SIZE,),
-    "width": (_SIZE,),
-    "name": (_LABEL,),
-    "description": ("a text of at most 10000 characters",),
-    "extra": ("an object",),
-    "$schema": ("a text",),
-    "obstacles": ("a list of obstacles",),
-    "path": ("an object with points and speed",),
-    "speed": (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",),
-    "repeat": ('"loop" or "back-and-forth"',),
-    "starts": ("an object of named starts",),
-    "weight": (_WEIGHT,),
-    "floor": (_WEIGHT,),
-    "background": (_WEIGHT,),
-    "black": (_WEIGHT,),
-    "white": (_WEIGHT,),
-    "peaks": (f"a list of at most {_MOST} peaks", "an object"),
-    "areas": (f"a list of at most {_MOST} areas", "an object"),
-    "sigma": (_SIZE,),
-    "covariance": ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
-    "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
-    "interpolation": ("bilinear or cells",),
-    "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
-    "picture": ("the name of a file",),
+# what is wanted at some keys, in their items, in their items, ...
+_WANTED = {
+    key: words
+    for keys, words in {
+        "boundary vertices": (_RING, _POINT, _COORDINATE),
+        "holes": ("a list of rings", _RING, _POINT, _COORDINATE),
+        "points": ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
+        "positions": ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
+        "center": (_POINT, _COORDINATE),
+        "radius width sigma": (f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)",),
+        "name": (_LABEL,),
+        "description": ("a text of at most 10000 characters",),
+        "extra": ("an object",),
+        "$schema": ("a text",),
+        "obstacles": ("a list of obstacles",),
+        "path": ("an object with points and speed",),
+        "speed": (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",),
+        "repeat": ('"loop" or "back-and-forth"',),
+        "starts": ("an object of named starts",),
+        "weight floor background black white": (_WEIGHT,),
+        "peaks": (f"a list of at most {_MOST} peaks", "an object"),
+        "areas": (f"a list of at most {_MOST} areas", "an object"),
+        "covariance": ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
+        "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
+        "interpolation": ("bilinear or cells",),
+        "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
+        "picture": ("the name of a file",),
+    }.items()
+    for key in keys.split()
 }
 
 

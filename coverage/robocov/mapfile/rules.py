@@ -29,10 +29,7 @@ _FLAT = 1e-9
 def check_rules(environment: Environment, where: str) -> None:
     """Check that `environment`, which messages call `where`, can be simulated.
 
-    Raises
-    ------
-    MapError
-        One line with the first broken rule, and how many more there are.
+    Raises `MapError`: one line with the first broken rule, and how many more there are.
     """
     found = list(_ring_mistakes(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):

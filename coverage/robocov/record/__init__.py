@@ -20,7 +20,7 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, shown
 from robocov.extras import extra
-from robocov.files.array_file import opened_arrays
+from robocov.files.array_file import read_arrays
 from robocov.files.atomic import written
 from robocov.files.result_folder import settle
 from robocov.observation import Decision, Observations, Snapshot
@@ -344,18 +344,19 @@ def nearest_moments(time: Array, rate: float) -> IntArray:
 
 
 def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
-    """Return the arrays of a record of so many robots, which are checked before and after they are read."""
-    with path.open("rb") as file, opened_arrays(file, str(path)) as saved:
-        for name in ARRAYS:
-            if name not in saved.headers:
-                raise InputError(f"{path}: there is no array {name}")
-            (shape, dtype), moments = saved.headers[name], saved.headers["time"].shape
-            wanted = moments if name == "time" else (*moments, robots, 2)
-            if dtype != np.float64 or shape != wanted or len(moments) != 1 or moments == (0,):
-                shape_wanted = "(T,)" if name == "time" else wanted
-                found, needed = f"{shape} of {dtype}", f"{shape_wanted} of float64"
-                raise InputError(f"{path}: {name} has shape {found}, but {needed} was wanted")
-        arrays = {name: saved.read(name) for name in ARRAYS}
+    """Return the arrays of a record of so many robots, which are checked."""
+    with path.open("rb") as file:
+        saved = read_arrays(file, str(path))
+    for name in ARRAYS:
+        if name not in saved:
+            raise InputError(f"{path}: there is no array {name}")
+        array, moments = saved[name], saved["time"].shape
+        wanted = moments if name == "time" else (*moments, robots, 2)
+        if array.dtype != np.float64 or array.shape != wanted or len(moments) != 1 or moments == (0,):
+            shape_wanted = "(T,)" if name == "time" else wanted
+            found, needed = f"{array.shape} of {array.dtype}", f"{shape_wanted} of float64"
+            raise InputError(f"{path}: {name} has shape {found}, but {needed} was wanted")
+    arrays = {name: saved[name] for name in ARRAYS}
     for name, largest in _LARGEST.items():
         values = arrays[name]
         good = np.abs(values) <= largest
