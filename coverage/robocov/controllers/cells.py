@@ -46,6 +46,11 @@ def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPa
             heard=seen.reported_positions,
             density=seen.density,
         )
+    return voronoi_cells(seen, warm)
+
+
+def voronoi_cells(seen: Observations, warm: Mesh | None) -> VoronoiPartition:
+    """Return each robot's cell of the places that are nearer to it, as it knows it."""
     return partition(
         seen.positions,
         seen.region,

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.controllers.cells import voronoi_cells
 from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
-from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi import VoronoiPartition
 from robocov.voronoi.delaunay import Mesh
 
 if TYPE_CHECKING:
@@ -90,14 +91,7 @@ class Individually:
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         """Ask the law for each robot's force."""
-        cells = partition(
-            seen.positions,
-            seen.region,
-            seen.neighbours,
-            warm=memory,
-            heard=seen.reported_positions,
-            density=seen.density,
-        )
+        cells = voronoi_cells(seen, memory)
         forces = np.empty_like(seen.positions)
         for i in range(len(forces)):
             point = seen.obstacle_points[i]
@@ -113,9 +107,7 @@ class Individually:
             )
             force = np.asarray(self.law.force(own), dtype=float)
             if force.shape != (2,):
-                raise ParameterError(
-                    f"controller {self.name!r}: force(own) gave {shown(force.tolist())}, "
-                    f"but two numbers in newtons were wanted"
-                )
+                told = f"gave {shown(force.tolist())}, but two numbers in newtons were wanted"
+                raise ParameterError(f"controller {self.name!r}: force(own) {told}")
             forces[i] = force
         return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=cells.triangulation)

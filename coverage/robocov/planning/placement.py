@@ -90,21 +90,9 @@ class CoverageDemand:
         anything. The place is a free cell on the border of the patch, chosen by stake over one metre plus
         the way.
 
-        Parameters
-        ----------
-        mine, home : (m,) m
-            Distances of the nodes of its own cell from its goal, 0 for others; of all from where it is.
-        tight : (h, w)
-            Cells where it cannot be.
-        least : float, m
-            Stakes below are not worth it, as the cost in cells times metres.
-        former : places, (2,) m each
-            From where it has looked already.
-
-        Returns
-        -------
-        (2,) m, or None
-            When there is nothing to look at.
+        Distances, (m,) m, are those of the nodes of its own cell from its goal, 0 for others (`mine`), and
+        of all nodes from where it is (`home`). It cannot be in `tight` cells, (h, w); from the `former`
+        places it has looked already. None: no stake is above the `least`, in cells times metres.
         """
         window, raster = self.window, self.known.raster
         patch, _ = ndimage.label((self._state == UNKNOWN) & ~self._outside)
@@ -261,68 +249,59 @@ def own_place(
     on by `steps` nodes at most.
     """
     first = ways.distances(begin)
-    target = (np.isfinite(first) & (weights > 0.0)).nonzero()[0]
-    worth = weights[target]
+    target = np.flatnonzero(np.isfinite(first) & (weights > 0.0))
+    worth, away = weights[target], first[target]
     near = np.minimum(ways.from_places(others)[target], _FAR)
-    away = first[target]
-    cell = away < near
-    limit = 1.5 * float(away[cell].max(initial=0.0)) + 4.0 * ways.spacing
-    known: dict[int, float] = {begin: float((worth * np.minimum(near, away)).sum())}
-
+    limit = 1.5 * float(away[away < near].max(initial=0.0)) + 4.0 * ways.spacing
+    costs: dict[int, float] = {}
     tables: dict[int, Array] = {}
 
-    def look_at(nodes: list[int]) -> None:
-        fresh = [k for k in nodes if k not in tables]
+    def beside(node: int) -> list[int]:
+        nodes = _neighbours(ways, node)
+        fresh = [k for k in (node, *nodes) if k >= 0 and k not in tables]
         for k, table in zip(fresh, ways.near(fresh, limit), strict=True):
             tables[k] = table[target]
-            known.setdefault(k, float((worth * np.minimum(near, tables[k])).sum()))
+            costs[k] = float((worth * np.minimum(near, tables[k])).sum())
+        return nodes
 
-    node = begin
+    node, around = begin, beside(begin)
     for _ in range(steps):
-        beside = [k for k in _beside(ways, node) if k >= 0]
-        look_at(beside)
-        best = min(beside, key=known.__getitem__, default=node)
-        if not known[best] < known[node]:
+        best = min((k for k in around if k >= 0), key=costs.__getitem__, default=node)
+        if not costs[best] < costs[node]:
             break
-        node = best
+        node, around = best, beside(best)
     mine = np.zeros(len(weights))
-    look_at([node, *(k for k in _beside(ways, node) if k >= 0)])
-    away = tables[node]
-    mine[target] = np.where(away < near, np.minimum(away, limit), 0.0)
-    goal, fall = _refined(ways, node, known, former)
+    mine[target] = np.where(tables[node] < near, np.minimum(tables[node], limit), 0.0)
+    goal, fall = _refined(ways, node, around, costs, former)
     if np.isfinite(former).all() and fall < rest * float((worth * mine[target]).sum()):
         goal = former.copy()
-    return OwnPlace(goal, node, mine, known[node])
+    return OwnPlace(goal, node, mine, costs[node])
 
 
-def _beside(ways: Ways, node: int) -> list[int]:
+def _neighbours(ways: Ways, node: int) -> list[int]:
     """Return the nodes right of, above, left of and below a node, -1 where there is none to go to."""
-    row, column = divmod(node, ways.window.columns)
-    found = []
-    for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-        at, along = row + down, column + right
-        inside = 0 <= at < ways.window.rows and 0 <= along < ways.window.columns
-        k = at * ways.window.columns + along
-        found.append(k if inside and ways.roomy[k] else -1)
-    return found
+    high, wide = ways.window.rows, ways.window.columns
+    row, column = divmod(node, wide)
+    inside = column + 1 < wide, row + 1 < high, column > 0, row > 0
+    nodes = node + 1, node + wide, node - 1, node - wide
+    return [k if there and ways.roomy[k] else -1 for k, there in zip(nodes, inside, strict=True)]
 
 
-def _refined(ways: Ways, node: int, cost: Mapping[int, float], former: Array) -> tuple[Array, float]:
+def _refined(
+    ways: Ways, node: int, around: list[int], cost: Mapping[int, float], former: Array
+) -> tuple[Array, float]:
     """Return the minimum of the parabolas round a node, and how far the former goal is above it."""
-    right, up, left, down = _beside(ways, node)
-    goal = ways.nodes[node].copy()
-    fall = 0.0
+    right, up, left, down = around
+    goal, fall = ways.nodes[node].copy(), 0.0
     for axis, (ahead, behind) in enumerate(((right, left), (up, down))):
         off = (former[axis] - ways.nodes[node][axis]) / ways.spacing
         if abs(off) > 1.0:
             fall = np.inf
         if ahead < 0 or behind < 0:
             continue
-        slope = 0.5 * (cost[ahead] - cost[behind])
-        bend = cost[ahead] + cost[behind] - 2.0 * cost[node]
-        if not bend > 0.0:
-            continue
-        shift = float(np.clip(-slope / bend, -0.5, 0.5))
-        goal[axis] += shift * ways.spacing
-        fall += (slope * off + 0.5 * bend * off * off) - (slope * shift + 0.5 * bend * shift * shift)
+        slope, bend = 0.5 * (cost[ahead] - cost[behind]), cost[ahead] + cost[behind] - 2.0 * cost[node]
+        if bend > 0.0:
+            shift = min(max(-slope / bend, -0.5), 0.5)
+            goal[axis] += shift * ways.spacing
+            fall += (slope * off + 0.5 * bend * off * off) - (slope * shift + 0.5 * bend * shift * shift)
     return goal, fall
