@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from robocov import errors
+from robocov.errors import MapError, Mistake, place
 
 
 def test_the_tree_of_errors() -> None:
@@ -35,3 +36,37 @@ def test_strange_names_leave_messages_readable() -> None:
     assert len(message) < 250
     assert message.endswith("(known: rapf, " + "x" * 57 + "...)")
     assert errors.unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")
+
+
+def test_one_is_told_and_the_others_are_counted() -> None:
+    mistakes = [Mistake.at(("boundary", k), "3, but a point was wanted") for k in range(3)]
+    assert str(MapError.of("m.json", mistakes[:1])) == "m.json: boundary[0]: 3, but a point was wanted"
+    error = MapError.of("m.json", mistakes, 4)
+    assert isinstance(error, MapError)
+    assert str(error) == "m.json: boundary[0]: 3, but a point was wanted (and 6 more)"
+    assert error.mistakes == tuple(mistakes)
+    assert (error.line, error.column) == (None, None)
+
+
+def test_with_a_line_it_begins_as_compilers_do() -> None:
+    error = MapError.of("m.json", [Mistake((), "empty", line=14, column=9)])
+    assert str(error) == "m.json:14:9: empty"
+    assert (error.line, error.column) == (14, 9)
+
+
+def test_an_error_without_a_place_has_no_line() -> None:
+    assert MapError("m.json: no such file").line is None
+    assert MapError("m.json: no such file").mistakes == ()
+
+
+def test_the_whole_document_needs_no_place() -> None:
+    assert Mistake.at((), "[], but an object was wanted").text == "[], but an object was wanted"
+
+
+def test_keys_that_are_no_names_are_quoted() -> None:
+    assert place(("a b", "$schema", "x-y", 3, "")) == '["a b"].$schema.x-y[3][""]'
+
+
+def test_keys_of_any_length_leave_messages_readable() -> None:
+    assert place(("a", "x" * 60, 1)) == f"a.{'x' * 60}[1]"
+    assert place(("a", "x" * 61, 1)) == f'a["{"x" * 57}..."][1]'

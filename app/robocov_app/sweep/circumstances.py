@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 from robocov.conditions import QUANTITIES, Conditions, parsed_failure, parsed_join
 from robocov.conditions import UNITS as CONDITION_UNITS
@@ -12,8 +12,8 @@ from robocov.errors import ParameterError, place, shown, unknown_name
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov_app.sweep.gain_choices import NO_LIMIT, once
 
-if TYPE_CHECKING:
-    from robocov_app.sweep.study import TeamValue
+TeamValue: TypeAlias = float | str | None
+"""A value of what is varied of team and conditions."""
 
 WORDS = ("fail", "join")
 """Conditions that are texts: ``3@20 5@40`` are two failures, in one run."""

@@ -18,7 +18,7 @@ from robocov.robots import DEFAULT_RADIUS, Team
 from robocov.robots.teamfile import team_of_groups
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.options import MOST_ROWS
-from robocov_app.sweep.circumstances import GROUPS, condition_axes, conditions_of
+from robocov_app.sweep.circumstances import GROUPS, TeamValue, condition_axes, conditions_of
 from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
 
 if TYPE_CHECKING:
@@ -39,9 +39,6 @@ _LONGEST_NAME = 100
 
 _HUGE = 1e300
 """What a float can hold, with some to spare."""
-
-TeamValue: TypeAlias = float | str | None
-"""A value of what is varied of team and conditions."""
 
 Swept: TypeAlias = float | Sequence[float | None] | None
 """One value, or several, each of which is tried."""

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
     from robocov.controllers.gains import Value
     from robocov.controllers.user_modules import Source
-    from robocov_app.sweep.study import Study, TeamValue
+    from robocov_app.sweep.circumstances import TeamValue
+    from robocov_app.sweep.study import Study
 
 _FORMAT = "robocov-task 1"
 """Version of the digest; that the same inputs give other results is told by `made_with`."""
