@@ -6,6 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import InputError, StartError
 from robocov.observation.region import Region
@@ -54,6 +55,22 @@ def test_free_space_of_overlapping_and_protruding_obstacles() -> None:
     assert len(environment.free.geoms) == 2, "the hole of the last obstacle is a room of its own"
     areas = [part.area for part in environment.free.geoms]
     assert areas == sorted(areas, reverse=True)
+
+
+@pytest.mark.parametrize(("x", "first"), [(3.0, 3.0), (5.0, 0.0), (7.0, 0.0)])
+def test_of_rooms_the_largest_is_the_first_and_of_equal_ones_the_left_one(x: float, first: float) -> None:
+    wall = PolygonObstacle(((x - 0.5, 0.0), (x + 0.5, 0.0), (x + 0.5, 10.0), (x - 0.5, 10.0)))
+    rooms = Environment("rooms", SQUARE, (wall,)).free.geoms
+    assert rooms[0].bounds[0] == pytest.approx(first + 0.5 * (first > 0.0))
+
+
+def test_another_density_has_other_masses_and_the_same_geometry() -> None:
+    plain = Environment("plain", SQUARE)
+    assert plain.free_masses.tolist() == [100.0]
+    twin = plain.with_density(Uniform(3.0))
+    assert twin.free is plain.free and twin.free_masses.tolist() == [300.0]
+    assert plain.same_place(twin)
+    assert not plain.same_place(Environment("plain", SQUARE, (CircleObstacle((5.0, 5.0), 1.0),)))
 
 
 @settings(max_examples=60)

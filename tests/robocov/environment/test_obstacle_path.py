@@ -89,6 +89,18 @@ def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
     assert environment.static.obstacles == environment.obstacles[:1]
 
 
+def test_what_comes_by_again_stands_in_the_very_same_place_holes_and_all() -> None:
+    frame = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
+    hole = ((1.0, 1.0), (2.0, 1.0), (2.0, 2.0))
+    path = ObstaclePath(((0.0, 0.0), (0.7, 0.3)), 0.37)
+    hall = Environment("hall", HALL, (PolygonObstacle(frame, (hole,), None, path),))
+    for turns in range(1, 30):
+        assert hall.at(1.0 + turns * path.period) == hall.at(1.0)
+    (shape,) = hall.at(1.0).obstacles
+    by = np.round(path.shift(1.0), 9)
+    assert shape.holes == (tuple((x + by[0], y + by[1]) for x, y in hole),)
+
+
 def test_where_nothing_moves_the_map_is_always_itself() -> None:
     hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
     assert not hall.moves

@@ -45,6 +45,14 @@ def test_the_same_seed_gives_the_same_positions(cluttered: Environment) -> None:
     assert not np.array_equal(start.sample(6, 3), start.sample(6, 4))
 
 
+def test_positions_are_those_of_the_last_version(cluttered: Environment) -> None:
+    """Saved studies name starts and seeds: 24 discs that are hard to place say how all of it is drawn."""
+    start = Start("wide", DiscStart((2.5, 2.5), 1.0), SQUARE)
+    drawn = [[1.9774691843, 2.9420289396], [3.157775734, 2.2890007007], [2.7120956862, 1.5850145627]]
+    np.testing.assert_allclose(start.sample(24, 5)[[0, 11, 23]], drawn, atol=1e-9)
+    assert not np.array_equal(start.sample(2, 5), start.sample(3, 5)[:2])
+
+
 def test_a_tight_start_is_filled_by_a_lattice() -> None:
     """75 discs of radius 0.1 m fill 75 % of a disc of radius 1 m: far more than darts can place."""
     start = Start("tight", DiscStart((5.0, 5.0), 0.9), SQUARE)
@@ -77,6 +85,11 @@ def test_uniform_starts_cover_the_free_space(cluttered: Environment) -> None:
 def test_given_positions_are_checked(positions, n: int, message: str) -> None:
     with pytest.raises(StartError, match=message):
         Start("given", PointsStart(positions), SQUARE).sample(n)
+
+
+def test_given_positions_may_touch_walls_and_each_other() -> None:
+    start = Start("given", PointsStart(((0.25, 1.0), (0.75, 1.0))), SQUARE)
+    assert len(start.sample(2, radius=0.25)) == 2
 
 
 def test_given_positions_are_taken_in_their_order() -> None:

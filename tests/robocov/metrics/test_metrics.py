@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
+from robocov.conditions import Conditions
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost
-from robocov.environment import Environment
+from robocov.environment import Environment, PolygonObstacle
+from robocov.environment.obstacle_path import ObstaclePath
 from robocov.metrics import (
     clearances,
     contacts,
@@ -20,6 +22,7 @@ from robocov.metrics import (
     stuck_robots,
     summarise,
 )
+from robocov.metrics.run_metrics import run_metrics
 from robocov.record import Record
 from robocov.simulation import Simulation
 
@@ -58,6 +61,14 @@ def test_a_late_move_counts() -> None:
     late = track(np.where(time > 15, np.minimum(time - 15, 1.0), 0.0))
     assert settled_at(time, late) == pytest.approx(16.0, abs=0.11)
     assert settled_at(time, track(np.where(time > 29, 1.0, 0.0))) is None
+
+
+def test_who_gets_as_far_as_the_limit_has_not_settled_and_one_of_the_team_is_enough() -> None:
+    time = np.arange(9) * 0.25
+    jump = track(np.where(time >= 1.0, 0.5, 0.0))
+    assert settled_at(time, jump, window=1.0, distance=0.5) == 1.0
+    team = np.concatenate([track(np.zeros(9)), jump], axis=1)
+    assert settled_at(time, team, window=1.0, distance=0.5) == 1.0
 
 
 def test_a_run_shorter_than_the_window_cannot_settle() -> None:
@@ -114,6 +125,50 @@ def test_meetings_are_those_that_are_seen_pair_by_pair(record: Record, robots: i
     assert (expected > 0) is (robots > 1)
 
 
+@pytest.fixture(scope="module")
+def changing(record: Record) -> Record:
+    """Robot 2 fails after a second, and robot 1 runs into it; robot 3 joins where robot 1 has been."""
+    name = {name: getattr(record.team, name)[:3] for name in record.team.__slots__}
+    positions = np.array(
+        [[[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]], [[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]]]
+        + [[[1.8, 1.0], [2.0, 1.0], [1.0, 1.0]]]
+    )
+    arrays = {each: np.ones((3, 3, 2)) for each in ("velocities", "forces", "goals", "obstacle_points")}
+    conditions = Conditions(failures=((2, 1.0),), joins=((3, 2.0),))
+    team = replace(record.team, **name)
+    return replace(
+        record, team=team, time=np.arange(3.0), positions=positions, conditions=conditions, **arrays
+    )
+
+
+def test_who_has_failed_is_a_wall_and_who_has_not_joined_is_not_there(changing: Record) -> None:
+    gap = clearances(changing)
+    assert np.isinf(gap).tolist() == [[False, False, True], [False, True, True], [False, True, False]]
+    assert gap[:, 0] == pytest.approx([0.9, 0.8, 0.0], abs=1e-9)
+    assert contacts(changing, gap) == 1
+    cost = CoverageCost(changing.environment, lattice=24)
+    history = cost_history(changing, cost)
+    for k, rows in enumerate(([0, 1], [0], [0, 2])):
+        assert history.mean_distance[k] == cost(changing.positions[k, rows]).mean_distance
+
+
+def test_only_who_works_counts_for_the_metrics(changing: Record) -> None:
+    metrics = run_metrics(changing, 1.0)
+    assert metrics.work == pytest.approx([0.0, 3.0, 6.0])  # |F v| is 2: of two robots, one, two
+    assert metrics.effort == pytest.approx([0.0, 4.0, 6.0])
+    assert metrics.robot_clearance == pytest.approx([0.8, np.inf, 0.6])
+    assert metrics.components.tolist() == [1, 1, 1]
+
+
+def test_where_obstacles_move_each_moment_has_its_own_map() -> None:
+    path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), 2.0)
+    wall = PolygonObstacle(((3.0, 0.0), (3.5, 0.0), (3.5, 4.0), (3.0, 4.0)), path=path)
+    hall = Environment("hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), (wall,))
+    some = Simulation(hall, Lloyd(), [[1.0, 2.0]], dt=0.1).run(1.0)
+    assert sample_moments(some, 10.0) == [0, 10]
+    assert run_metrics(some, 10.0).visible_area[[0, -1]] == pytest.approx([12.0, 20.0])
+
+
 def test_the_mean_over_a_run_is_that_over_time() -> None:
     time = np.array([0.0, 1.0, 1.5, 4.0])
     assert mean_over_run(time, 3.0 - 0.5 * time) == pytest.approx(2.0)
@@ -134,6 +189,12 @@ def test_a_robot_at_rest_away_from_its_goal_is_stuck() -> None:
     assert stuck_robots(time, track(0.005 * time), goals(9.0, 201)) == 1
     trembling = track(0.01 * np.sin(40 * time))
     assert stuck_robots(time, trembling, goals(9.0, 201)) == 1, "net displacement counts"
+
+
+def test_the_window_of_a_stuck_robot_begins_with_the_moment_at_its_beginning() -> None:
+    time = np.arange(41) * 0.25
+    assert stuck_robots(time, track(np.where(time > 5.0, 1.0, 0.0)), goals(9.0, 41)) == 0
+    assert stuck_robots(time, track(np.where(time >= 5.0, 1.0, 0.0)), goals(9.0, 41)) == 1
 
 
 def test_robots_are_counted_and_those_without_goals_are_not_stuck() -> None:
