@@ -287,7 +287,13 @@ def _unhide(
                 for s in range(first, tiles.first[tile + 1]):
                     if (hidden[tile] >> (s - first)) & 1:
                         bound = max(bound, paths.distance[s])
-                count = _within(tiles.boxes, tile, robots, bound * bound, lists[1], near, lists[2])
+                count = 0
+                for j in range(near):
+                    i = lists[1, j]
+                    near_enough = near2(tiles.boxes, tile, robots[i, 0], robots[i, 1]) <= bound * bound
+                    if near_enough and not beyond_horizon(tiles.boxes, tile, index, i):
+                        lists[2, count] = i
+                        count += 1
                 for s in range(first, tiles.first[tile + 1]):
                     if (hidden[tile] >> (s - first)) & 1:
                         x, y = tiles.sites[s, 0], tiles.sites[s, 1]

@@ -188,7 +188,7 @@ def with_room(
 
     `fill` returns how many rows it used, and is called with more and more room until that is not negative.
     """
-    entries, used = 64 * n + 4 * bins, -1
+    entries, used = 256 * n + 16 * bins, -1
     while used < 0:
         index = AngularWallIndex.room(n, bins, entries)
         numbers, lengths = np.empty((entries, 3), np.int64), np.empty((entries, 2))

@@ -38,7 +38,7 @@ class AngularWallIndex(NamedTuple):
 
     @classmethod
     def room(cls, n: int, bins: int, entries: int) -> AngularWallIndex:
-        """Return room for the index of so many sources, to be filled by `enter_walls`."""
+        """Return room for the index of so many sources, for `enter_walls`; bins are a power of 2."""
         return cls(
             np.empty((n, 3)), np.empty((n, bins, 2)), np.empty((n, bins), np.int64),
             np.empty((entries, 2), np.int64), np.empty(64, np.int64),
@@ -71,7 +71,7 @@ def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> 
     angle = pseudo_angle(dx, dy)
     first, last = int(np.floor((angle - wide) * (bins * 0.25))), int(np.floor((angle + wide) * (bins * 0.25)))
     for k in range(first, min(last, first + bins - 1) + 1):  # noqa: SIM110, kernels are plain loops
-        if limits[i, k % bins, 1] >= least:
+        if limits[i, k & (bins - 1), 1] >= least:
             return False
     return True
 
@@ -139,7 +139,7 @@ def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) 
     inner_low, inner_high = int(np.ceil((start + _PAD) * scale)), int(np.floor((stop - _PAD) * scale))
     far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PAD)
     for place in range(low, min(high, low + bins - 1) + 1):
-        k = place % bins
+        k = place & (bins - 1)
         if near > limits[i, k, 1]:
             continue
         limits[i, k, 0] = min(limits[i, k, 0], near)
@@ -149,7 +149,7 @@ def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) 
         # what is farther than all of a wall across the whole bin is hidden by that one
         if inner_low <= place < inner_high:
             limits[i, k, 1] = min(limits[i, k, 1], far)
-    last = inner_high % bins
+    last = inner_high & (bins - 1)
     if inner_low <= inner_high < low + bins and far < limits[i, last, 1]:
         far = _chained(walls, wall, px, py, stop, (inner_high + 1) / scale, far)
         limits[i, last, 1] = min(limits[i, last, 1], far)

@@ -18,7 +18,7 @@ BITS = 48
 """The square that holds the map is 2**48 grid steps wide: 4e-15 of its side, below a double's rounding
 for a map that does not start at zero, yet few enough that `cross` can be exact."""
 
-LEAF = 4
+LEAF = 8
 """Boxes of a leaf of a `box_tree`."""
 
 _DOUBT = 2.0**48

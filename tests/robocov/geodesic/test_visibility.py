@@ -38,7 +38,7 @@ def seen(geodesics, index, targets):
     )
 
 
-@pytest.mark.parametrize("bins", [1, 7, 64, 256])
+@pytest.mark.parametrize("bins", [1, 8, 64, 256])
 def test_the_view_does_not_depend_on_the_number_of_bins(bins):
     rng = np.random.default_rng(2)
     rings = [rng.uniform(0.1, 0.9, 2) + 0.07 * np.array([[1, 0], [0, 1], [-1, 0.3]]) for _ in range(12)]
