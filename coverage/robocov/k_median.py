@@ -15,27 +15,17 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 
-_FALL = 1e-9
-"""Part of the cost by which a step must lower it, far more than rounding: none is undone by the next."""
-
-_PASSES = 60
-"""Rounds of `improved`; a few are usual."""
-
-_HARDLY = 1e-4
-"""Part of the sum that a round of `improved` must save."""
-
-_REMOVED = (2, 3)
-"""So many sources are taken away at once."""
-
-_TRIED = 4
-"""So many ways to put them back are tried to the end."""
+_FALL = 1e-9  # part of the cost by which a step must lower it, far more than rounding: none is undone
+_PASSES = 60  # rounds of `improved`; a few are usual
+_HARDLY = 1e-4  # part of the sum that a round of `improved` must save
+_REMOVED = (2, 3)  # so many sources are taken away at once
+_TRIED = 4  # so many ways to put them back are tried to the end
 
 
 def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
-    """Return (count,) sources as k-means++ draws them (Arthur and Vassilvitskii 2007), by distances.
+    """Return (count,) sources, the nearest to targets drawn with chances in proportion to their distances.
 
-    A target is drawn with a chance in proportion to its distance from the sources so far, and the source
-    nearest to it is taken.
+    That is k-means++ (Arthur and Vassilvitskii 2007), with distances for squares.
     """
     chosen: list[int] = []
     nearest = np.ones(len(table))

@@ -34,34 +34,16 @@ the nearest of them, as they are, and looks for its own place."""
 STILL_FOR, STILL_WITHIN = 3.0, 0.1
 """A robot that does not get so many metres away for so many seconds rests."""
 
-_HARDLY = 0.1
-"""Part of the spacing of the nodes that others may move before a plan is made anew."""
-
-_ARRIVED, _TURN = 0.35, 0.2
-"""Metres from a place at which it counts as reached, for looking around, and for the next way-point."""
-
-_BRAKING, _FOR_TURNING = 0.4, 0.7
-"""Parts of the acceleration: what is counted on for braking, less than half for the lag of the drive, and
-what is spent on where to go; the rest is left for not running into anything."""
-
-_MARGIN, _APART = 0.02, 0.04
-"""Gaps that are left to walls and to other robots, m."""
-
-_EAGERNESS = 10.0
-"""Speed in 1/s with which the distance to what is close may fall to its gap."""
-
-_CREEP = 0.15
-"""Speed at which a robot moves along what it is closest to, m/s; the more room, the faster."""
-
-_ASIDE, _HEEDED = 0.3, 1.5
-"""Largest speed, m/s, at which robots in each other's way, so many metres away, pass on the left."""
-
-_TOGETHER = 1.5
-"""A robot plans for its whole team as long as it takes to cross the region so many times."""
-
-_STAGGERED = 0.5
-"""Part of the period in which all robots make their first plans."""
-
+_HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
+_ARRIVED, _TURN = 0.35, 0.2  # metres from a place, or a way-point, at which it counts as reached
+_BRAKING = 0.4  # part of the acceleration that is counted on: less than half, for the lag of the drive
+_FOR_TURNING = 0.7  # part of it that is spent on where to go; the rest is for not running into anything
+_MARGIN, _APART = 0.02, 0.04  # gaps that are left to walls and to other robots, m
+_EAGERNESS = 10.0  # speed in 1/s with which the distance to what is close may fall to its gap
+_CREEP = 0.15  # speed at which a robot moves along what it is closest to, m/s; the more room, the faster
+_ASIDE, _HEEDED = 0.3, 1.5  # largest speed, m/s, to pass on the left who is in the way, so many metres away
+_TOGETHER = 1.5  # a robot plans for its whole team as long as it takes to cross the region so many times
+_STAGGERED = 0.5  # part of the period in which all robots make their first plans
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 

@@ -19,11 +19,8 @@ from robocov.potential import separation
 from robocov.robots import Team
 from robocov.voronoi.delaunay import Mesh
 
-_ROUNDING = 1e-3
-"""Distance in metres over which the braking curve, which is vertical at the safe distance, is rounded."""
-
-_TOGETHER = 1e-9
-"""Distance in metres at which robots in one place are taken to be."""
+_ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe distance, is rounded
+_TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to be
 
 
 @dataclass(frozen=True, slots=True, eq=False)

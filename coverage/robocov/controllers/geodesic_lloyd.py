@@ -21,11 +21,8 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
 
-_SEGMENTS = 2
-"""Edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it."""
-
-_SIMPLER = 0.005
-"""Metres by which the walls of the room may be simplified: every corner costs time."""
+_SEGMENTS = 2  # edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it
+_SIMPLER = 0.005  # metres by which the walls of the room may be simplified: every corner costs time
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,29 +21,14 @@ from robocov.observation.scans import Scanning, headings
 from robocov.robots import Team
 from robocov.voronoi.delaunay import Mesh
 
-_GRAIN = 0.1
-"""Side in metres of the squares in which a robot remembers what it has met."""
-
-_EAGERNESS = 4.0
-"""Speed in 1/s with which the distance to what is close may fall to the clearance."""
-
-_BETTER = 0.2
-"""What counts as nearer to the goal must be so much nearer, m: else the modes take turns."""
-
-_BACK = 0.3
-"""Distance in metres at which a robot has come back to a place."""
-
-_ARRIVED = 0.05
-"""Distance in metres at which a robot has arrived."""
-
-_WALK = 1.0
-"""Way in metres along a boundary that is not worth trying."""
-
-_WANES = 0.9
-"""Part of its patience that is left to a robot after every goal that it has kept."""
-
-_TOUCHING = 0.95
-"""A point that is already nearer than the clearance is kept off by this part of its distance."""
+_GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met
+_EAGERNESS = 4.0  # speed in 1/s with which the distance to what is close may fall to the clearance
+_BETTER = 0.2  # what counts as nearer to the goal must be so much nearer, m: else the modes take turns
+_BACK = 0.3  # distance in metres at which a robot has come back to a place
+_ARRIVED = 0.05  # distance in metres at which a robot has arrived
+_WALK = 1.0  # way in metres along a boundary that is not worth trying
+_WANES = 0.9  # part of its patience that is left to a robot after every goal that it has kept
+_TOUCHING = 0.95  # a point that is already nearer than the clearance is kept off by this part of its distance
 
 
 class Mode(Enum):
@@ -161,7 +146,7 @@ class TangentBug:
     detour: float | None = gain(
         4.0,
         "distances",
-        "longest way along a boundary, in those to the goal; null for once round",
+        "longest way along a boundary, in those to the goal; null: once round",
         optional=True,
     )
     moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
@@ -237,13 +222,11 @@ def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
     """Return the squares that a robot has met something in, with those of (k, 2) points; nan for none."""
     square = np.floor(points[~np.isnan(points[:, 0])] / _GRAIN)
     return np.unique(np.concatenate([*met, square[:, 0] + 1j * square[:, 1]]))
+    """An end of the contour that blocks the way: the first ray that passes it, and the point just past it, m."""
 
 
 class Gap(NamedTuple):
-    """An end of the contour that blocks the way: a node of the local tangent graph.
-
-    It is the first ray that passes it, and the point just past it, (2,) m from the robot.
-    """
+    """An end of the contour that blocks the way: the first ray that passes it, the point just past it, (2,) m."""
 
     ray: int
     point: Array
@@ -281,7 +264,8 @@ class Look:
 
     def next(self, bug: Bug) -> Bug:
         """Return what the robot does from now on."""
-        if self._in_view(self.goal) or (bug.mode is Mode.GOAL and self._ahead_is_free()):
+        free = self._towards(self.goal) >= self.reach - 1e-9
+        if self._in_view(self.goal) or (bug.mode is Mode.GOAL and free):
             return self._off(bug, Mode.GOAL, self.position + self.goal)
         if bug.mode is Mode.PROJECTED:
             return bug
@@ -301,10 +285,6 @@ class Look:
         """Return whether the robot can go straight to a place."""
         far = _length(place)
         return far < _ARRIVED or self._towards(place) >= far - 1e-9
-
-    def _ahead_is_free(self) -> bool:
-        """Return whether the robot can go as far towards its goal as it sees."""
-        return self._towards(self.goal) >= self.reach - 1e-9
 
     def _towards(self, place: Array) -> float:
         """Return how far the robot can go straight on towards a place, m."""

@@ -25,13 +25,9 @@ from robocov.errors import ParameterError, shown, unknown_name
 if TYPE_CHECKING:
     from types import CodeType, ModuleType
 
-_MODULE = "robocov_user_"
-"""Prefix of the names of modules loaded from files of users."""
-
+_MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
 _OURS = str(Path(__file__).parents[1])
-
-_INSTALLED = frozenset(("site-packages", "dist-packages"))
-"""Folders of installed packages, which have versions."""
+_INSTALLED = frozenset(("site-packages", "dist-packages"))  # folders of packages, which have versions
 
 
 class Module(NamedTuple):

@@ -21,32 +21,15 @@ if TYPE_CHECKING:
 
     from robocov.cost import CoverageCost, CoverageResult
 
-_SEGMENTS = 32
-"""Edges of a quarter circle around corners of walls: they cut 3e-4 of the radius off it, less than `GAP`."""
-
-_PUSHES = 60
-"""Times that overlapping robots are pushed apart before the place counts as too narrow for them."""
-
-_FARTHER = 1.005
-"""They are pushed a little too far, else they would never quite arrive."""
-
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""The golden angle: its multiples are spread evenly."""
-
-_MEMORY = 8
-"""Steps from which the curvature is learnt."""
-
-_ARMIJO = 1e-4
-"""Part of the fall that the slope promises which is good enough."""
-
-_HALVINGS = 4, 14
-"""Times that a step along the learnt direction, and along the slope, is halved before it counts as none."""
-
-_SLOW = 5, 1e-7
-"""So many steps that together lower the cost by less than this part of it are the last ones."""
-
-_STEPS = 300
-"""Most steps; some tens are usual."""
+_SEGMENTS = 32  # edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than `GAP`
+_PUSHES = 60  # times that overlapping robots are pushed apart before the place counts as too narrow for them
+_FARTHER = 1.005  # they are pushed a little too far, else they would never quite arrive
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: its multiples are spread evenly
+_MEMORY = 8  # steps from which the curvature is learnt
+_ARMIJO = 1e-4  # part of the fall that the slope promises which is good enough
+_HALVINGS = 4, 14  # of a step along the learnt direction, and along the slope, before it counts as none
+_SLOW = 5, 1e-7  # so many steps that together lower the cost by less than this part of it are the last ones
+_STEPS = 300  # most steps; some tens are usual
 
 
 class Room:

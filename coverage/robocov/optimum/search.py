@@ -37,20 +37,11 @@ MOST_ROBOTS = 500
 
 MOST_RESTARTS = 100_000
 
-_SOURCES, _SOURCES_A_ROBOT = 600, 20
-"""About so many places for robots are in the table, more for large teams."""
-
-_TARGETS = 1000
-"""At most about so many groups of sites are in the table."""
-
-_FINEST = 200_000
-"""At most so many places are looked at, in the box around a component, for these."""
-
-_UNREACHED = 1e4
-"""Counts as the distance to what a robot cannot reach, in sizes of the map: far more than any way is long."""
-
-_BUILT, _TABLED = 0.3, 0.5
-"""Parts of the progress at which the cost is built, and the table filled."""
+_SOURCES, _SOURCES_A_ROBOT = 600, 20  # about so many places for robots are in the table, more for large teams
+_TARGETS = 1000  # at most about so many groups of sites are in the table
+_FINEST = 200_000  # at most so many places are looked at, in the box around a component, for these
+_UNREACHED = 1e4  # sizes of the map that count as the distance to what a robot cannot reach
+_BUILT, _TABLED = 0.3, 0.5  # parts of the progress at which the cost is built, and the table filled
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,14 +31,9 @@ BRIDGE = 0.5
 """Ends of neighbouring rays that are closer together, in metres, are on one surface. No wider than the
 passages that a robot should find; a door seen from afar would be closed else."""
 
-_STRIDE = 0.7
-"""A ray is looked at after every so many cells."""
-
-_INTO = 0.25
-"""So many cells behind the end of a ray the obstacle is: the end itself may be on the border of two cells."""
-
-_CORE = 0.3
-"""A ray that passes the middle of a presumed cell, up to so much of its side, shows that there is no wall."""
+_STRIDE = 0.7  # a ray is looked at after every so many cells
+_INTO = 0.25  # the obstacle is so many cells behind the end of a ray, which may be on the border of two cells
+_CORE = 0.3  # a ray that passes the middle of a presumed cell, to so much of its side, shows that it is free
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,9 +31,7 @@ LONG = 30.0
 BLOCKS = 1000
 """Blocks that a map is divided into, at most."""
 
-_OVER = 1.9
-"""Relaxation factor; the best for walks that end after `LONG` blocks."""
-
+_OVER = 1.9  # relaxation factor; the best for walks that end after `LONG` blocks
 _SWEEPS, _EXACT = 1000, 1e-11
 
 

@@ -35,11 +35,8 @@ if TYPE_CHECKING:
 MOST_SOURCES = 180
 """A plan for a team chooses among at most so many nodes; its own goal each robot then finds among all."""
 
-_FAR = 1e9
-"""Metres that stand for "nobody is there"."""
-
-_SEEN_ENOUGH = 0.6
-"""Metres around a place from where somebody has looked: it is not gone to again."""
+_FAR = 1e9  # metres that stand for "nobody is there"
+_SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
 
 @dataclass(frozen=True, eq=False)
