@@ -222,11 +222,10 @@ def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
     """Return the squares that a robot has met something in, with those of (k, 2) points; nan for none."""
     square = np.floor(points[~np.isnan(points[:, 0])] / _GRAIN)
     return np.unique(np.concatenate([*met, square[:, 0] + 1j * square[:, 1]]))
-    """An end of the contour that blocks the way: the first ray that passes it, and the point just past it, m."""
 
 
 class Gap(NamedTuple):
-    """An end of the contour that blocks the way: the first ray that passes it, the point just past it, (2,) m."""
+    """An end of the contour that blocks the way: the first ray past it, and the point just past it, (2,) m."""
 
     ray: int
     point: Array
