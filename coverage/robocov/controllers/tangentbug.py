@@ -225,7 +225,7 @@ def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
 
 
 class Gap(NamedTuple):
-    """An end of the contour that blocks the way: the first ray past it, and the point just past it, (2,) m."""
+    """An end of the contour that blocks the way: the first ray past it, and a point just past it, m."""
 
     ray: int
     point: Array
