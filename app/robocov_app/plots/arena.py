@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.voronoi.weighted_cells import outlines_of
 from robocov_app.plots.page import tone
 from robocov_app.view.aims import CENTROID, GOAL, are_centroids
 from robocov_app.view.phi import density_words, shading
@@ -113,7 +112,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
     cells = record.cells()
-    outlines, owners = outlines_of(cells)
+    outlines, owners = cells.outlines
     hues = robot_hues(n, working[cells.adjacency])
     paper = colours == "paper"
     tint = theme.paper_tint if paper else theme.tint

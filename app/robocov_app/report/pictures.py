@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.voronoi.weighted_cells import outlines_of
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path, lives
 from robocov_app.saved import roster_of
@@ -80,7 +79,7 @@ def run_picture(
     if n <= MOST_ROBOTS:
         cells, working = record.cells(), np.flatnonzero(record.working[-1])
         hues = robot_hues(n, working[cells.adjacency] if n > ONE_HUE_EACH else None).tolist()
-        for cell, owner in zip(*outlines_of(cells), strict=True):
+        for cell, owner in zip(*cells.outlines, strict=True):
             hue = hues[working[int(owner)]]
             if len(cell) > 2:
                 parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')

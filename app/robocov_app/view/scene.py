@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import WeightedCells, outlines_of, weighted_partition
+from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
 if TYPE_CHECKING:
     from robocov_app.view.field import Field
@@ -136,7 +136,7 @@ class Scene:
                 cells = weighted_partition(where, team.max_speed, environment.region, density=density)
             else:
                 cells = partition(where, environment.region, density=density)
-        outlines, owners = outlines_of(cells)
+        outlines, owners = cells.outlines
         return cls(
             environment,
             team,

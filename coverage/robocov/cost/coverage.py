@@ -14,7 +14,7 @@ from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.arrays.grouping import weighted_mean
 from robocov.cost.lattice import Number, Sites, lattice_of
 from robocov.cost.site_paths import CornerViews, Paths, corner_views, site_paths
-from robocov.density.masses import means_over_squares
+from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, checked, counted, shown

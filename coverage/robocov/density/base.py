@@ -1,24 +1,29 @@
-"""What every density φ is: values at places, moments of cells."""
+"""What every density φ is: values at places, moments of cells; and its integrals over other polygons."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+import shapely
 
 from robocov.arrays import Array
-from robocov.density.moments import Moments
+from robocov.density.cell_edges import REGION, CellEdges
 from robocov.errors import ParameterError, shown
 
 if TYPE_CHECKING:
-    from robocov.voronoi.cell_edges import CellEdges
+    from collections.abc import Sequence
 
 HEAVIEST = 1e6
 """Largest value that a weight may have."""
 
 _NOTHING = 1e-9
 """What counts as no density at all, as a part of the highest."""
+
+_AT_ONCE = 1 << 16
+"""Squares that are looked at at once, which bounds the memory."""
 
 
 class Density(ABC):
@@ -49,8 +54,8 @@ class Density(ABC):
         """Return φ at (k, 2) points in metres, (k,)."""
 
     @abstractmethod
-    def moments(self, edges: CellEdges, origins: Array) -> Moments:
-        """Return mass, first and polar moments of cells about their origins.
+    def moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Return the integrals of φ, φ (q - o) and φ |q - o|² over n cells with origins o, (n, 4).
 
         Parameters
         ----------
@@ -79,10 +84,10 @@ class Density(ABC):
             the latter: a cell whose mean density is below 1e-9 of the highest is filled up to that.
         """
         moments = self.moments(edges, origins)
-        mass, first = np.maximum(moments.mass, 0.0), moments.first
+        mass = np.maximum(moments[:, 0], 0.0)
         filling = np.maximum(_NOTHING * self.highest * area - mass, 0.0)
         weight = mass + filling
-        first = first + filling[:, None] * (centroid - origins)
+        first = moments[:, 1:3] + filling[:, None] * (centroid - origins)
         full = weight > 0.0
         offset = first / np.where(full, weight, 1.0)[:, None]
         return mass, np.where(full[:, None], origins + offset, centroid)
@@ -99,3 +104,71 @@ def check_weight(name: str, value: float, *, above: bool = False) -> None:
     if not ((value > 0.0 if above else value >= 0.0) and value <= HEAVIEST):
         wanted = f"a number {'above' if above else 'from'} 0 to {HEAVIEST:.0f}"
         raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
+
+
+@dataclass(frozen=True)
+class Uniform(Density):
+    """Every place counts the same: as no density at all, but for the unit of the cost.
+
+    Attributes
+    ----------
+    weight : float
+        Above 0.
+    """
+
+    kind: ClassVar[str] = "uniform"
+
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_weight("weight", self.weight, above=True)
+
+    @property
+    def lowest(self) -> float:
+        """The weight."""
+        return self.weight
+
+    @property
+    def highest(self) -> float:
+        """The weight."""
+        return self.weight
+
+    def value(self, points: Array) -> Array:
+        """Return φ at (k, 2) points in metres, (k,)."""
+        return np.full(len(points), float(self.weight))
+
+    def moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Return mass, first and polar moments of cells about their origins."""
+        return self.weight * edges.moments(len(origins))
+
+
+def masses_of_polygons(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
+    """Return the integral of φ over each of some valid polygons, (k,) m², their holes left out."""
+    pieces, owners, origins = [np.empty((0, 4))], [], np.zeros((len(polygons), 2))
+    for k, polygon in enumerate(polygons):
+        polygon = shapely.orient_polygons(polygon)
+        origins[k] = polygon.centroid.coords[0]
+        for ring in (polygon.exterior, *polygon.interiors):
+            points = shapely.get_coordinates(ring) - origins[k]
+            pieces.append(np.hstack([points[:-1], points[1:]]))
+            owners += [k] * (len(points) - 1)
+    ends = np.concatenate(pieces)
+    return np.maximum(density.moments(_edges(ends[:, :2], ends[:, 2:], np.array(owners)), origins)[:, 0], 0.0)
+
+
+def means_over_squares(density: Density, middles: Array, side: float) -> Array:
+    """Return the mean of φ over axis-parallel squares, (k,), from their middles, (k, 2) m."""
+    corners = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    means = np.empty(len(middles))
+    for k in range(0, len(middles), _AT_ONCE):
+        some = middles[k : k + _AT_ONCE]
+        start, end = (np.tile(ring, (len(some), 1)) for ring in (corners, np.roll(corners, -1, axis=0)))
+        edges = _edges(start, end, np.repeat(np.arange(len(some)), 4))
+        means[k : k + len(some)] = density.moments(edges, some)[:, 0]
+    # what rounding makes of nothing
+    return np.clip(means / (side * side), density.lowest, density.highest)
+
+
+def _edges(start: Array, end: Array, cell: Array) -> CellEdges:
+    owner = cell.astype(np.intp, copy=False)
+    return CellEdges(start, end, owner, np.full(len(owner), REGION))

@@ -12,7 +12,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, frozen
-from robocov.density.masses import masses_of_polygons
+from robocov.density.base import masses_of_polygons
 from robocov.drawing import Drawable
 from robocov.environment.obstacle_path import ObstaclePath
 from robocov.environment.starts import Start, StartSpec, UniformStart

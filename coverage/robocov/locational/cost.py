@@ -22,8 +22,8 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, shown
-from robocov.voronoi.cell_edges import CellEdges
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 

@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from robocov.density import Density
+    from robocov.observation.cells import Cells
     from robocov.observation.region import Region
     from robocov.observation.scans import Scans
-    from robocov.voronoi import VoronoiPartition
-    from robocov.voronoi.weighted_cells import WeightedCells
 
 
 @dataclass(slots=True, eq=False)
@@ -110,7 +109,7 @@ class Decision:
         Where each robot is drawn to, nan where it has no goal; None when the law knows no goals.
     terms : dict of name to (n, 2) N
         The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...).
-    cells : VoronoiPartition, WeightedCells or None
+    cells : Cells or None
         The cells that the law used.
     memory : object
         What the robots remember; it is handed back at the next decision.
@@ -119,7 +118,7 @@ class Decision:
     forces: Array
     goals: Array | None = None
     terms: Mapping[str, Array] = field(default_factory=dict)
-    cells: VoronoiPartition | WeightedCells | None = None
+    cells: Cells | None = None
     memory: Any = None
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, shown
+from robocov.observation.cells import Cells
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.voronoi.cell_edges import CellEdges
 from robocov.voronoi.clipping import cells_of
 from robocov.voronoi.delaunay import Mesh
 
@@ -31,36 +32,24 @@ _NO_MESH = np.empty((2, 0), dtype=np.int32)
 _NO_EDGES = np.empty((0, 6))
 
 
-@dataclass(frozen=True, eq=False)
-class VoronoiPartition:
+@dataclass(eq=False)
+class VoronoiPartition(Cells):
     """The cells V_i of equation (1) within a convex region.
-
-    Mass and centroid are there at once; everything else is computed when it is first asked for.
 
     Attributes
     ----------
-    generators : (n, 2) m
-    mass : (n,) m²
-        M of equation (2): the areas of the cells where the density is 1.
-    centroid : (n, 2) m
-        C of equation (2). An empty cell's is its generator.
     triangulation : Mesh or None
-        What the next partition of slowly moving generators may start from, as its `warm`; see
-        `robocov.voronoi.delaunay`. None when the cells were not read from one.
+        What the next partition of slowly moving generators may start from, as its `warm`, if there is one.
     density : Density or None
         φ of mass, centroid and moments; None for 1.
     """
 
-    generators: Array
-    mass: Array
-    centroid: Array
     triangulation: Mesh | None
     _find_edges: Callable[[], CellEdges]
     density: Density | None = None
 
     @cached_property
     def edges(self) -> CellEdges:
-        """The edges of all cells, with what lies beyond them."""
         return self._find_edges()
 
     @cached_property
@@ -68,27 +57,19 @@ class VoronoiPartition:
         """The cells, (k, 2) m each, counter-clockwise; (0, 2) where a cell is empty."""
         return self.edges.polygons(self.generators)
 
+    @property
+    def outlines(self) -> tuple[list[Array], IntArray]:
+        return self.polygons, np.arange(len(self.generators))
+
     @cached_property
     def adjacency(self) -> IntArray:
-        """The pairs (i, j), i < j, of cells that share an edge, (m, 2), ascending.
-
-        Where communication is limited, cells overlap: i and j are then a pair when the bisector
-        between them is an edge of either.
-        """
         return self.edges.adjacency()
 
     @cached_property
     def polar_moment(self) -> Array:
-        """J_{V,p} of equation (2), (n,) m⁴: the polar moments of the cells about their generators."""
         if self.density is not None:
-            return self.density.moments(self.edges, self.generators).polar
-        return self.edges.polar_moment(len(self.generators))
-
-    @cached_property
-    def polar_moment_about_centroid(self) -> Array:
-        """J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
-        lever = self.generators - self.centroid
-        return self.polar_moment - self.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
+            return self.density.moments(self.edges, self.generators)[:, 3]
+        return self.edges.moments(len(self.generators))[:, 3]
 
 
 def partition(

@@ -11,10 +11,8 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inner_kernel, kernel
+from robocov.density.cell_edges import REGION
 from robocov.voronoi.delaunay import Mesh, before, following, triangulated
-
-REGION = -1
-"""What lies beyond an edge of a cell that is a piece of the region's boundary."""
 
 _NEAREST = 6
 """Robots by which a cell is cut in order of their distance; then it is so small that few others count."""

@@ -20,13 +20,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.density.cell_edges import REGION, CellEdges
 from robocov.errors import InputError, shown
+from robocov.observation.cells import Cells
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi.arcs import Arcs, rings
 from robocov.voronoi.bisectors import Curves, Pieces, boundaries, in_reach
 from robocov.voronoi.bounded_cells import VoronoiPartition, partition
-from robocov.voronoi.cell_edges import REGION, CellEdges
 from robocov.voronoi.delaunay import Mesh
 
 if TYPE_CHECKING:
@@ -42,18 +43,15 @@ _NOTHING = 1e-14
 """Area of a cell, relative to the region's, that is rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class WeightedCells:
+@dataclass(eq=False)
+class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
+
+    Where a cell is not convex, its centroid may lie outside of it.
 
     Attributes
     ----------
-    generators : (n, 2) m
     speeds : (n,) m/s
-    mass : (n,) m²
-        M of equation (2): the areas of the cells where the density is 1.
-    centroid : (n, 2) m
-        An empty cell's is its generator. Where a cell is not convex it may lie outside.
     pieces : Pieces
         The boundaries, relative to the generators.
     region : Region
@@ -62,10 +60,7 @@ class WeightedCells:
     density : Density or None
     """
 
-    generators: Array
     speeds: Array
-    mass: Array
-    centroid: Array
     pieces: Pieces
     region: Region
     triangulation: Mesh | None = None
@@ -112,16 +107,10 @@ class WeightedCells:
     def polar_moment(self) -> Array:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moments of the cells about their generators."""
         if self.density is not None and not self.density.uniform:
-            return self.density.moments(self.edges, self.generators).polar
+            return self.density.moments(self.edges, self.generators)[:, 3]
         weight = 1.0 if self.density is None else self.density.highest
         polar = weight * self.pieces.arcs.moments()[2]
         return np.where(self.mass > 0.0, _sums(self.pieces.cell, polar, len(self.generators)), 0.0)
-
-    @cached_property
-    def polar_moment_about_centroid(self) -> Array:
-        """J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
-        lever = self.generators - self.centroid
-        return self.polar_moment - self.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
 def weighted_partition(
@@ -188,13 +177,6 @@ def weighted_partition(
     return cells
 
 
-def outlines_of(cells: VoronoiPartition | WeightedCells) -> tuple[list[Array], IntArray]:
-    """Return the outlines of any cells, (k, 2) m each, and whose each is, in an order to paint them in."""
-    if isinstance(cells, WeightedCells):
-        return cells.outlines
-    return cells.polygons, np.arange(len(cells.generators))
-
-
 def _links(neighbours: Neighbours) -> tuple[IntArray, IntArray]:
     """Return who hears whom, by the hearer."""
     n = neighbours.count
@@ -237,7 +219,7 @@ def _cells(
     shift /= np.where(mass > 0.0, mass, np.inf)[:, None]
     mass = np.where(beaten, 0.0, np.where(curved, mass, cells.mass))
     centroid = np.where((curved | beaten)[:, None], points + shift, cells.centroid)
-    return WeightedCells(points, speeds, mass, centroid, _joined(straight, bent), region)
+    return WeightedCells(points, mass, centroid, speeds, _joined(straight, bent), region)
 
 
 def _linked(n: int, one: IntArray, other: IntArray) -> Neighbours:

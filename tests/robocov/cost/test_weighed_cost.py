@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Uniform, WeightedArea, WeightedPolygons
-from robocov.density.masses import means_over_squares
+from robocov.density.base import means_over_squares
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.optimum import optimum
 from robocov.simulation import Simulation

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize, minimize_scalar
 from voronoi_cases import FAMILIES, PENTAGON, REGIONS, Family, families, names, scattered, seeds
 
+from robocov.density.cell_edges import CellEdges
 from robocov.locational import Distance, Performance, Sensing, SquaredDistance, gradient, value
 from robocov.locational.best_points import _downhill, best_points
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.cell_edges import CellEdges
 from robocov.voronoi.weighted_cells import weighted_partition
 
 FUNCTIONS: list[Performance] = [Distance(), Sensing(1e-3), Sensing(0.3), Sensing(2.0), Sensing(1e4)]

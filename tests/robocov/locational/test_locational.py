@@ -12,6 +12,7 @@ from scipy.integrate import dblquad, quad
 from scipy.special import spence
 from voronoi_cases import PENTAGON, REGIONS, names, scattered, seeds
 
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
 from robocov.locational import (
     CellSides,
@@ -25,7 +26,6 @@ from robocov.locational import (
 )
 from robocov.observation.region import Region
 from robocov.voronoi import partition
-from robocov.voronoi.cell_edges import CellEdges
 
 FUNCTIONS: list[Performance] = [
     SquaredDistance(),

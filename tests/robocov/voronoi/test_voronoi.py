@@ -25,11 +25,11 @@ from voronoi_cases import (
     seeds,
 )
 
+from robocov.density.cell_edges import REGION
 from robocov.errors import InputError
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import partition
-from robocov.voronoi.cell_edges import REGION
 
 
 @pytest.mark.parametrize("name", REGIONS)

@@ -1,4 +1,4 @@
-"""The edges of Voronoi cells, and what follows from them alone: polygons, moments, who borders whom."""
+"""The edges of cells, and what follows from them alone: polygons, moments, who borders whom."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
 
 REGION = -1
 """What lies beyond an edge of a cell that is a piece of the region's boundary."""
@@ -44,15 +45,12 @@ class CellEdges:
         stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
         return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
-    def polar_moment(self, count: int) -> Array:
-        """Return J_{V,p}, the polar moment of each of `count` cells about its generator, (n,) m⁴.
+    def moments(self, count: int) -> Array:
+        """Return area, first moments and polar moment of `count` cells about their generators, (n, 4).
 
-        The second moment of equation (2): each edge adds the triangle that it spans with the generator.
+        In m², m³ and m⁴: each edge adds the triangle that it spans with the generator.
         """
-        (x, y), (u, v) = self.start.T, self.end.T
-        square = x * (x + u) + u * u + y * (y + v) + v * v
-        weights = (x * v - u * y) * square / 12.0
-        return np.bincount(self.cell, weights, minlength=count).astype(np.float64, copy=False)
+        return _moments(self.start, self.end, self.cell, count)
 
     def adjacency(self) -> IntArray:
         """Return the pairs (i, j), i < j, of cells with an edge between them, (m, 2), ascending."""
@@ -67,3 +65,16 @@ class CellEdges:
         """Return which edges have a length: more than rounding makes of a point so far from the generator."""
         (x, y), (u, v) = self.start.T, self.end.T
         return np.asarray(np.hypot(u - x, v - y) > 1e-12 * (np.hypot(x, y) + np.hypot(u, v)))
+
+
+@kernel
+def _moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
+    sums = np.zeros((count, 4))
+    for k in range(len(cell)):
+        x, y, u, v = start[k, 0], start[k, 1], end[k, 0], end[k, 1]
+        cross, c = x * v - u * y, cell[k]
+        sums[c, 0] += cross / 2.0
+        sums[c, 1] += cross * (x + u) / 6.0
+        sums[c, 2] += cross * (y + v) / 6.0
+        sums[c, 3] += cross * (x * (x + u) + u * u + y * (y + v) + v * v) / 12.0
+    return sums
