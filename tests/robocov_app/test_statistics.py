@@ -28,16 +28,6 @@ def test_the_interval_of_a_mean_is_about_the_classical_one() -> None:
     assert found.high == pytest.approx(values.mean() + half, abs=0.1 * half)
 
 
-@pytest.mark.parametrize("statistic", ["median", "mean"])
-def test_ninety_five_percent_of_the_intervals_hold_the_truth(statistic: str) -> None:
-    rng = np.random.default_rng(2)
-    held = 0
-    for _ in range(300):
-        found = bootstrap(rng.normal(size=60), statistic, resamples=400)  # type: ignore[arg-type]
-        held += found.low <= 0.0 <= found.high
-    assert 0.90 <= held / 300 <= 0.985
-
-
 def test_values_of_one_cluster_stay_together() -> None:
     rng = np.random.default_rng(3)
     levels = rng.normal(size=20)
@@ -62,7 +52,7 @@ def test_drawing_clusters_agrees_with_doing_it_by_hand(statistic, of) -> None:
 
 
 @given(st.lists(numbers, min_size=2, max_size=30))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=20)
 def test_intervals_lie_within_the_sample_and_do_not_depend_on_chance(values: list[float]) -> None:
     found = bootstrap(values, resamples=200)
     assert min(values) <= found.low <= found.high <= max(values)

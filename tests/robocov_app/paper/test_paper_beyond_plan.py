@@ -12,15 +12,19 @@ from robocov_app.paper.plan import FULL, QUICK, claim_maps, claims_study, tuning
 from robocov_app.paper.verdicts import LEAST_MAPS
 from robocov_app.sweep.task import tasks_of
 
+both = pytest.mark.parametrize(
+    "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]
+)
 
-@pytest.mark.parametrize("plan", [FULL, QUICK], ids=lambda plan: plan.name)
+
+@both
 def test_every_registered_controller_takes_part_once(plan):
     others = [law.key for _, laws in beyond_studies.rival_studies(plan).values() for law in laws]
     assert len(others) == len(set(others))
     assert {*others, *IN_CLAIMS} == set(CONTROLLERS)
 
 
-@pytest.mark.parametrize("plan", [FULL, QUICK], ids=lambda plan: plan.name)
+@both
 def test_rivals_begin_where_the_papers_controllers_began(plan):
     laws = {"rapf": beyond_studies.UNTUNED[0], "rpf": beyond_studies.UNTUNED[2]}
     papers = {(task.document, task.start, task.seed) for task in tasks_of(claims_study(plan, laws))}
@@ -33,6 +37,7 @@ def test_rivals_begin_where_the_papers_controllers_began(plan):
             assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
 
 
+@pytest.mark.slow
 def test_in_full_ours_is_run_as_often_as_rapf_and_rivals_on_every_map():
     beyond = beyond_studies.of(FULL)
     assert beyond.own_seeds == FULL.seeds
@@ -42,6 +47,7 @@ def test_in_full_ours_is_run_as_often_as_rapf_and_rivals_on_every_map():
         assert len(study) == 33 * 3 * seeds * len(laws)
 
 
+@pytest.mark.slow
 def test_maps_that_nobody_looked_at_are_none_of_the_others():
     unseen = {each.name: each.environment for each in beyond_studies.unseen_maps(FULL)}
     known = [*claim_maps(FULL), *tuning_maps(FULL), *beyond_studies.small_maps(FULL)]

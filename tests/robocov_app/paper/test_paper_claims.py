@@ -16,6 +16,8 @@ from robocov_app.paper.placements import matched_distance, spread_of_placements
 from robocov_app.paper.verdicts import Claim, Criterion, amount
 from robocov_app.statistics import Interval
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
+
 STARTS = ("corner", "centre", "uniform")
 FEW, MANY = 3, 12
 

@@ -25,6 +25,8 @@ from robocov_app.paper.verdicts import Claim, Criterion
 from robocov_app.paper.writing import told_counts
 from robocov_app.statistics import Interval
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
+
 MAPS = ("a", "b", "c", "d", "e", "f")
 OURS = contender("howard")
 """Stands for ours: goals are asked of any contender."""

@@ -17,8 +17,12 @@ BEST = {
     "rpf": best("rpf", {"k_rep": 10.0, "rho_0": 6.0}),
 }
 
+both = pytest.mark.parametrize(
+    "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]
+)
 
-@pytest.mark.parametrize("plan", [FULL, QUICK], ids=lambda plan: plan.name)
+
+@both
 def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(plan):
     assert not set(plan.tuning) & set(plan.generated)
     assert plan.tuning_seed not in plan.seeds
@@ -30,6 +34,7 @@ def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(plan):
     assert len(plan.tuning) >= 5 and len(plan.tuning_starts) >= 2
 
 
+@pytest.mark.slow
 def test_the_full_study_is_as_large_as_it_is_said_to_be():
     assert len(planned.claim_maps(FULL)) == 33
     assert len(FULL.generated) >= 20

@@ -48,6 +48,7 @@ def make_known(known, gains):
     return {gain: known[gain].validated(value, "grid") for gain, value in gains.items()}
 
 
+@pytest.mark.slow
 def test_in_full_they_are_tuned_where_nothing_is_tested():
     study = rival_gains_study(FULL)
     assert study is not None

@@ -41,10 +41,9 @@ def written(figure):
     return extents
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize(("count", "with_curves"), [(1, True), (2, False), (3, True), (5, True)])
 @pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
 @pytest.mark.parametrize("environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
-@pytest.mark.parametrize("with_curves", [True, False])
 def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
     moments = [moment_of(environment, seed=k) for k in range(count)]
     figure = plot_coverage(curves(count if with_curves else 0), moments, size=size)
