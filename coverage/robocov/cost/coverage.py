@@ -19,7 +19,7 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, checked, counted, shown
 from robocov.geodesic import Geodesics
-from robocov.geodesic.distances import BINS, CORNER_BINS, with_room
+from robocov.geodesic.distances import BINS, CORNER_BINS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -239,7 +239,7 @@ class CoverageCost:
             if progress is not None:
                 progress(begin / count)
             part = begin, min(begin + _BLOCK, count)
-            found = with_room(
+            found = self.geodesics.with_room(
                 1, CORNER_BINS, lambda *room, part=part: corner_views(walls, tiles, *part, *room)
             )
             pieces.append(found[1:])
@@ -302,7 +302,7 @@ class CoverageCost:
                 )
             )  # fmt: skip
 
-        with_room(n, BINS, fill)
+        geodesics.with_room(n, BINS, fill)
         return found
 
     def _result(

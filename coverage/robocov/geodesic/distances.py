@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 BINS, CORNER_BINS = 64, 256
 """Angular bins of a source; a corner looks at many targets."""
 
-_BLOCK = 256
+_BLOCK = 64
 """Corners that are looked at between two beats."""
 
 _TARGETS = 1024
@@ -181,22 +181,6 @@ def _shortest(
             table[i, j] = best
 
 
-def with_room(
-    n: int, bins: int, fill: Callable[[AngularWallIndex, IntArray, Array], int]
-) -> tuple[AngularWallIndex, IntArray, Array]:
-    """Return an index of n sources, and what filling it writes of numbers, (used, 3), and lengths, (used, 2).
-
-    `fill` returns how many rows it used, and is called with more and more room until that is not negative.
-    """
-    entries, used = 256 * n + 16 * bins, -1
-    while used < 0:
-        index = AngularWallIndex.room(n, bins, entries)
-        numbers, lengths = np.empty((entries, 3), np.int64), np.empty((entries, 2))
-        used = fill(index, numbers, lengths)
-        entries *= 2
-    return index, numbers[:used].copy(), lengths[:used].copy()
-
-
 class Geodesics:
     """The shortest paths of one environment; immutable.
 
@@ -227,13 +211,15 @@ class Geodesics:
         self.free = shapely.transform(environment.free, self.grid.snap)
         self.walls = walls_of(self.free)
         self.corners = self.grid.metres(self.walls.corners[:, :2])
+        # so many entries for each source were enough so far
+        self._room = {BINS: 256, CORNER_BINS: 1 << 14}
         count = len(self.corners)
         seen, pieces = np.empty(count, np.int64), [(np.empty((0, 3), np.int64), np.empty((0, 2)))]
         for begin in range(0, count, _BLOCK):
             if beat is not None:
                 beat()
             part = begin, min(begin + _BLOCK, count), seen
-            found = with_room(
+            found = self.with_room(
                 1, CORNER_BINS, lambda *room, part=part: _corner_links(self.walls, *part, *room)
             )
             pieces.append(found[1:])
@@ -242,6 +228,22 @@ class Geodesics:
         order = np.lexsort((other, one))
         first = np.searchsorted(one[order], np.arange(count + 1))
         self.graph = Graph(first, other[order], np.tile(lengths[:, 0], 2)[order])
+
+    def with_room(
+        self, n: int, bins: int, fill: Callable[[AngularWallIndex, IntArray, Array], int]
+    ) -> tuple[AngularWallIndex, IntArray, Array]:
+        """Return an index of n sources, and what is written of numbers, (used, 3), and lengths, (used, 2).
+
+        `fill` writes all of these and returns how many rows it used, -1 if it wants more room.
+        """
+        while True:
+            entries = self._room[bins] * n + 2 * bins
+            index = AngularWallIndex.room(n, bins, entries)
+            numbers, lengths = np.empty((entries, 3), np.int64), np.empty((entries, 2))
+            used = fill(index, numbers, lengths)
+            if used >= 0:
+                return index, numbers[:used].copy(), lengths[:used].copy()
+            self._room[bins] *= 2
 
     def place(self, points: Array, what: str = "positions") -> tuple[Array, BoolArray]:
         """Return points in grid coordinates, those a hair outside the free space moved into it.
@@ -313,7 +315,7 @@ class Geodesics:
         def fill(index: AngularWallIndex, *_: object) -> int:
             return int(_corner_distances(self.walls, index, self.graph, places, bends, distance, ways, queue))
 
-        return with_room(n, BINS, fill)[0], distance, ways
+        return self.with_room(n, BINS, fill)[0], distance, ways
 
     def distances(self, sources: Array, targets: Array) -> Array:
         """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads.
