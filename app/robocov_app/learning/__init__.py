@@ -1,8 +1,9 @@
 """Learning environments: the simulation for gymnasium and PettingZoo (``pip install "robocov[rl]"``).
 
-`CoverageParallelEnv` has one learner for each robot, `CoverageEnv` one for all of them; both take what a
-`CoverageTask` says, and their observations are those of an `ObservationLayout`. What is learned becomes a
-controller as a `PolicyController`; a controller acts in the environments as a `ControllerPolicy`.
+`CoverageParallelEnv` has one learner for each robot, `CoverageEnv` one for all of them, `CoverageVectorEnv`
+many of these at once; all take what a `CoverageTask` says, and their observations are those of an
+`ObservationLayout`. What is learned becomes a controller as a `PolicyController`; a controller acts in the
+environments as a `ControllerPolicy`.
 
     import numpy as np
     from robocov_app.learning import CoverageEnv, ObservationLayout
@@ -47,7 +48,7 @@ from robocov.extras import extra
 
 if TYPE_CHECKING:
     from robocov_app.learning.expert import ControllerPolicy
-    from robocov_app.learning.gym import CoverageEnv
+    from robocov_app.learning.gym import CoverageEnv, CoverageVectorEnv
     from robocov_app.learning.layout import ObservationLayout
     from robocov_app.learning.parallel import CoverageParallelEnv
     from robocov_app.learning.policy import PolicyController
@@ -59,6 +60,7 @@ __all__ = [
     "CoverageEnv",
     "CoverageParallelEnv",
     "CoverageTask",
+    "CoverageVectorEnv",
     "GeneratedMaps",
     "ObservationLayout",
     "PolicyController",
@@ -70,6 +72,7 @@ _HOME: dict[str, tuple[str, tuple[str, ...]]] = {
     "CoverageEnv": ("gym", ("gymnasium",)),
     "CoverageParallelEnv": ("parallel", ("gymnasium", "pettingzoo")),
     "CoverageTask": ("task", ()),
+    "CoverageVectorEnv": ("gym", ("gymnasium",)),
     "GeneratedMaps": ("scenarios", ()),
     "ObservationLayout": ("layout", ()),
     "PolicyController": ("policy", ()),

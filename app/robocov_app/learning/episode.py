@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from robocov.observation.neighbours import close_pairs
 from robocov.observation.scans import Scanning
 from robocov.record import Record
 from robocov.record.recorder import Recorder
+from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning.driving import driving_forces
 from robocov_app.learning.rewards import reference_distance, shares
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation.region import Region
     from robocov.record import Record
-    from robocov.robots import Team
     from robocov_app.learning.layout import Rows
     from robocov_app.learning.task import CoverageTask
 
@@ -47,6 +47,12 @@ class Learner:
     summary: ClassVar[str] = "whoever acts in a learning environment"
 
     scanning: Scanning | None = None
+
+    @classmethod
+    def of(cls, task: CoverageTask) -> Learner:
+        """Return the learner of a task, with the scans that it is told of."""
+        rays = task.observation.rays
+        return cls(Scanning(rays, task.period) if rays else None)
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered here."""
@@ -76,6 +82,7 @@ def drawn_episode(
     scenarios: Scenarios,
     rng: np.random.Generator,
     options: Mapping[str, Any] | None = None,
+    place: Place | None = None,
 ) -> Episode:
     """Return a new episode, by chance where the options leave it to chance.
 
@@ -89,6 +96,8 @@ def drawn_episode(
         ``map``: a map, its name or path. ``start``: the name of one of its starts. ``start_seed``: the
         seed of the positions, as that of `robocov run`. ``positions``: the positions themselves, (n, 2) m.
         ``conditions_seed``: the seed of the task's conditions. Other keys mean nothing here.
+    place : Place or None
+        Beside the episodes of others, where these are on the same map.
 
     Raises
     ------
@@ -113,10 +122,59 @@ def drawn_episode(
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
             raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
-        return Episode(task, environment, cost, positions, conditions=conditions)
+        return Episode(task, environment, cost, positions, conditions=conditions, place=place)
     radius = float(task.whole_team.radius.max())
     positions = start.sample(task.robots, seed=seed, radius=radius)
-    return Episode(task, environment, cost, positions, conditions=conditions, start=start.name, seed=seed)
+    origin: dict[str, Any] = {"start": start.name, "seed": seed}
+    return Episode(task, environment, cost, positions, conditions=conditions, place=place, **origin)
+
+
+class SharedSimulation:
+    """One simulation for the episodes of several learning environments on one map, moved on together.
+
+    Parameters
+    ----------
+    task : CoverageTask
+        Without conditions, and not recording.
+    environment : Environment
+        In which nothing moves.
+    count : int
+        Of episodes.
+    """
+
+    def __init__(self, task: CoverageTask, environment: Environment, count: int) -> None:
+        self.environment, self._task, self._count = environment, task, count
+        self._simulation: Simulation | None = None
+        self._told: tuple[Observations | None, Rows] = None, np.empty((0, 0), dtype=np.float32)
+
+    def begin(self, run: int, positions: Array) -> Simulation:
+        """Put the team of an episode to its start."""
+        task, count = self._task, self._count
+        if self._simulation is None:
+            # the others follow
+            starts, team = np.tile(positions, (count, 1)), Team.joined([task.whole_team] * count)
+            self._simulation = Simulation(
+                self.environment, Learner.of(task), starts, team, task.dt, runs=count
+            )
+        self._simulation.restart(run, positions)
+        return self._simulation
+
+    def moved(self, actions: Array) -> Array:
+        """Hold the actions of all, (count n, 2); return how long each robot was in contact, s."""
+        assert self._simulation is not None
+        return held(self._task, self._simulation, actions)
+
+    def rows(self) -> Rows:
+        """Return what each robot of all episodes is told now."""
+        assert self._simulation is not None
+        seen = self._simulation.observe()
+        if seen is not self._told[0]:
+            self._told = seen, self._task.observation.rows(seen, self._simulation.team)
+        return self._told[1]
+
+
+Place: TypeAlias = "tuple[SharedSimulation, int]"
+"""A simulation, and the number of the episode in it."""
 
 
 class Episode:
@@ -132,6 +190,8 @@ class Episode:
     conditions : Conditions or None
     start : str, seed : int
         Where the positions came from, for the record.
+    place : Place or None
+        Where the team is moved together with others.
 
     Attributes
     ----------
@@ -146,6 +206,10 @@ class Episode:
         The unit of rewards.
     trail : list of (n, 2) m
         The positions at each decision so far, from the start on.
+    shared : SharedSimulation or None
+        In which the team is moved together with others.
+    contact : (n,) s or None
+        Of the action that `SharedSimulation.moved` has carried out, until `advance` has told of it.
 
     Raises
     ------
@@ -165,30 +229,39 @@ class Episode:
         conditions: Conditions | None = None,
         start: str | None = None,
         seed: int | None = None,
+        place: Place | None = None,
     ) -> None:
         self.task, self.team = task, task.whole_team
         if len(positions) != len(self.team):
             raise StartError(
                 f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
             )
-        rays = task.observation.rays
-        self._learner = learner = Learner(Scanning(rays, task.period) if rays else None)
-        self.simulation = Simulation(
-            environment, learner, positions, self.team, task.dt, conditions=conditions
-        )
-        self.working = self.simulation.working
+        self.shared: SharedSimulation | None = None
+        run = 0
+        if place is not None and place[0].environment is environment:
+            self.shared, run = place
+        self._rows = slice(run * len(positions), (run + 1) * len(positions))
+        if self.shared is None:
+            learner = Learner.of(task)
+            self.simulation = Simulation(
+                environment, learner, positions, self.team, task.dt, conditions=conditions
+            )
+        else:
+            self.simulation = self.shared.begin(run, positions)
+        self.contact: Array | None = None
+        self.working = self.simulation.working[self._rows]
         self._cost = MomentaryCost(cost)
-        self._counted = self._cost.counted(0.0, self.simulation.positions, self.working)
-        result = self._cost(0.0, self.simulation.positions, self.working)
+        self._counted = self._cost.counted(0.0, self.positions, self.working)
+        result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
             raise ParameterError(
                 f"lattice: {task.lattice}, but a finer one was wanted for map {environment.name!r}"
             )
         self.result = self.initial = result
         self.reference = reference_distance(environment.free_area - result.uncovered_area, len(self.team))
-        self.trail = [self.simulation.positions]
+        self.trail = [self.positions]
         self._rewarded = 0
-        self._scans = self.snapshot.seen.scans
+        self._scans = self.simulation.observe().scans
         self._start, self._seed = start, seed
         self._moments: list[Snapshot] = []
 
@@ -196,6 +269,16 @@ class Episode:
     def environment(self) -> Environment:
         """The map."""
         return self.simulation.environment
+
+    @property
+    def positions(self) -> Array:
+        """Centres of the robots, (n, 2) m."""
+        return self.simulation.positions[self._rows]
+
+    @property
+    def time(self) -> float:
+        """Simulated time in seconds."""
+        return self.cycle * self.task.repeat * self.task.dt
 
     @property
     def snapshot(self) -> Snapshot:
@@ -214,8 +297,10 @@ class Episode:
 
     def observations(self) -> Rows:
         """Return what each robot is told now, (n, size)."""
-        seen = self.snapshot.seen
-        return self.task.observation.rows(seen, self.team, self._scans)
+        if self.shared is not None:
+            rows: Rows = self.shared.rows()[self._rows].copy()
+            return rows
+        return self.task.observation.rows(self.simulation.observe(), self.team, self._scans)
 
     def state(self) -> Rows:
         """Return what nobody knows in the team: where all are, and how fast, (4 n,) from -1 to 1.
@@ -225,15 +310,15 @@ class Episode:
         """
         low_x, low_y, high_x, high_y = self.environment.region.bounds
         middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
-        where = (self.simulation.positions - middle) / self.environment.region.diameter
-        speed = self.simulation.velocities / self.team.max_speed[:, None]
+        where = (self.positions - middle) / self.environment.region.diameter
+        speed = self.simulation.velocities[self._rows] / self.team.max_speed[:, None]
         rows: Rows = np.clip(np.column_stack([where, speed]), -1.0, 1.0).astype(np.float32)
         return rows.ravel()
 
     def facts(self) -> dict[str, float]:
         """Return what is told beside observations: time and cost of the team, units in the names."""
         return {
-            "time_s": self.simulation.time,
+            "time_s": self.time,
             "mean_distance_m": self.result.mean_distance,
             "uncovered_area_m2": self.result.uncovered_area,
         }
@@ -252,19 +337,14 @@ class Episode:
         ParameterError
             When they are not finite numbers of that shape; the message names the robot.
         """
-        actions = self._checked(actions)
-        task, simulation = self.task, self.simulation
-        contact = np.zeros(len(self.team))
-        for _ in range(task.repeat):
-            forces = driving_forces(task.action, actions, simulation.velocities, self.team)
-            forces = np.where(simulation.working[:, None], forces, 0.0)
-            if task.recording:
-                self._moments.append(replace(simulation.snapshot, decision=Decision(forces)))
-            simulation.step(forces=forces)
-            contact += task.dt * self._touching()
-        self.working = simulation.working
-        self.trail.append(simulation.positions)
-        self._scans = simulation.snapshot.seen.scans
+        task, contact = self.task, self.contact
+        if contact is None:
+            keep = self._moments if task.recording else None
+            contact = held(task, self.simulation, checked_actions(actions, len(self.team)), keep)
+        self.contact = None
+        self.working = self.simulation.working[self._rows]
+        self.trail.append(self.positions)
+        self._scans = self.simulation.observe().scans
         gained = self._gained(last) / self.reference
         return Outcome(np.asarray(gained - task.contact_penalty * contact), contact)
 
@@ -274,8 +354,8 @@ class Episode:
         Who fails changes the cost at once. That is nobody's doing: those who have counted all the time
         get what became of their own cost, as if they had been alone.
         """
-        task, now, gained = self.task, self.simulation.time, np.zeros(len(self.team))
-        positions, earlier = self.simulation.positions, self.trail[self._rewarded]
+        task, now, gained = self.task, self.time, np.zeros(len(self.team))
+        positions, earlier = self.trail[-1], self.trail[self._rewarded]
         counted = self._cost.counted(now, positions, self.working)
         changed = not np.array_equal(counted, self._counted)
         since = self.cycle - self._rewarded
@@ -304,7 +384,7 @@ class Episode:
         if not self.task.recording:
             raise ParameterError("record: a task with recording=True was wanted")
         recorder = Recorder(
-            *(self.environment, self.team, self._learner, self.task.dt),
+            *(self.environment, self.team, self.simulation.controller, self.task.dt),
             start=self._start,
             seed=self._seed,
             conditions=self.simulation.conditions,
@@ -313,23 +393,47 @@ class Episode:
             recorder.add(moment)
         return recorder.record()
 
-    def _touching(self) -> BoolArray:
-        """Return which robots that work touch a wall or another robot now, (n,)."""
-        simulation, radius = self.simulation, self.team.radius
-        positions, works = simulation.positions, simulation.working
-        touching = works & ~np.isnan(simulation.sensor.nearest(positions, radius + TOUCHING)[:, 0])
-        first, second, distance = close_pairs(positions, 2.0 * float(radius.max()) + TOUCHING)
-        if len(first):
-            met = (distance <= radius[first] + radius[second] + TOUCHING) & works[first] & works[second]
-            touching[first[met]] = True
-        return touching
 
-    def _checked(self, actions: Any) -> Array:
-        array = np.asarray(actions, dtype=np.float64)
-        if array.shape != (len(self.team), 2):
-            raise ParameterError(f"actions of shape {array.shape}, but {(len(self.team), 2)} was wanted")
-        for robot in np.flatnonzero(~np.isfinite(array).all(axis=1)).tolist():
-            raise ParameterError(
-                f"action of robot_{robot + 1}: {shown(array[robot].tolist())}, but finite numbers were wanted"
-            )
-        return array
+def held(
+    task: CoverageTask, simulation: Simulation, actions: Array, moments: list[Snapshot] | None = None
+) -> Array:
+    """Hold actions, (n, 2) N or m/s, for the time of one decision; return the time in contact, (n,) s."""
+    contact = np.zeros(len(actions))
+    for _ in range(task.repeat):
+        forces = driving_forces(task.action, actions, simulation.velocities, simulation.team)
+        forces = np.where(simulation.working[:, None], forces, 0.0)
+        if moments is not None:
+            moments.append(replace(simulation.snapshot, decision=Decision(forces)))
+        simulation.step(forces=forces)
+        contact += task.dt * _touching(simulation, task.robots)
+    return contact
+
+
+def _touching(simulation: Simulation, each: int) -> BoolArray:
+    """Return which robots that work touch a wall or another robot now, (n,); there are `each` in a run."""
+    positions, works, radius = simulation.positions, simulation.working, simulation.team.radius
+    touching = works & ~np.isnan(simulation.sensor.nearest(positions, radius + TOUCHING)[:, 0])
+    first, second, distance = close_pairs(positions, 2.0 * float(radius.max()) + TOUCHING)
+    if len(first):
+        met = (distance <= radius[first] + radius[second] + TOUCHING) & works[first] & works[second]
+        touching[first[met & (first // each == second // each)]] = True
+    return touching
+
+
+def checked_actions(actions: Any, count: int) -> Array:
+    """Return the actions of so many robots, (count, 2).
+
+    Raises
+    ------
+    ParameterError
+        When they are not finite numbers of that shape; the message names the robot.
+    """
+    array = np.asarray(actions, dtype=np.float64)
+    if array.shape != (count, 2):
+        raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")
+    if not np.isfinite(array).all():
+        robot = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise ParameterError(
+            f"action of robot_{robot + 1}: {shown(array[robot].tolist())}, but finite numbers were wanted"
+        )
+    return array

@@ -6,16 +6,24 @@ both. (gymnasium knows no entry points of packages any more.)
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from robocov.errors import RobocovError
 from robocov_app.learning.driving import action_limit
-from robocov_app.learning.episode import Episode, drawn_episode
+from robocov_app.learning.episode import (
+    Episode,
+    Place,
+    SharedSimulation,
+    checked_actions,
+    drawn_episode,
+)
 from robocov_app.learning.pictures import FRAMES_PER_SECOND, RENDER_MODES, Pictures
 from robocov_app.learning.scenarios import Scenarios
 from robocov_app.learning.task import CoverageTask, changed_task
@@ -48,6 +56,8 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     size : (width, height), px
         Of pictures.
     theme : {"light", "dark"}
+    scenarios : Scenarios or None
+        Of the task, to be shared by several environments.
     **changes
         Of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``.
 
@@ -56,6 +66,8 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     task : CoverageTask
     episode : Episode
         The present one; None before the first ``reset``.
+    place : Place or None
+        Where its team is moved together with those of other environments; see `CoverageVectorEnv`.
 
     Raises
     ------
@@ -75,13 +87,15 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         render_mode: str | None = None,
         size: tuple[int, int] = (640, 480),
         theme: str = "light",
+        scenarios: Scenarios | None = None,
         **changes: Any,
     ) -> None:
         self.task = changed_task(task, changes)
         self.render_mode = render_mode
         self._pictures = Pictures(render_mode, size, theme)
-        self._scenarios = Scenarios(self.task.maps, self.task.lattice)
+        self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
         self.episode: Episode | None = None
+        self.place: Place | None = None
         n = self.task.robots
         low, high = (np.tile(row, (n, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)
@@ -101,7 +115,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             See `robocov_app.learning.episode.drawn_episode`.
         """
         super().reset(seed=seed)
-        self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options)
+        self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
         self._pictures.shown(self.episode)
         info = self._info(np.zeros(self.task.robots))
         return self._rows(), {**info, "map": self.episode.environment.name}
@@ -142,6 +156,70 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _info(self, contact: Array) -> dict[str, Any]:
         episode = self._present()
         return {**episode.facts(), "contact_s": contact.copy(), "working": episode.working.copy()}
+
+
+class CoverageVectorEnv(SyncVectorEnv):
+    """Many of `CoverageEnv` in one process, several times as quick: gymnasium's ``VectorEnv``.
+
+    Each environment is what it is alone, bit for bit: with ``reset(seed=s)`` that of the seed s + k.
+    Those on one map without conditions and moving obstacles are moved on together, others one by one.
+
+    Parameters
+    ----------
+    num_envs : int
+    task : CoverageTask or None
+    autoreset_mode : gymnasium.vector.AutoresetMode
+        When an episode that is over is followed by the next one.
+    **changes
+        Of the task.
+
+    Raises
+    ------
+    InputError
+        When the task makes no sense or a map cannot be read.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: CoverageTask | None = None,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **changes: Any,
+    ) -> None:
+        self.task = changed_task(task, changes)
+        scenarios = Scenarios(self.task.maps, self.task.lattice)
+        make = partial(CoverageEnv, self.task, scenarios=scenarios)
+        super().__init__([make] * num_envs, autoreset_mode=autoreset_mode)
+        self._teams = cast("list[CoverageEnv]", self.envs)
+        ideal = self.task.conditions is None or self.task.conditions.ideal
+        self._shared: SharedSimulation | None = None
+        if scenarios.only is not None and not scenarios.only.moves and ideal and not self.task.recording:
+            self._shared = SharedSimulation(self.task, scenarios.only, num_envs)
+            for run, env in enumerate(self._teams):
+                env.place = self._shared, run
+
+    def step(self, actions: Any) -> Any:
+        """Let all teams act, and return observations, rewards, terminations, truncations and infos.
+
+        Raises
+        ------
+        ParameterError
+            When the actions are not finite numbers of shape (num_envs, n, 2).
+        """
+        n, together = self.task.robots, []
+        values = np.zeros((self.num_envs, n, 2))
+        begun_now = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        for run, (env, action) in enumerate(zip(self._teams, actions, strict=True)):
+            if not begun_now[run]:
+                values[run] = checked_actions(action, n)
+                if env.episode is not None and env.episode.shared is not None:
+                    together.append(run)
+        if self._shared is not None and together:
+            contact = self._shared.moved(values.reshape(-1, 2)).reshape(-1, n)
+            for run in together:
+                cast("Episode", self._teams[run].episode).contact = contact[run]
+        return super().step(values)
 
 
 gymnasium.register(ID, f"{__name__}:{CoverageEnv.__name__}")

@@ -91,6 +91,12 @@ class Scenarios:
         self._lattice = lattice
         self._costs: OrderedDict[Environment, CoverageCost] = OrderedDict()
 
+    @property
+    def only(self) -> Environment | None:
+        """The map, where there is but one."""
+        source = self._sources[0]
+        return source if len(self._sources) == 1 and isinstance(source, Environment) else None
+
     def draw(self, rng: np.random.Generator) -> Environment:
         """Return one of the maps, each as likely, or a new one of its maker."""
         source = self._sources[int(rng.integers(len(self._sources)))]

@@ -8,13 +8,14 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.vector import AutoresetMode
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError
 from robocov_app import learning
-from robocov_app.learning import CoverageEnv, CoverageParallelEnv, ObservationLayout
+from robocov_app.learning import CoverageEnv, CoverageParallelEnv, CoverageVectorEnv, ObservationLayout
 
 SMALL = {"maps": "square", "robots": 3, "lattice": 8, "duration": 2.0, "dt": 0.05, "repeat": 2}
 ID = "robocov_app.learning.gym:robocov/Coverage-v0"
@@ -138,3 +139,43 @@ def test_a_policy_loads_neither() -> None:
     script += "print({'gymnasium', 'pettingzoo', 'pygame', 'matplotlib'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"reward": "own", "repeat": 1},
+        {"observation": ObservationLayout(1, 6)},
+        {"conditions": Conditions(loss=0.5)},
+    ],
+)
+def test_many_moved_together_are_as_one_at_a_time(mode: AutoresetMode, changes: dict[str, Any]) -> None:
+    """Observations, rewards, ends and infos, bit for bit, over the ends of episodes."""
+    options = {**SMALL, "maps": "rooms", "duration": 0.4, **changes}
+    together = CoverageVectorEnv(3, autoreset_mode=mode, **options)
+    apart = gymnasium.vector.SyncVectorEnv([partial(CoverageEnv, **options)] * 3, autoreset_mode=mode)
+    assert together.action_space == apart.action_space
+    assert together.observation_space == apart.observation_space
+    assert together.metadata == apart.metadata
+    rng = np.random.default_rng(0)
+    answers = [each.reset(seed=5) for each in (together, apart)]
+    for step in range(12):
+        assert data_equivalence(*answers, exact=True)
+        action = rng.normal(scale=20.0, size=(3, 3, 2))
+        answers = [each.step(action) for each in (together, apart)]
+        if mode == AutoresetMode.DISABLED and answers[0][3].any():
+            mask = answers[0][3]
+            answers = [each.reset(options={"reset_mask": mask.copy()}) for each in (together, apart)]
+        if step == 5:
+            other = {"map": "square", "reset_mask": np.array([False, True, False])}
+            answers = [each.reset(seed=9, options=dict(other)) for each in (together, apart)]
+
+
+def test_many_are_asked_for_actions_of_the_right_shape() -> None:
+    several = CoverageVectorEnv(2, **SMALL)
+    with pytest.raises(RobocovError, match="reset"):
+        several.step(np.zeros((2, 3, 2)))
+    several.reset(seed=0)
+    with pytest.raises(ParameterError, match="action of robot_3"):
+        several.step(np.pad(np.zeros((2, 2, 2)), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan))
