@@ -7,6 +7,7 @@ offers ``matplotlib``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol
 
@@ -22,34 +23,20 @@ DEFAULT = "matplotlib"
 class DrawingBackend(Protocol):
     """Who draws.
 
-    What `axes` are is the backend's affair. Where they are given, the functions draw there and return
-    them; where they are None, on a page of their own, and they return that page's. The options are the
-    backend's as well.
+    ``plot_...(thing, axes=None, **options)`` draws an `Environment`, a `Record`, a `CostHistory` or a
+    `CoverageResult` on the axes, and returns them; where they are None, on a page of its own, and returns
+    that page's. What axes and options are is the backend's affair. Notebooks show what ``..._html(thing)``
+    returns, a str, and where there is no HTML ``..._png(thing)``, bytes.
     """
 
-    def plot_environment(self, environment: Any, axes: Any = None, **options: Any) -> Any:
-        """Plot an `Environment`, and return the axes."""
-
-    def plot_record(self, record: Any, axes: Any = None, **options: Any) -> Any:
-        """Plot a `Record`: the map, where the robots began, went and ended; and return the axes."""
-
-    def plot_history(self, history: Any, axes: Any = None, **options: Any) -> Any:
-        """Plot the mean distance of a `CostHistory` against time, and return the axes."""
-
-    def plot_result(self, result: Any, axes: Any = None, **options: Any) -> Any:
-        """Plot the distances of a `CoverageResult` from each place to its robot, and return the axes."""
-
-    def environment_html(self, environment: Any) -> str:
-        """Return what a notebook shows of a map."""
-
-    def environment_png(self, environment: Any) -> bytes:
-        """Return a picture of a map for where there is no HTML."""
-
-    def record_html(self, record: Any) -> str:
-        """Return what a notebook shows of a run: it can be played."""
-
-    def record_png(self, record: Any) -> bytes:
-        """Return a picture of a run for where there is no HTML."""
+    plot_environment: Callable[..., Any]
+    plot_record: Callable[..., Any]
+    plot_history: Callable[..., Any]
+    plot_result: Callable[..., Any]
+    environment_html: Callable[[Any], str]
+    environment_png: Callable[[Any], bytes]
+    record_html: Callable[[Any], str]
+    record_png: Callable[[Any], bytes]
 
 
 class Drawable:

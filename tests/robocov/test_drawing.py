@@ -64,7 +64,7 @@ def record(empty: Environment) -> Record:
 def test_the_application_is_installed_as_the_backend() -> None:
     assert drawing_backend().__name__ == "robocov_app.drawing_backend"  # type: ignore[attr-defined]
     assert drawing_backend("matplotlib") is drawing_backend()
-    wanted = [name for name in vars(drawing.DrawingBackend) if not name.startswith("_")]
+    wanted = list(drawing.DrawingBackend.__annotations__)
     assert len(wanted) == 8
     assert all(callable(getattr(drawing_backend(), name)) for name in wanted)
 

@@ -81,10 +81,7 @@ class Start:
         if isinstance(self.spec, PointsStart):
             return self._given(n, radius, self.spec.positions)
         spacing = 2.0 * radius * (1.0 + GAP)
-        room = self.free.buffer(-radius * (1.0 + GAP))
-        if isinstance(self.spec, DiscStart):
-            # the disc holds the centres; robots may stick out of it by their radius
-            room = room.intersection(shapely.Point(self.spec.center).buffer(self.spec.radius, quad_segs=64))
+        room = self.room(radius)
         if room.is_empty:
             raise self._error(f"no room for a robot of radius {radius:g} m; a wider start was wanted")
         rng = np.random.default_rng([seed, n])
@@ -102,6 +99,14 @@ class Start:
                 f"fewer robots or a wider start was wanted"
             )
         return points
+
+    def room(self, radius: float) -> BaseGeometry:
+        """Return where the centre of a robot of that radius may be, unless positions are given."""
+        room = self.free.buffer(-radius * (1.0 + GAP))
+        if isinstance(self.spec, DiscStart):
+            # the disc holds the centres; robots may stick out of it by their radius
+            room = room.intersection(shapely.Point(self.spec.center).buffer(self.spec.radius, quad_segs=64))
+        return room
 
     def _error(self, what: str) -> StartError:
         return StartError(f"start {self.name!r}: {what}")

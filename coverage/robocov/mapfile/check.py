@@ -235,9 +235,7 @@ def _start_report(environment: Environment, name: str, radius: float) -> StartRe
     spec = environment.starts[name]
     if isinstance(spec, PointsStart):
         return StartReport(name, "points", len(spec.positions))
-    room, kind = environment.free.buffer(-radius * (1 + GAP)), "uniform"
-    if isinstance(spec, DiscStart):
-        room, kind = room.intersection(shapely.Point(spec.center).buffer(spec.radius, quad_segs=64)), "disc"
     # robots in the densest packing, a hexagonal one
     cell = 2 * math.sqrt(3) * (radius * (1 + GAP)) ** 2
-    return StartReport(name, kind, max(1, int(room.area / cell)))
+    capacity = max(1, int(environment.start(name).room(radius).area / cell))
+    return StartReport(name, "disc" if isinstance(spec, DiscStart) else "uniform", capacity)

@@ -52,8 +52,8 @@ def check_rules(environment: Environment, where: str) -> None:
 def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     """Yield what is wrong with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
-    extent = np.ptp(points, axis=0)
-    count = len(np.unique(points, axis=0))
+    extent = points.max(axis=0) - points.min(axis=0)
+    count = len(set(map(tuple, ring)))
     if count < 3:
         what = f"{count} different point{'s' if count > 1 else ''}, but at least 3 were wanted"
         yield Mistake.at(at, what)
@@ -65,8 +65,10 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
         yield Mistake.at(at, f"{_size(extent)}, but at least {SMALLEST * 1000:g} mm each way was wanted")
         return
     polygon = Polygon(points)
-    # a ring that crosses itself may have no area either
     flat = _FLAT * float(extent.max()) ** 2
+    if polygon.is_valid and polygon.area > flat:
+        return
+    # a ring that crosses itself may have no area either
     if shapely.convex_hull(polygon).area <= flat:
         what = f"area {polygon.area:g} m², but points that are not on one line were wanted"
         yield Mistake.at(at, what)
