@@ -67,47 +67,25 @@ class RestTracker:
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
-    """What one robot remembers. Immutable.
-
-    Attributes
-    ----------
-    known : DiscoveredMap
-    due, since : float, s
-        When it plans next; when it began, or the robots that it hears became others.
-    tracker : RestTracker
-    planned, ways, table : DiscoveredMap, Ways and Table, or None
-        The map when the last plan was made, and what was computed of it.
-    situation, group : (k, 2) m and (k,), or None
-        Where the robots were at the last plan, this one first, and who they were.
-    quiet : bool
-        Whether all others rested then.
-    places : (k, 3) or None
-        Where they were to be: number, x, y.
-    own, node : (2,) m or None, int
-        Its own place in the plan, and the node there.
-    look, former, looked : (2,) m or None, places, float in s
-        Where it goes first, to look around; from where it has; for how long.
-    idle : bool
-        Whether the next plan may be left out where nothing has changed.
-    """
+    """What one robot remembers. Immutable."""
 
     known: DiscoveredMap
-    due: float
+    due: float  # when it plans next, s
     tracker: RestTracker
-    since: float = 0.0
-    ways: Ways | None = None
+    since: float = 0.0  # when it began, or the robots that it hears became others, s
+    planned: DiscoveredMap | None = None  # the map when the last plan was made,
+    ways: Ways | None = None  # and what was computed of it
     table: Table | None = None
-    planned: DiscoveredMap | None = None
-    situation: Array | None = None
-    group: IntArray | None = None
-    quiet: bool = False
-    places: Array | None = None
-    own: Array | None = None
-    node: int = -1
-    look: Array | None = None
-    former: tuple[Array, ...] = ()
-    looked: float = 0.0
-    idle: bool = False
+    situation: Array | None = None  # (k, 2) m, where the robots were at the last plan, this one first,
+    group: IntArray | None = None  # (k,), who they were,
+    quiet: bool = False  # whether all others rested then,
+    places: Array | None = None  # (k, 3), and where they were to be: number, x, y
+    own: Array | None = None  # (2,) m, its own place in the plan,
+    node: int = -1  # and the node there
+    look: Array | None = None  # (2,) m, where it goes first, to look around,
+    former: tuple[Array, ...] = ()  # from where it has,
+    looked: float = 0.0  # and for how long, s
+    idle: bool = False  # whether the next plan may be left out where nothing has changed
 
     def __deepcopy__(self, memo: object) -> PlannerState:
         return self
@@ -115,26 +93,13 @@ class PlannerState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtlasMemory:
-    """What the robots remember.
+    """What the robots remember."""
 
-    Attributes
-    ----------
-    team : Team
-        A robot knows its own limits.
-    states : tuple of PlannerState, one for each robot
-    routes : tuple of (w, 2) m
-        The way-points, the last one the goal.
-    legs : (n,)
-        The way-point that is headed for.
-    returns : (n, rays, 2) m or None
-        What the last scan of each met.
-    """
-
-    team: Team
-    states: tuple[PlannerState, ...]
-    routes: tuple[Array, ...]
-    legs: IntArray
-    returns: Array | None = None
+    team: Team  # a robot knows its own limits
+    states: tuple[PlannerState, ...]  # one for each robot
+    routes: tuple[Array, ...]  # the way-points of each, (w, 2) m, the last one the goal
+    legs: IntArray  # (n,), the way-point that is headed for
+    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:

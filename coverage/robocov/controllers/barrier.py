@@ -25,14 +25,11 @@ _TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """Where, (m, 2) m, and when, s, robots heard those to be that were near.
+    """Where robots heard those to be that were near."""
 
-    The (m,) pairs are ``robot * n + neighbour``, ascending.
-    """
-
-    time: float
-    pair: IntArray
-    positions: Array
+    time: float  # s
+    pair: IntArray  # (m,), robot * n + neighbour, ascending
+    positions: Array  # (m, 2) m, of the neighbour
 
 
 @dataclass(frozen=True, slots=True, eq=False)

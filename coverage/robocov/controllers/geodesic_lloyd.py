@@ -27,16 +27,13 @@ _SIMPLER = 0.005  # metres by which the walls of the room may be simplified: eve
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeodesicMemory:
-    """What the robots remember of the last planning, and when, s, it was.
-
-    Their goals and the first way-points to them, (n, 2) m, and the lengths of the ways from there, (n,) m.
-    """
+    """What the robots remember of the last planning."""
 
     team: Team
-    goals: Array | None = None
-    way: Array | None = None
-    beyond: Array | None = None
-    planned: float = -np.inf
+    goals: Array | None = None  # (n, 2) m
+    way: Array | None = None  # (n, 2) m, the first way-points to them
+    beyond: Array | None = None  # (n,) m, lengths of the ways from there
+    planned: float = -np.inf  # s
 
 
 @dataclass(frozen=True)

@@ -43,41 +43,20 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bug:
-    """What one robot remembers of its way.
-
-    Attributes
-    ----------
-    mode : Mode
-    turn : {1, -1}
-        Which way round it looks for the end of what blocks it: counter-clockwise or clockwise.
-    way : (2,) m
-        Where it is heading now; when it is `passing` it goes on from there, and need not slow down.
-    aim : (2,) m or None
-        The goal that it keeps, since it met something on the way there; None while its goal moves.
-    best : (2,) m or None
-        Of all boundaries followed for that goal, and all places left for, the point nearest to it.
-    entered, last : (2,) m or None
-        Where it met the boundary that it follows, and where it was when it looked last.
-    followed, patience : float, m
-        Length of its way along that boundary, and the longest that it goes.
-    resting : (2,) m or None
-        The moving goal when it came to rest at `best`.
-    tries : int
-        How many goals it has kept so far.
-    """
+    """What one robot remembers of its way; places are (2,) m."""
 
     mode: Mode
-    turn: int
-    way: Array
-    passing: bool = False
-    aim: Array | None = None
-    best: Array | None = None
-    entered: Array | None = None
-    last: Array | None = None
-    followed: float = 0.0
-    patience: float = math.inf
-    resting: Array | None = None
-    tries: int = 0
+    turn: int  # round which way it looks for the end of what blocks it: 1 counter-clockwise, -1 clockwise
+    way: Array  # where it is heading now
+    passing: bool = False  # whether it goes on from there, and need not slow down
+    aim: Array | None = None  # the goal that it keeps since it met something; None while it moves
+    best: Array | None = None  # of all boundaries followed, and places left for, the nearest to it
+    entered: Array | None = None  # where it met the boundary that it follows
+    last: Array | None = None  # where it was when it looked last
+    followed: float = 0.0  # length of its way along that boundary, m
+    patience: float = math.inf  # the longest that it goes along one, m
+    resting: Array | None = None  # the moving goal when it came to rest at `best`
+    tries: int = 0  # how many goals it has kept so far
 
     def before(self, position: Array, goal: Array, moved: float) -> Bug:
         """Return the bug without the goal that it keeps, when that is done with and there is another one.
@@ -96,15 +75,12 @@ class Bug:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TangentBugMemory:
-    """What the robots remember: themselves, for each the bug, what the last scan met, and squares met so far.
+    """What the robots remember."""
 
-    These are (w,) numbers, column + i row, ascending.
-    """
-
-    team: Team
+    team: Team  # a robot knows its own body and limits
     bugs: tuple[Bug, ...] = ()
-    returns: Array | None = None
-    met: tuple[ComplexArray, ...] = ()
+    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
+    met: tuple[ComplexArray, ...] = ()  # (w,) squares in which each has met something: column + i row
     triangulation: Mesh | None = None
 
 
@@ -233,33 +209,17 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one robot sees in one scan.
-
-    Attributes
-    ----------
-    law : TangentBug
-    position : (2,) m
-    goal : (2,) m
-        From the robot.
-    points : (m, 2) m
-        Obstacle points, from the robot; nan where a ray met nothing.
-    walls : (w, 2) m
-        All that it has met so far, from the robot, to within `_GRAIN`.
-    directions, free : (k, 2), (k,) m
-        Unit vectors evenly round a full turn, and how far the robot can go straight on along each.
-    keep, reach : float, m
-        Distance that its centre keeps from obstacles, and range of its sensor.
-    """
+    """What one robot sees in one scan: all places and distances are from it, in m."""
 
     law: TangentBug
-    position: Array
-    goal: Array
-    points: Array
-    walls: Array
-    directions: Array
-    free: Array
-    keep: float
-    reach: float
+    position: Array  # (2,), its own
+    goal: Array  # (2,)
+    points: Array  # (m, 2) obstacle points; nan where a ray met nothing
+    walls: Array  # (w, 2), all that it has met so far, to within `_GRAIN`
+    directions: Array  # (k, 2) unit vectors evenly round a full turn
+    free: Array  # (k,), how far the robot can go straight on along each
+    keep: float  # distance that its centre keeps from obstacles
+    reach: float  # range of its sensor
 
     def next(self, bug: Bug) -> Bug:
         """Return what the robot does from now on."""
@@ -292,7 +252,7 @@ class Look:
 
     def _ends(self, towards: Array) -> dict[int, Gap]:
         """Return the ends of the contour that blocks the view in a direction, by the turn to them."""
-        first, at = int((self.directions @ towards).argmax()), self._towards(towards)
+        first, at = int((self.directions * towards).sum(axis=1).argmax()), self._towards(towards)
         found = {}
         for turn in (1, -1):
             end = end_of_contour(self.free, self.directions, first, turn, at, self.law.jump, self.reach)
@@ -302,11 +262,16 @@ class Look:
 
     def _to_goal(self, bug: Bug) -> Bug:
         ends = self._ends(self.goal)
-        by_way_of = {turn: _length(end.point) + _length(self.goal - end.point) for turn, end in ends.items()}
-        # of two that are about as good, the one that it was going to
-        by_way_of = {turn: far - (_BETTER if turn == bug.turn else 0.0) for turn, far in by_way_of.items()}
+        distance, left = (
+            _length(self.goal),
+            {turn: math.dist(self.goal, end.point) for turn, end in ends.items()},
+        )
+        by_way_of = {turn: _length(end.point) + left[turn] for turn, end in ends.items()}
+        if bug.turn in ends:
+            # of two that are about as good, the one that it was going to
+            by_way_of[bug.turn] -= _BETTER
         distance = _length(self.goal)
-        nearer = [turn for turn, end in ends.items() if _length(self.goal - end.point) < distance]
+        nearer = [turn for turn in ends if left[turn] < distance]
         if nearer:
             turn = min(nearer, key=lambda turn: by_way_of[turn])
             way = self.position + ends[turn].point
@@ -339,7 +304,7 @@ class Look:
             lost = bug.followed > 3.0 * bug.patience
             return self._at_best(replace(bug, best=frozen(self.position)) if lost else bug)
         # every ray where it is nearest to the goal
-        along = np.clip(self.directions @ self.goal, 0.0, self.free)
+        along = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free)
         left = np.hypot(*(self.goal - along[:, None] * self.directions).T)
         ray = int(left.argmin())
         if left[ray] < _length(self.position + self.goal - best) - _BETTER:
@@ -362,7 +327,7 @@ class Look:
             seen[(ends[-1].ray + 1 + np.arange(span)) % len(seen)] = True
         places = self.free[seen, None] * self.directions[seen]
         known = np.zeros(2) if bug.best is None else bug.best - self.position
-        places = np.concatenate([known[None], places])
+        places = np.vstack([known, places])
         return frozen(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
 
     def _at_best(self, bug: Bug) -> Bug:

@@ -137,11 +137,11 @@ def _best_view(
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Distances from some nodes, (c,), among which a plan for a team chooses, to all, (c, m) m."""
+    """Distances from some nodes, among which a plan for a team chooses, to all."""
 
     ways: Ways
-    sources: IntArray
-    distance: Array
+    sources: IntArray  # (c,)
+    distance: Array  # (c, m) m
 
     def __deepcopy__(self, memo: object) -> Table:
         return self
@@ -221,16 +221,12 @@ def team_places(
 
 @dataclass(frozen=True, eq=False)
 class OwnPlace:
-    """The best place for one robot, the others being where they are.
+    """The best place for one robot, the others being where they are."""
 
-    The goal is (2,) m, the node is nearest to it; `mine`, (m,) m, holds the distances from there to the nodes
-    that are nearer to it than to any other robot, 0 for the others. The cost J is in cells times metres.
-    """
-
-    goal: Array
-    node: int
-    mine: Array
-    cost: float
+    goal: Array  # (2,) m
+    node: int  # nearest to it
+    mine: Array  # (m,) m, distances from there to the nodes of the robot's own cell, 0 for the others
+    cost: float  # J, in cells times metres
 
 
 def own_place(
