@@ -2,28 +2,6 @@
 
 from __future__ import annotations
 
-from robocov.locational.cost import (
-    CellSides,
-    Distance,
-    OverEdge,
-    Performance,
-    Seen,
-    Sensing,
-    SquaredDistance,
-    gradient,
-    hessian,
-    value,
-)
+from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, gradient, hessian, value
 
-__all__ = [
-    "CellSides",
-    "Distance",
-    "OverEdge",
-    "Performance",
-    "Seen",
-    "Sensing",
-    "SquaredDistance",
-    "gradient",
-    "hessian",
-    "value",
-]
+__all__ = ["Distance", "Performance", "Sensing", "SquaredDistance", "gradient", "hessian", "value"]

@@ -5,28 +5,33 @@ optimum: f is (-1/2)-concave, and in the plane the integral of such a function o
 quasi-concave (Borell; Brascamp and Lieb). Along any line the cost therefore falls, and then rises. So where
 it still falls at the end of a step, the step has not gone too far. That is all that is asked of a step,
 beside that it stays in the cell; no difference of two costs is ever formed, which would cancel.
+
+With a density φ that varies, derivatives are by quadrature. A cell is taken apart into the triangles that the
+point itself spans with the edges. In the coordinates q = p + u (e(t) - p), where e(t) runs along an edge,
+distance and direction from p are smooth, so that Gauss's rule converges quickly where φ is smooth; where it
+jumps within a cell, the error is of the order of the distance of the nodes.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.locational.cost import CellSides
+from robocov.arrays import Array, BoolArray
+from robocov.compiled import inner_kernel, kernel
+from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, derivatives
+from robocov.observation.cells import Cells
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov.arrays import Array, BoolArray
-    from robocov.locational.cost import Performance, Seen
-    from robocov.voronoi import VoronoiPartition
-    from robocov.voronoi.weighted_cells import WeightedCells
+    from robocov.density import Density
 
-_NEAR = 1e-7
+_NEAR, _WEIGHED_NEAR = 1e-7, 1e-6
 """A Newton step so short, relative to the cell's size, is the last: the next would be its square."""
 
-_ROUNDS = 80
+_ROUNDS, _WEIGHED_ROUNDS = 80, 30
 """Evaluations after which a cell has what it has: most need 4, hairs below a low sensor some dozens."""
 
 _FLATTEST = 1e-14
@@ -38,14 +43,20 @@ _FLAT = 1e-9
 _NOTHING = 1e-15
 """A step so short, relative to the cell's size, changes nothing."""
 
+_EMPTY = 1e-12
+"""φ so small, relative to its highest value, all over a cell is nothing: its centroid is as good a point."""
+
 _RISE = 0.5
 """Where the cost rises again at the end of a step, it may rise so many times as fast as it fell."""
 
 _LEAST, _MOST = 0.1, 0.5
 """Of a step that went too far, so much is tried next."""
 
+_ALONG, _OUTWARD = 16, 12
+"""Nodes along an edge, and from the point to it."""
 
-def best_points(cells: VoronoiPartition | WeightedCells, f: Performance, start: Array | None = None) -> Array:
+
+def best_points(cells: Cells, f: Performance, start: Array | None = None) -> Array:
     """Return the points where ∫ f(|q-p|) dq over each cell is best, (n, 2) m.
 
     A convex cell's lies in it, and is its only optimum. Of a cell that is not convex, as those of robots of
@@ -54,7 +65,7 @@ def best_points(cells: VoronoiPartition | WeightedCells, f: Performance, start: 
 
     Parameters
     ----------
-    cells : VoronoiPartition or WeightedCells
+    cells : Cells
     f : Performance
     start : (n, 2) m or None
         Where the search begins, within the cells; None: at the centroids.
@@ -62,133 +73,173 @@ def best_points(cells: VoronoiPartition | WeightedCells, f: Performance, start: 
     Examples
     --------
     >>> from robocov import Region, partition
-    >>> from robocov.locational.cost import Distance
     >>> triangle = Region(np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]))
     >>> best_points(partition(np.array([[1.0, 0.5]]), triangle), Distance()).round(4)
     array([[0.9733, 0.9733]])
     """
     start = (cells.centroid if start is None else start) - cells.generators
-    sides = CellSides(cells.edges, len(start))
+    room, size, area = derivatives(cells.edges, start, SquaredDistance())[:, 5:].T
+    searching = (room > 0.0) | (area > _FLAT * np.square(size))
 
-    def slopes(x: Array, y: Array, seen: Seen, wanted: BoolArray) -> Slopes:
-        over = f.over_edges(seen)
-        return Slopes(*(f.sign * each for each in (*sides.gradient(over), *sides.hessian(over))))
+    def slopes(points: Array, wanted: BoolArray) -> Array:
+        return derivatives(cells.edges, points, f)
 
-    return np.asarray(cells.generators + newton(sides, slopes, start))
-
-
-class Slopes(NamedTuple):
-    """Gradient and Hessian of what is to be small, (n,) each."""
-
-    x: Array
-    y: Array
-    xx: Array
-    xy: Array
-    yy: Array
+    return cells.generators + _newton(slopes, start, searching, f.sign, _NEAR, _ROUNDS)
 
 
-def newton(
-    sides: CellSides,
-    slopes: Callable[[Array, Array, Seen, BoolArray], Slopes],
+def weighed_best_points(cells: Cells, density: Density, f: Distance | Sensing) -> Array:
+    """Return the points where ∫ f(|q-p|) φ(q) dq over each cell is best, (n, 2) m.
+
+    From the centroid by φ on: of f = r and a convex cell it is the best of all, of f = 1/(r²+h²) the one
+    that lies downhill from there. A cell that is not convex, or in which φ is nothing, keeps its centroid.
+
+    Parameters
+    ----------
+    cells : Cells
+        With the density.
+    density : Density
+    f : Distance or Sensing
+    """
+    start = cells.centroid - cells.generators
+    room, size, area = derivatives(cells.edges, start, SquaredDistance())[:, 5:].T
+    searching = (room > 1e-9 * size) & (cells.mass > _EMPTY * density.highest * area)
+
+    def slopes(points: Array, wanted: BoolArray) -> Array:
+        found = derivatives(cells.edges, points, SquaredDistance())
+        found[:, :5] = _weighed_slopes(cells, density, f, size, points, wanted)
+        return found
+
+    return cells.generators + _newton(slopes, start, searching, 1.0, _WEIGHED_NEAR, _WEIGHED_ROUNDS)
+
+
+def _newton(
+    slopes: Callable[[Array, BoolArray], Array],
     start: Array,
-    searching: BoolArray | None = None,
-    near: float = _NEAR,
-    rounds: int = _ROUNDS,
+    searching: BoolArray,
+    sign: float,
+    near: float,
+    rounds: int,
 ) -> Array:
     """Return where Newton's method, safeguarded, ends in each cell, (n, 2) m relative to the generators.
 
     Parameters
     ----------
-    sides : CellSides
     slopes : callable
-        Of x and y, (n,) m, the edges as seen from there, and for which cells they are wanted.
+        Of points (n, 2) m, and for which cells they are wanted: what `derivatives` returns.
     start : (n, 2) m
-    searching : (n,) or None
-        In which cells; None: in all that are more than rounding.
-    near : float
-        A step so short, relative to the cell's size, is the last.
-    rounds : int
-        Evaluations after which a cell has what it has.
+    searching : (n,)
+        In which cells.
+    sign, near, rounds
+        Of f, and when a search ends.
     """
-    x, y = start[:, 0].copy(), start[:, 1].copy()
-    seen = sides.seen_from(x, y)
-    room = sides.room(seen)
-    confined = room > 0.0
-    if searching is None:
-        searching = confined | (sides.area > _FLAT * np.square(sides.size))
-    if not searching.any():
-        return start
-    room = np.where(confined, room, np.inf)
-    go_x, go_y, fall = _newton_steps(slopes(x, y, seen, searching), sides.size)
-    part = np.ones(len(x))
-    for _ in range(rounds):
-        step_x, step_y = part * go_x, part * go_y
-        length = np.sqrt(step_x * step_x + step_y * step_y)
-        last = searching & (length <= np.minimum(near * sides.size, room))
-        x[last] += step_x[last]
-        y[last] += step_y[last]
-        searching = searching & ~last & (length > _NOTHING * sides.size)
+    points, there = start.copy(), start.copy()
+    # room, step in full, slope along it, part of it that is tried
+    state = np.full((len(start), 5), np.nan)
+    for _ in range(rounds + 1):
         if not searching.any():
             break
-        there_x, there_y = np.where(searching, x + step_x, x), np.where(searching, y + step_y, y)
-        seen = sides.seen_from(there_x, there_y)
-        room_there = np.where(confined, sides.room(seen), np.inf)
-        inside = room_there >= 0.0
-        there = slopes(there_x, there_y, seen, searching & inside)
-        slope = there.x * go_x + there.y * go_y
-        taken = searching & inside & (slope <= -_RISE * fall)
-        # where the line through both slopes is level, but neither too near nor too far
-        level = np.clip(fall / np.minimum(fall - slope, -1e-300), _LEAST, _MOST)
-        part = np.where(taken, 1.0, part * np.where(inside, level, _MOST))
-        if taken.any():
-            next_x, next_y, next_fall = _newton_steps(there, sides.size)
-            x, y = np.where(taken, there_x, x), np.where(taken, there_y, y)
-            go_x, go_y = np.where(taken, next_x, go_x), np.where(taken, next_y, go_y)
-            fall, room = np.where(taken, next_fall, fall), np.where(taken, room_there, room)
-    return np.column_stack([x, y])
+        _advance(points, there, searching, state, slopes(there, searching), sign, near)
+    return points
 
 
-def _newton_steps(slopes: Slopes, size: Array) -> tuple[Array, Array, Array]:
-    """Return Newton's steps x and y, (n,) m, and how fast the cost falls along them: its slope, negative.
+@kernel
+def _advance(
+    points: Array, there: Array, searching: BoolArray, state: Array, slopes: Array, sign: float, near: float
+) -> None:
+    """Take the step to `there`, or a shorter one, by the slopes there; and propose the next."""
+    for i in range(len(points)):
+        if not searching[i]:
+            continue
+        gx, gy, room, size = sign * slopes[i, 0], sign * slopes[i, 1], slopes[i, 5], slopes[i, 6]
+        fresh = np.isnan(state[i, 4])
+        if (fresh and room <= 0.0) or state[i, 0] == np.inf:
+            room = np.inf  # a cell that is not convex confines nothing
+        fall, slope = state[i, 3], gx * state[i, 1] + gy * state[i, 2]
+        if fresh or (room >= 0.0 and slope <= -_RISE * fall):
+            points[i, 0], points[i, 1] = there[i, 0], there[i, 1]
+            go_x, go_y = _newton_step(
+                gx, gy, sign * slopes[i, 2], sign * slopes[i, 3], sign * slopes[i, 4], size
+            )
+            state[i, 0], state[i, 1], state[i, 2] = room, go_x, go_y
+            state[i, 3], state[i, 4] = gx * go_x + gy * go_y, 1.0
+        else:
+            # where the line through both slopes is level, but neither too near nor too far
+            level = min(max(fall / min(fall - slope, -1e-300), _LEAST), _MOST)
+            state[i, 4] *= level if room >= 0.0 else _MOST
+        x, y = state[i, 4] * state[i, 1], state[i, 4] * state[i, 2]
+        length = np.sqrt(x * x + y * y)
+        there[i, 0], there[i, 1] = points[i, 0] + x, points[i, 1] + y
+        if length <= min(near * size, state[i, 0]):
+            points[i, 0], points[i, 1], searching[i] = there[i, 0], there[i, 1], False
+        elif not length > _NOTHING * size:
+            searching[i] = False
 
-    No step is longer than half the cell's perimeter.
-    """
-    slope_x, slope_y, xx, xy, yy = slopes
+
+@inner_kernel
+def _newton_step(gx: float, gy: float, xx: float, xy: float, yy: float, size: float) -> tuple[float, float]:
+    """Return Newton's step, or one that goes down where the Hessian is no bowl; at most as long as `size`."""
     trace, determinant = xx + yy, xx * yy - xy * xy
-    bowl = (trace > 0.0) & (determinant > _FLATTEST * trace * trace)
-    if bowl.all():
-        go_x, go_y = xy * slope_y - yy * slope_x, xy * slope_x - xx * slope_y
-        go_x, go_y = go_x / determinant, go_y / determinant
+    if trace > 0.0 and determinant > _FLATTEST * trace * trace:
+        x, y = (xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant
     else:
-        safe = np.where(bowl, determinant, 1.0)
-        otherwise = _downhill(slope_x, slope_y, xx, xy, yy)
-        go_x = np.where(bowl, (xy * slope_y - yy * slope_x) / safe, otherwise[0])
-        go_y = np.where(bowl, (xy * slope_x - xx * slope_y) / safe, otherwise[1])
-    length = np.sqrt(go_x * go_x + go_y * go_y)
-    part = size / np.maximum(np.maximum(length, size), 1e-300)
-    go_x, go_y = go_x * part, go_y * part
-    return go_x, go_y, slope_x * go_x + slope_y * go_y
+        x, y = _downhill(gx, gy, xx, xy, yy)
+    part = size / max(np.sqrt(x * x + y * y), size, 1e-300)
+    return x * part, y * part
 
 
-def _downhill(slope_x: Array, slope_y: Array, xx: Array, xy: Array, yy: Array) -> tuple[Array, Array]:
-    """Return steps as Newton's, but with the sizes of the Hessian's eigenvalues: they go down in any case."""
+@inner_kernel
+def _downhill(gx: float, gy: float, xx: float, xy: float, yy: float) -> tuple[float, float]:
+    """Return a step as Newton's, but with the sizes of the Hessian's eigenvalues: it always goes down."""
     mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
-    radius = np.sqrt(half * half + xy * xy)
+    radius, sign = np.sqrt(half * half + xy * xy), -1.0 if mean < 0.0 else 1.0
     # the eigenvalue of the greater size; the other by the determinant, as a difference would cancel
-    great = mean + np.copysign(radius, mean)
-    safe = np.where(great == 0.0, 1.0, great)
-    small = (xx * yy - xy * xy) / safe
+    great = mean + sign * radius
+    greatest = abs(great) if great != 0.0 else 1.0
+    small = (xx * yy - xy * xy) / (great if great != 0.0 else 1.0)
     # along its eigenvector, of which of two forms the longer is taken
-    turned = np.copysign(half, half * mean)
-    upper = turned >= 0.0
-    axis_x = np.where(upper, radius + turned, np.copysign(1.0, mean) * xy)
-    axis_y = np.where(upper, np.copysign(1.0, mean) * xy, radius - turned)
-    size = np.sqrt(axis_x * axis_x + axis_y * axis_y)
-    round_ = size == 0.0
-    axis_x, axis_y = np.where(round_, 1.0, axis_x), np.where(round_, 0.0, axis_y)
-    size = np.where(round_, 1.0, size)
-    axis_x, axis_y = axis_x / size, axis_y / size
-    greatest = np.abs(safe)
-    along = -(slope_x * axis_x + slope_y * axis_y) / greatest
-    across = -(slope_y * axis_x - slope_x * axis_y) / np.maximum(np.abs(small), _FLATTEST * greatest)
-    return along * axis_x - across * axis_y, along * axis_y + across * axis_x
+    turned = sign * half
+    x, y = (radius + turned, sign * xy) if turned >= 0.0 else (sign * xy, radius - turned)
+    size = np.sqrt(x * x + y * y)
+    x, y = (x / size, y / size) if size > 0.0 else (1.0, 0.0)
+    along = -(gx * x + gy * y) / greatest
+    across = -(gy * x - gx * y) / max(abs(small), _FLATTEST * greatest)
+    return along * x - across * y, along * y + across * x
+
+
+def _weighed_slopes(
+    cells: Cells, density: Density, f: Distance | Sensing, size: Array, points: Array, wanted: BoolArray
+) -> Array:
+    """Return the derivatives of what is to be small by quadrature, (n, 5), zero where not wanted."""
+    edges = cells.edges
+    some = np.flatnonzero(wanted[edges.cell])
+    cell = edges.cell[some]
+    nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
+    t, t_weights = 0.5 * (nodes + 1.0), 0.5 * weights
+    nodes, weights = np.polynomial.legendre.leggauss(_OUTWARD)
+    u, u_weights = np.tile(0.5 * (nodes + 1.0), (len(size), 1)), np.tile(0.5 * weights, (len(size), 1))
+    if isinstance(f, Sensing):
+        # as close to the point as f is steep
+        bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
+        u, u_weights = (
+            np.sinh(bend * u) / np.sinh(bend),
+            u_weights * bend * np.cosh(bend * u) / np.sinh(bend),
+        )
+    u, u_weights = u[cell][:, None, :], (u * u_weights)[cell][:, None, :]
+    # (edges, along, outward, 2)
+    start, end = edges.start[some] - points[cell], edges.end[some] - points[cell]
+    rim = start[:, None] + (end - start)[:, None] * t[:, None]
+    off = rim[:, :, None, :] * u[..., None]
+    double = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
+    weight = double[:, None, None] * t_weights[:, None] * u_weights
+    places = off + (cells.generators + points)[cell][:, None, None]
+    weight = weight * density.value(places.reshape(-1, 2)).reshape(weight.shape)
+    dx, dy = off[..., 0], off[..., 1]
+    square = dx * dx + dy * dy
+    if isinstance(f, Sensing):
+        low = 1.0 / (square + f.height**2)
+        first, second = 2.0 * weight * low * low, -8.0 * weight * low * low * low
+    else:
+        inverse = 1.0 / np.sqrt(np.maximum(square, 1e-300))
+        first, second = weight * inverse, -weight * inverse * inverse * inverse
+    parts = -first * dx, -first * dy, first + second * dx * dx, second * dx * dy, first + second * dy * dy
+    return np.column_stack([np.bincount(cell, part.sum(axis=(1, 2)), len(points)) for part in parts])

@@ -10,18 +10,19 @@ atan(s₂/w) - atan(s₁/w): equations (15)-(20) of the paper, without its case 
 second integral of (18), which is printed with the wrong sign but adds up to nothing round a cell. The value
 of the integral itself is a sum over the triangles that p spans with the edges. p may lie anywhere.
 
-What is summed over a cell's edges is summed in their order, and nothing else of other cells comes near it:
-a cell's row does not depend on the others, to the last bit.
+What is summed over a cell's edges is summed in their order: a cell's row does not depend on the others, to
+the last bit.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.compiled import inlined_kernel, inner_kernel, kernel
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, shown
 
@@ -31,51 +32,12 @@ _PANEL = 2.0
 """Length of a panel of the quadrature in τ, where s = w sinh τ: the integrand is analytic for |Im τ| < π/2,
 and 16 nodes leave less than a rounding error."""
 
-_ARCTAN_SERIES = tuple((-1.0) ** k / (2 * k + 3) for k in range(15))
-"""Of (x - atan x)/x³ in powers of x²."""
+_SQUARES, _DISTANCES = 0, 1
 
 
-class Seen(NamedTuple):
-    """The edges of cells as seen from one point a cell.
-
-    Attributes
-    ----------
-    distance : (s,) m
-        d, from the point to the edge's line along its outward normal: negative where the point is beyond it.
-    first, last : (s,) m
-        s₁ and s₂: the ends along the edge, from the foot of the perpendicular.
-    near, far : (s,) m
-        Distances to the two ends.
-    size : (s,) m
-        Half of the cell's perimeter, which is at least its diameter: the same for all edges of a cell.
-    """
-
-    distance: Array
-    first: Array
-    last: Array
-    near: Array
-    far: Array
-    size: Array
-
-
-class OverEdge(NamedTuple):
-    """Integrals over edges, (s,) each.
-
-    Attributes
-    ----------
-    value
-        ∫ f ds.
-    along, across
-        ∫ f'(r)/r s ds and ∫ f'(r)/r d ds: how ∫ f ds changes as the point moves.
-    """
-
-    value: Array
-    along: Array
-    across: Array
-
-
-class Performance(Protocol):
-    """A function f of the distance, of which (4) is the integral over the cells.
+@dataclass(frozen=True)
+class SquaredDistance:
+    """f = r², equation (12): mean intervention by squares; its optimum is the centroid, (13). In m².
 
     Attributes
     ----------
@@ -83,64 +45,26 @@ class Performance(Protocol):
         1 where f increases, and the cost is to be small; -1 where f decreases, and it is to be large.
     """
 
-    sign: ClassVar[float]
-
-    def __call__(self, distance: Array) -> Array:
-        """Return f(r) at distances, m."""
-
-    def over_edges(self, seen: Seen) -> OverEdge:
-        """Return the integrals over the edges.
-
-        A constant that is the same for all edges of a cell may be left out of f: round the cell it is 0.
-        """
-
-    def over_triangles(self, seen: Seen) -> Array:
-        """Return ∫ f over the triangles that the points span with the edges, (s,), signed as the distance."""
-
-
-@dataclass(frozen=True)
-class SquaredDistance:
-    """f = r², equation (12): mean intervention by squares; its optimum is the centroid, (13). In m²."""
-
+    kind: ClassVar[int] = _SQUARES
     sign: ClassVar[float] = 1.0
+    height: ClassVar[float] = 1.0
 
     def __call__(self, distance: Array) -> Array:
         """Return f(r), m²."""
         return np.square(distance)
-
-    def over_edges(self, seen: Seen) -> OverEdge:
-        """Return the integrals over edges: m³, m² and m²."""
-        d, s, e = seen.distance, seen.first, seen.last
-        length = e - s
-        value = length * ((s * s + s * e + e * e) / 3.0 + d * d)
-        return OverEdge(value, length * (e + s), 2.0 * d * length)
-
-    def over_triangles(self, seen: Seen) -> Array:
-        """Return the integrals over triangles, m⁴."""
-        d, s, e = seen.distance, seen.first, seen.last
-        return d * (e - s) * (3.0 * d * d + s * s + s * e + e * e) / 12.0
 
 
 @dataclass(frozen=True)
 class Distance:
     """f = r: what the coverage cost (22) asks for within a convex cell; its optimum is the median. In m."""
 
+    kind: ClassVar[int] = _DISTANCES
     sign: ClassVar[float] = 1.0
+    height: ClassVar[float] = 1.0
 
     def __call__(self, distance: Array) -> Array:
         """Return f(r), m."""
         return np.asarray(distance)
-
-    def over_edges(self, seen: Seen) -> OverEdge:
-        """Return the integrals over edges: m², m and m."""
-        d, s, e, near, far, _ = seen
-        log = _inverse_over(seen)
-        return OverEdge(0.5 * (e * far - s * near + d * d * log), far - near, d * log)
-
-    def over_triangles(self, seen: Seen) -> Array:
-        """Return the integrals over triangles, m³."""
-        d, s, e, near, far, _ = seen
-        return d * (e * far - s * near + d * d * _inverse_over(seen)) / 6.0
 
 
 @dataclass(frozen=True)
@@ -160,6 +84,7 @@ class Sensing:
         When the height is no finite positive number.
     """
 
+    kind: ClassVar[int] = 2
     sign: ClassVar[float] = -1.0
 
     height: float
@@ -172,125 +97,9 @@ class Sensing:
         """Return f(r), 1/m²."""
         return np.asarray(1.0 / (np.square(distance) + self.height**2))
 
-    def over_edges(self, seen: Seen) -> OverEdge:
-        """Return the integrals over edges: 1/m, 1/m² and 1/m²; in cells that are small, of f - 1/h².
 
-        Seen from high above, f is nearly the same everywhere, and what it differs by would be lost.
-        """
-        d, s, e, near, far, size = seen
-        square = self.height**2
-        w = np.sqrt(d * d + square)
-        angle = np.arctan2(w * (e - s), w * w + s * e)
-        value = angle / w
-        small = size < self.height
-        if small.any():
-            rest = _arctan_rest(e / w) - _arctan_rest(s / w)
-            value = np.where(small, -(e - s) * (d / w) ** 2 / square - rest / w, value)
-        low, high = near * near + square, far * far + square
-        along = (s - e) * (s + e) / (low * high)
-        across = -d / (w * w) * (e / high - s / low + angle / w)
-        return OverEdge(value, along, across)
-
-    def over_triangles(self, seen: Seen) -> Array:
-        """Return the integrals over triangles, a number, by quadrature to rounding.
-
-        In closed form there are dilogarithms, which cancel where a triangle is flat or seen from high above.
-        """
-        d, square = seen.distance, self.height**2
-        w = np.sqrt(d * d + square)
-        begin, end = np.arcsinh(seen.first / w), np.arcsinh(seen.last / w)
-        panels = np.maximum(np.ceil((end - begin) / _PANEL), 1.0).astype(np.intp)
-        edge = np.repeat(np.arange(len(d)), panels)
-        number = np.arange(len(edge)) - np.repeat(np.cumsum(panels) - panels, panels)
-        half = 0.5 * (end - begin) / panels
-        middle = begin[edge] + half[edge] * (2 * number + 1)
-        tau = middle[:, None] + half[edge, None] * _NODES
-        wide = w[edge, None]
-        s = wide * np.sinh(tau)
-        r = (s * s + (d * d)[edge, None]) / square
-        # log(1 + r²/h²)/r², which is 1/h² at the foot of the point
-        integrand = np.log1p(r) / np.where(r > 0.0, r, 1.0)
-        integrand[r == 0.0] = 1.0
-        panel = (integrand * wide * np.cosh(tau) * _WEIGHTS).sum(axis=1) * half[edge]
-        return 0.5 * d / square * np.bincount(edge, panel, minlength=len(d))
-
-
-class CellSides:
-    """The edges of n cells, ready to be seen from any points.
-
-    Parameters
-    ----------
-    edges : CellEdges
-    count : int
-        n; cells without edges are empty.
-
-    Attributes
-    ----------
-    normal_x, normal_y : (s,)
-        Outward unit normals.
-    size : (n,) m
-        Half of each perimeter.
-    area : (n,) m²
-    """
-
-    def __init__(self, edges: CellEdges, count: int) -> None:
-        self.cell: IntArray = edges.cell
-        self.count = count
-        (x, y), (u, v) = edges.start.T, edges.end.T
-        along_x, along_y = u - x, v - y
-        self._length = np.sqrt(along_x * along_x + along_y * along_y)
-        over = 1.0 / np.maximum(self._length, 1e-300)
-        # the outward normal; the direction of the edge is (-normal_y, normal_x)
-        self.normal_x, self.normal_y = along_y * over, -along_x * over
-        n, m = self.normal_x, self.normal_y
-        self._squares = n * n, n * m, m * m, 0.5 * (n - m) * (n + m)
-        self._distance = x * self.normal_x + y * self.normal_y
-        self._first = y * self.normal_x - x * self.normal_y
-        self.size = 0.5 * self.summed(self._length)
-        # an edge of no length but rounding has no direction either
-        self._aside = self._length <= 1e-12 * self.size[self.cell]
-        self.area = 0.5 * self.summed(self._distance * self._length)
-        self._begins = np.flatnonzero(np.diff(self.cell, prepend=-1))
-
-    def summed(self, values: Array) -> Array:
-        """Return the sums over the edges of each cell, (n,), of values on edges, (s,)."""
-        return np.bincount(self.cell, values, minlength=self.count).astype(np.float64, copy=False)
-
-    def seen_from(self, x: Array, y: Array) -> Seen:
-        """Return the edges as seen from a point for each cell, (n,) m each, relative to its generator."""
-        at_x, at_y = x[self.cell], y[self.cell]
-        distance = self._distance - (at_x * self.normal_x + at_y * self.normal_y)
-        first = self._first - (at_y * self.normal_x - at_x * self.normal_y)
-        last = first + self._length
-        square = distance * distance
-        near, far = np.sqrt(square + first * first), np.sqrt(square + last * last)
-        return Seen(distance, first, last, near, far, self.size[self.cell])
-
-    def room(self, seen: Seen) -> Array:
-        """Return how far each point is inside its cell, (n,) m: negative outside, 0 in an empty cell.
-
-        Of a cell that is not convex it is how far the point is inside the part that sees all of it.
-        """
-        found = np.zeros(self.count)
-        distance = np.where(self._aside, np.inf, seen.distance)
-        if len(distance):
-            found[self.cell[self._begins]] = np.minimum.reduceat(distance, self._begins)
-        return found
-
-    def gradient(self, over: OverEdge) -> tuple[Array, Array]:
-        """Return the two components of the gradients with respect to the points, (n,) each."""
-        return -self.summed(self.normal_x * over.value), -self.summed(self.normal_y * over.value)
-
-    def hessian(self, over: OverEdge) -> tuple[Array, Array, Array]:
-        """Return the components xx, xy and yy of the Hessians with respect to the points, (n,) each."""
-        xx, xy, yy, difference = self._squares
-        mixed, across = over.along * xy, over.across
-        return (
-            self.summed(across * xx - mixed),
-            # the mean of the two ways to write it, which are equal once they are summed round the cell
-            self.summed(across * xy + over.along * difference),
-            self.summed(across * yy + mixed),
-        )
+Performance: TypeAlias = SquaredDistance | Distance | Sensing
+"""A function f of the distance, of which (4) is the integral over the cells."""
 
 
 def value(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -311,8 +120,8 @@ def value(edges: CellEdges, points: Array, f: Performance) -> Array:
     >>> value(cells.edges, np.zeros((1, 2)), SquaredDistance()).round(6)
     array([2.666667])
     """
-    sides = CellSides(edges, len(points))
-    return sides.summed(f.over_triangles(sides.seen_from(*np.asarray(points, dtype=np.float64).T)))
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    return _values(edges.start, edges.end, edges.cell, points, f.kind, f.height, _NODES, _WEIGHTS)
 
 
 def gradient(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -321,9 +130,7 @@ def gradient(edges: CellEdges, points: Array, f: Performance) -> Array:
     As the cells move with their generators, this is also the gradient of the whole cost: what the boundary
     between two cells adds to one it takes from the other, (8)-(10). The parameters are those of `value`.
     """
-    sides = CellSides(edges, len(points))
-    over = f.over_edges(sides.seen_from(*np.asarray(points, dtype=np.float64).T))
-    return np.column_stack(sides.gradient(over))
+    return derivatives(edges, points, f)[:, :2]
 
 
 def hessian(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -331,20 +138,144 @@ def hessian(edges: CellEdges, points: Array, f: Performance) -> Array:
 
     The parameters are those of `value`.
     """
-    sides = CellSides(edges, len(points))
-    over = f.over_edges(sides.seen_from(*np.asarray(points, dtype=np.float64).T))
-    xx, xy, yy = sides.hessian(over)
-    return np.stack([np.column_stack([xx, xy]), np.column_stack([xy, yy])], axis=1)
+    return derivatives(edges, points, f)[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
 
 
-def _inverse_over(seen: Seen) -> Array:
-    """Return ∫ 1/r ds over the edges, (s,)."""
-    d = np.maximum(np.abs(seen.distance), 1e-300)
-    return np.asarray(np.arcsinh(seen.last / d) - np.arcsinh(seen.first / d))
+def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
+    """Return the derivatives of `value` by x, y, xx, xy and yy, and of each cell room, size and area, (n, 8).
+
+    The room, m, is how far the point is inside its cell: negative outside, 0 in an empty cell; of a cell that
+    is not convex it is how far the point is inside the part that sees all of it. The size, m, is half of the
+    perimeter, which is at least the diameter. The parameters are those of `value`.
+    """
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    return _derivatives(edges.start, edges.end, edges.cell, points, f.kind, f.height)
 
 
-def _arctan_rest(x: Array) -> Array:
+@inner_kernel
+def _seen(start: Array, end: Array, k: int, x: float, y: float) -> tuple[float, float, float, float, float]:
+    """Return an edge's outward normal and length, and where it is as seen from a point.
+
+    That is the distance d from the point to the edge's line along the normal, negative where the point is
+    beyond it; and s₁, where the edge begins, from the foot of the perpendicular along it.
+    """
+    along_x, along_y = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1]
+    length = np.sqrt(along_x * along_x + along_y * along_y)
+    over = 1.0 / max(length, 1e-300)
+    nx, ny = along_y * over, -along_x * over
+    px, py = start[k, 0], start[k, 1]
+    d = px * nx + py * ny - (x * nx + y * ny)
+    return nx, ny, length, d, py * nx - px * ny - (y * nx - x * ny)
+
+
+@kernel
+def _derivatives(start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float) -> Array:
+    found = np.zeros((len(points), 8))
+    k = 0
+    for i in range(len(points)):
+        x, y, begin, room, size = points[i, 0], points[i, 1], k, np.inf, 0.0
+        while k < len(cell) and cell[k] == i:
+            size += 0.5 * _seen(start, end, k, x, y)[2]
+            k += 1
+        for edge in range(begin, k):
+            nx, ny, length, d, s = _seen(start, end, edge, x, y)
+            total, along, across = _over_edge(kind, height, d, s, s + length, size)
+            mixed, difference = along * nx * ny, 0.5 * (nx - ny) * (nx + ny)
+            found[i, 0] -= nx * total
+            found[i, 1] -= ny * total
+            found[i, 2] += across * nx * nx - mixed
+            # the mean of the two ways to write it, which are equal once they are summed round the cell
+            found[i, 3] += across * nx * ny + along * difference
+            found[i, 4] += across * ny * ny + mixed
+            found[i, 7] += 0.5 * length * (d + x * nx + y * ny)
+            # an edge of no length but rounding has no direction either
+            if length > 1e-12 * size:
+                room = min(room, d)
+        found[i, 5], found[i, 6] = room if begin < k else 0.0, size
+    return found
+
+
+@inner_kernel
+def _over_edge(
+    kind: int, height: float, d: float, s: float, e: float, size: float
+) -> tuple[float, float, float]:
+    """Return ∫ f ds over an edge, and how it changes as the point moves: ∫ f'(r)/r s ds and ∫ f'(r)/r d ds.
+
+    A constant that is the same for all edges of a cell may be left out of f: round the cell it is 0.
+    """
+    length, near, far = e - s, np.sqrt(d * d + s * s), np.sqrt(d * d + e * e)
+    if kind == _SQUARES:
+        return length * ((s * s + s * e + e * e) / 3.0 + d * d), length * (e + s), 2.0 * d * length
+    if kind == _DISTANCES:
+        log = _inverse_over(d, s, e)
+        return 0.5 * (e * far - s * near + d * d * log), far - near, d * log
+    square = height * height
+    w = np.sqrt(d * d + square)
+    angle = np.arctan2(w * length, w * w + s * e)
+    total = angle / w
+    if size < height:
+        # seen from high above, f is nearly the same everywhere: of f - 1/h², which would be lost else
+        rest = _arctan_rest(e / w) - _arctan_rest(s / w)
+        total = -length * (d / w) ** 2 / square - rest / w
+    low, high = near * near + square, far * far + square
+    along = (s - e) * (s + e) / (low * high)
+    return total, along, -d / (w * w) * (e / high - s / low + angle / w)
+
+
+@inlined_kernel
+def _inverse_over(d: float, s: float, e: float) -> float:
+    """Return ∫ 1/r ds over an edge."""
+    d = max(abs(d), 1e-300)
+    return float(np.arcsinh(e / d) - np.arcsinh(s / d))
+
+
+@inner_kernel
+def _arctan_rest(x: float) -> float:
     """Return x - atan x without cancellation where x is small."""
-    square = x * x
-    series = np.polynomial.polynomial.polyval(np.minimum(square, 0.0625), _ARCTAN_SERIES)
-    return np.where(square < 0.0625, x * square * series, x - np.arctan(x))
+    square, series = x * x, 0.0
+    if square >= 0.0625:
+        return float(x - np.arctan(x))
+    for k in range(14, -1, -1):
+        series = series * square + (1.0 - 2.0 * (k % 2)) / (2 * k + 3)
+    return x * square * series
+
+
+@kernel
+def _values(
+    start: Array,
+    end: Array,
+    cell: IntArray,
+    points: Array,
+    kind: int,
+    height: float,
+    nodes: Array,
+    weights: Array,
+) -> Array:
+    """Return the sums of ∫ f over the triangles that the points span with the edges, signed as d."""
+    sums = np.zeros(len(points))
+    for k in range(len(cell)):
+        i = cell[k]
+        _, _, length, d, s = _seen(start, end, k, points[i, 0], points[i, 1])
+        e = s + length
+        if kind == _SQUARES:
+            sums[i] += d * length * (3.0 * d * d + s * s + s * e + e * e) / 12.0
+            continue
+        if kind == _DISTANCES:
+            near, far = np.sqrt(d * d + s * s), np.sqrt(d * d + e * e)
+            sums[i] += d * (e * far - s * near + d * d * _inverse_over(d, s, e)) / 6.0
+            continue
+        # by quadrature to rounding: in closed form there are dilogarithms, which cancel where a triangle is
+        # flat or seen from high above
+        w = np.sqrt(d * d + height * height)
+        begin, stop = np.arcsinh(s / w), np.arcsinh(e / w)
+        panels = max(int(np.ceil((stop - begin) / _PANEL)), 1)
+        half = 0.5 * (stop - begin) / panels
+        for panel in range(panels):
+            for node in range(len(nodes)):
+                tau = begin + half * (2 * panel + 1 + nodes[node])
+                foot = w * np.sinh(tau)
+                r = (foot * foot + d * d) / (height * height)
+                # log(1 + r²/h²)/r², which is 1/h² at the foot of the point
+                part = (np.log1p(r) / r if r > 0.0 else 1.0) * w * np.cosh(tau) * weights[node]
+                sums[i] += 0.5 * d / (height * height) * part * half
+    return sums

@@ -16,15 +16,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError, unknown_name
-from robocov.locational.best_points import best_points
+from robocov.locational.best_points import best_points, weighed_best_points
 from robocov.locational.cost import Distance, Sensing
-from robocov.locational.weighed_best_points import weighed_best_points
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.density import Density
-    from robocov.voronoi import VoronoiPartition
-    from robocov.voronoi.weighted_cells import WeightedCells
+    from robocov.observation.cells import Cells
 
 TARGETS = ("centroid", "sensing", "median")
 """The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, by which the coverage cost (22) counts."""
@@ -33,16 +31,14 @@ MEANING = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h
 HEIGHT = "h of (14), for the target sensing: how high the sensor is; what is much farther counts little"
 
 
-def targets(
-    cells: VoronoiPartition | WeightedCells, density: Density | None, target: str, height: float
-) -> Array:
+def targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
     """Return where each robot heads for, (n, 2) m: within its cell, if that is convex.
 
     An empty cell's is its generator.
 
     Parameters
     ----------
-    cells : VoronoiPartition or WeightedCells
+    cells : Cells
         With the density, if there is one.
     density : Density or None
         φ; None for 1 everywhere.

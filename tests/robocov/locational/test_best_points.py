@@ -273,7 +273,7 @@ def test_steps_go_down_by_the_sizes_of_the_eigenvalues(numbers: list[float]) -> 
     values, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
     if np.abs(values).min() < 1e-6:
         return
-    step = np.ravel(_downhill(*(np.array([each]) for each in (*slope, xx, xy, yy))))
+    step = np.array(_downhill(*slope.tolist(), xx, xy, yy))
     np.testing.assert_allclose(step, -axes @ (axes.T @ slope / np.abs(values)), rtol=1e-6, atol=1e-7)
 
 

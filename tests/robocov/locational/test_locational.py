@@ -15,7 +15,6 @@ from voronoi_cases import PENTAGON, REGIONS, names, scattered, seeds
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
 from robocov.locational import (
-    CellSides,
     Distance,
     Performance,
     Sensing,
@@ -24,6 +23,7 @@ from robocov.locational import (
     hessian,
     value,
 )
+from robocov.locational.cost import derivatives
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
@@ -164,7 +164,9 @@ def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, 
     np.testing.assert_allclose(gradient(cells.edges, points, f), slope, rtol=1e-9, atol=1e-11 * size**3)
     bend = 2.0 * cells.mass[:, None, None] * np.eye(2)
     np.testing.assert_allclose(hessian(cells.edges, points, f), bend, rtol=1e-9, atol=1e-12 * size**2)
-    np.testing.assert_allclose(CellSides(cells.edges, n).area, cells.mass, rtol=1e-9, atol=1e-12 * size**2)
+    np.testing.assert_allclose(
+        derivatives(cells.edges, points, f)[:, 7], cells.mass, rtol=1e-9, atol=1e-12 * size**2
+    )
 
 
 def cost(points: np.ndarray, borders: np.ndarray, region: Region, f: Performance) -> float:
@@ -227,9 +229,7 @@ def test_far_from_the_origin_nothing_is_lost() -> None:
 
 def test_an_edge_of_rounding_does_not_say_where_the_inside_is() -> None:
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + 2e-16, 1.0 - 2e-16], [0.0, 1.0]])
-    sides = CellSides(cell(corner), 1)
-    middle = np.array([0.4])
-    assert sides.room(sides.seen_from(middle, middle))[0] == pytest.approx(0.4)
+    assert derivatives(cell(corner), np.full((1, 2), 0.4), Distance())[0, 5] == pytest.approx(0.4)
 
 
 def test_cells_without_area_cost_nothing() -> None:

@@ -10,9 +10,8 @@ from numpy.testing import assert_allclose
 
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
 from robocov.locational import Distance, Sensing
-from robocov.locational.best_points import best_points
+from robocov.locational.best_points import best_points, weighed_best_points
 from robocov.locational.targets import targets
-from robocov.locational.weighed_best_points import weighed_best_points
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import partition
