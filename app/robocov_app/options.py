@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 MOST_ROWS = 2e7
 """Largest record, in moments times robots: about 2 GB."""
 
+USUAL_ROWS = 4e6
+"""Largest record where its rate is left open: about 320 MB."""
+
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
 _JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
 """What a gain's value may look like where it is a word, and what looks so and is none."""
@@ -43,6 +46,8 @@ class RunOptions:
     """Simulated seconds."""
     dt: float = 1 / 60
     """Control period in seconds."""
+    record_hz: float | None = None
+    """Moments a second that the record keeps, about; by default all, of large teams what makes 320 MB."""
     radius: float = 0.1
     """Radius of a robot in metres."""
     max_speed: float = 1.0
@@ -98,13 +103,28 @@ class RunOptions:
         from robocov.simulation import check_dt  # asking for help must not load the physics
 
         check_dt(self.dt)
-        moments = self.duration / self.dt
-        if moments * self.robots > MOST_ROWS:
+        if self.record_hz is not None:
+            in_range("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
+        rows = self.duration / self.dt * self.robots / self.record_every
+        if rows > MOST_ROWS:
             raise ParameterError(
-                f"--duration: {self.duration:g} s of {self.robots} robots at {self.dt:g} s are "
-                f"{moments * self.robots:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
+                f"--record-hz: {self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are "
+                f"{rows:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
             )
         self.picture_size()
+
+    @property
+    def record_every(self) -> int:
+        """Of so many steps the record keeps one."""
+        if self.record_hz is None:
+            return math.ceil(max(self.duration / self.dt * self.robots / USUAL_ROWS, 1.0))
+        return max(round(1.0 / (self.record_hz * self.dt)), 1)
+
+    @property
+    def record_words(self) -> str:
+        """What the command's last line says of a record that is thinned."""
+        every = self.record_every
+        return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 
     def made_team(self) -> Team:
         """Return the team that the options describe.

@@ -113,10 +113,12 @@ def simulated(
     chatter = redirect_stdout(sys.stderr) if options.json else nullcontext()
     with chatter, progress(f"simulating {controller.label}", total, quiet=options.json) as update:
         for step, snapshot in enumerate(simulation.snapshots(options.duration)):
-            recorder.add(snapshot)
-            if step % 10 == 0 or step == total:
+            last = step == total or stop.requested
+            if last or step % options.record_every == 0:
+                recorder.add(snapshot)
+            if last or step % 10 == 0:
                 update(step)
-            if stop.requested:
+            if last:
                 break
     return recorder.record()
 

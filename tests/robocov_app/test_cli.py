@@ -141,7 +141,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --start coridor", "did you mean 'corridor'?"),
         ("run rooms --dt 0", "dt: 0.0 s"),
         ("run rooms --dt nan", "dt: nan s"),
-        ("run rooms --duration 1e6", "rows of the record"),
+        ("run rooms --duration 1e6 --record-hz 60", "rows of the record"),
         ("run rooms --duration -1", "--duration: -1.0"),
         ("run rooms --max-speed 0", "team.max_speed: 0.0 m/s"),
         ("run rooms --max-acceleration inf", "team.max_acceleration: inf"),

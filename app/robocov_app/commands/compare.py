@@ -98,7 +98,7 @@ def command(options: Arguments) -> int:
     else:
         print_table(runs)
         done = "stopped; what was done is in" if stop.requested else "saved in"
-        print(f"{done} {out}/: {listed(out)}")
+        print(f"{done} {out}/: {listed(out)}{options.record_words}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -75,7 +75,7 @@ def command(options: Arguments) -> int:
     else:
         print_summary(run)
         stopped = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stop.requested else "saved in"
-        print(f"{stopped} {out}/: {listed(out)}")
+        print(f"{stopped} {out}/: {listed(out)}{options.record_words}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -320,14 +321,19 @@ def _dsatur(neighbours: list[list[int]]) -> list[int]:
     hues = [-1] * n
     uses = [0] * MAP_COLOURS
     seen: list[set[int]] = [set() for _ in range(n)]
-    left = set(range(n))
-    while left:
-        vertex = max(left, key=lambda v: (len(seen[v]), len(neighbours[v]), -v))
-        left.remove(vertex)
+    # what is in it of a vertex that is coloured, or of whose neighbours more are by now, is passed over
+    waiting = [(0, -len(neighbours[v]), v) for v in range(n)]
+    heapify(waiting)
+    while waiting:
+        colours, _, vertex = heappop(waiting)
+        if hues[vertex] >= 0 or -colours < len(seen[vertex]):
+            continue
         around = [hues[other] for other in neighbours[vertex]]
         hue = min(range(MAP_COLOURS), key=lambda h: (around.count(h), uses[h], h))
         hues[vertex] = hue
         uses[hue] += 1
         for other in neighbours[vertex]:
-            seen[other].add(hue)
+            if hues[other] < 0 and hue not in seen[other]:
+                seen[other].add(hue)
+                heappush(waiting, (-len(seen[other]), -len(neighbours[other]), other))
     return hues

@@ -126,5 +126,6 @@ def check_starts(
 def _wall_distance(environment: Environment, places: Array) -> Array:
     """Return how far places are from a wall, (n,) m; -inf within one."""
     points = shapely.points(places)
+    shapely.prepare(environment.free)
     inside = shapely.contains_properly(environment.free, points)
     return np.where(inside, shapely.distance(environment.free.boundary, points), -np.inf)

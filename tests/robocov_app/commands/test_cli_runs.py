@@ -10,6 +10,7 @@ from called import SHORT, answer, complaint
 
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov.record import Record
+from robocov_app import options
 from robocov_app.cli import main
 
 
@@ -285,3 +286,20 @@ def test_a_controller_that_fails_is_named_with_its_line(
     words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
     assert part in complaint(capsys, *words)
     assert not out.exists(), "a folder with nothing in it is not left behind"
+
+
+def test_records_of_large_teams_are_thinned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["run", "rooms", "--robots", "3", "--duration", "0.5", "--lattice", "16"]
+    assert main([*words, "--out", str(tmp_path / "all")]) == 0
+    assert "the record" not in capsys.readouterr().out
+    assert main([*words, "--record-hz", "20", "--out", str(tmp_path / "some")]) == 0
+    assert "the record, and what is counted in it, is of one step in 3" in capsys.readouterr().out
+    monkeypatch.setattr(options, "USUAL_ROWS", 30.0)
+    assert main([*words, "--out", str(tmp_path / "few")]) == 0
+    whole, some, few = (Record.load(tmp_path / name) for name in ("all", "some", "few"))
+    assert [len(each.time) for each in (whole, some, few)] == [31, 11, 11]
+    for thin in (some, few):
+        np.testing.assert_array_equal(thin.positions, whole.positions[::3])
+        np.testing.assert_array_equal(thin.time, whole.time[::3])
