@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, frozen
+from robocov.density import Density
 from robocov.density.base import masses_of_polygons
 from robocov.drawing import Drawable
 from robocov.environment.obstacle_path import ObstaclePath
 from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, counted, unknown_name
 from robocov.observation.region import Region
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.density import Density
 
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]

@@ -9,18 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Integral
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.errors import StartError, is_number
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 GAP = 0.02
 """Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""

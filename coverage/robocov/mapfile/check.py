@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
-from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.environment import Environment, PolygonObstacle, Ring, WallObstacle
 from robocov.environment.obstacle_path import in_the_way, swept_area
 from robocov.environment.passages import Gap, narrowest_gap
 from robocov.environment.starts import GAP, DiscStart, PointsStart
 from robocov.errors import StartError, listed, place
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov.environment import Ring
 
 _SAME_PLACE = 1e-6
 """Vertices closer than this, in metres, are one vertex given twice."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.density import FINEST, Density, Raster
+from robocov.environment import Ring
 from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, reason, shown_json
 from robocov.mapfile.models import (
     LARGEST,
@@ -24,12 +27,6 @@ from robocov.mapfile.models import (
     UniformDensityModel,
     plain,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov.arrays import Array
-    from robocov.environment import Ring
 
 MOST_BYTES = 8_000_000
 """Largest picture of a density, in bytes."""

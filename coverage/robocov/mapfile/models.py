@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from robocov.density import (
     FINEST,
@@ -23,10 +24,6 @@ from robocov.environment.obstacle_path import ObstaclePath, Repeat
 from robocov.environment.starts import DiscStart, PointsStart, UniformStart
 from robocov.errors import Mistake, place, shown_json, unknown_name
 from robocov.files.documents import check_header, refused
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
-
 
 FORMAT = "robocov-map"
 VERSION = 1
@@ -50,12 +47,17 @@ LONGEST_LABEL = 100
 
 _NAME = r"^[^\x00-\x1f\x7f]+$"
 
+
+def _between(least: float, most: float, description: str | None = None) -> Any:
+    return Field(strict=True, allow_inf_nan=False, ge=least, le=most, description=description)
+
+
 Coordinate: TypeAlias = Annotated[
     float,
-    Field(strict=True, allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST, description="metres"),
+    _between(-FARTHEST, FARTHEST, "metres"),
     AfterValidator(lambda value: 0.0 if -TINY < value < TINY else value),
 ]
-Size: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+Size: TypeAlias = Annotated[float, _between(SMALLEST, LARGEST)]
 Vertex: TypeAlias = Annotated[
     list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]]), AfterValidator(tuple)
 ]
@@ -65,13 +67,13 @@ Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LO
 LIGHTEST = 1e-9
 """Weights that are smaller are read as 0: they would be when the map is written."""
 
-Entry: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=HEAVIEST)]
+Entry: TypeAlias = Annotated[float, _between(0.0, HEAVIEST)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
-Variance: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e8, le=1e8)]
+Variance: TypeAlias = Annotated[float, _between(-1e8, 1e8)]
 Matrix: TypeAlias = Annotated[
     list[Annotated[list[Variance], Field(min_length=2, max_length=2)]], Field(min_length=2, max_length=2)
 ]
-Speed: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SLOWEST, le=FASTEST)]
+Speed: TypeAlias = Annotated[float, _between(SLOWEST, FASTEST)]
 
 LEAST_VARIANCE = SMALLEST**2
 """Smallest variance of a peak each way, in square metres."""
@@ -113,8 +115,13 @@ def _name(example: str) -> Any:
 
 
 _PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
+_MATRIX = [[2, 0.5], [0.5, 1]]
 _CORNERS = [[1, 1], [2, 1], [2, 3]]
 _HOT_SPOT = {"center": [7.5, 3], "sigma": 1.5, "weight": 4}
+_TREASURY = {"name": "treasury", "vertices": _CORNERS, "weight": 5}
+_WALL = {"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}
+_STARTS = {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}
+_DENSITY = {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]}
 
 
 class PathModel(Model, title="path"):
@@ -217,9 +224,7 @@ class PeakModel(Model, title="peak"):
     center: Vertex = _field("Its centre [x, y] in metres", [7.5, 3])
     sigma: Size | None = _field("Its standard deviation in metres, where it is round", 1.5, None)
     covariance: Matrix | None = _field(
-        "Its covariance in square metres where it is not: symmetric, positive definite",
-        [[2, 0.5], [0.5, 1]],
-        None,
+        "Its covariance in square metres where it is not: symmetric, positive definite", _MATRIX, None
     )
     weight: Weight = _field("What it adds at its centre", 4)
 
@@ -251,11 +256,7 @@ class PolygonDensityModel(Model, title="polygon density"):
     stands_for = WeightedPolygons
     kind: Literal["polygons"] = _kind("polygons")
     background: Weight = _field("What a place outside them all counts", 1, 1.0)
-    areas: list[AreaModel] = _field(
-        "The polygons, the later ones on top",
-        [{"name": "treasury", "vertices": _CORNERS, "weight": 5}],
-        max_length=_MOST,
-    )
+    areas: list[AreaModel] = _field("The polygons, the later ones on top", [_TREASURY], max_length=_MOST)
 
 
 class RasterDensityModel(Model, title="raster density"):
@@ -303,19 +304,11 @@ class MapModel(Model, title="robocov map"):
         [[0, 0], [10, 0], [10, 6], [0, 6]],
     )
     obstacles: list[ObstacleModel] = _field(
-        "They may overlap, touch, and stick out of the boundary",
-        [{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}],
-        [],
+        "They may overlap, touch, and stick out of the boundary", [_WALL], []
     )
-    starts: dict[Label, StartModel] = _field(
-        "Named starts; the first is the default",
-        {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}},
-        {},
-    )
+    starts: dict[Label, StartModel] = _field("Named starts; the first is the default", _STARTS, {})
     density: DensityModel | None = _field(
-        "How much each place counts; without it every place the same",
-        {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]},
-        None,
+        "How much each place counts; without it every place the same", _DENSITY, None
     )
     extra: dict[str, Any] = _field("Free keys of yours; kept untouched", {"author": "Ada"}, {})
 
@@ -381,15 +374,9 @@ def _validated(kind: type[_Kind], document: object, where: str) -> _Kind:
         raise refused(error, where, _mistake) from None
 
 
-def _kinds(union: Any) -> dict[str, type[Model]]:
-    models = get_args(get_args(union)[0])
-    return {get_args(model.model_fields["kind"].annotation)[0]: model for model in models}
-
-
 _CHOICES: dict[str, dict[str, type[Model]]] = {
-    "obstacles": _kinds(ObstacleModel),
-    "starts": _kinds(StartModel),
-    "density": _kinds(DensityModel),
+    key: {get_args(each.model_fields["kind"].annotation)[0]: each for each in get_args(get_args(union)[0])}
+    for key, union in (("obstacles", ObstacleModel), ("starts", StartModel), ("density", DensityModel))
 }
 
 _PARTS: dict[str, type[Model]] = {"path": PathModel, "peaks": PeakModel, "areas": AreaModel}

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
+from robocov.arrays import Array
 from robocov.density import WeightedArea, WeightedPolygons
-from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.environment import Environment, PolygonObstacle, Ring, WallObstacle
 from robocov.environment.starts import GAP, DiscStart, PointsStart, UniformStart
-from robocov.errors import MapError, Mistake, StartError, place
+from robocov.errors import JsonPath, MapError, Mistake, StartError, place
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov.arrays import Array
-    from robocov.environment import Ring
-    from robocov.errors import JsonPath
 
 _FLAT = 1e-9
 """A ring whose area is below this part of its bounding box squared is a line."""

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, counted, shown
-from robocov.metrics import clearances, robot_gaps
+from robocov.metrics import CostHistory, clearances, robot_gaps
 from robocov.metrics.sight import Covered, Walls, covered
 from robocov.observation.neighbours import Neighbours
-from robocov.record import nearest_moments
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
+from robocov.record import Record, nearest_moments
 
 RATE = 2.0
 """Moments a second at which areas and graphs are looked at where nothing else is said."""
