@@ -11,7 +11,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information
 from robocov.controllers.driving import approach, avoid, drive, offsets_from_neighbours
-from robocov.controllers.gains import gain, response_time_gain, validate_gains
+from robocov.controllers.gains import WithGains, gain, response_time_gain
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -108,7 +108,7 @@ class AtlasMemory:
 
 
 @dataclass(frozen=True)
-class Atlas:
+class Atlas(WithGains):
     """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
 
     Twice a second every robot scans, and enters what it sees into its own grid (`DiscoveredMap`). It also
@@ -156,9 +156,6 @@ class Atlas:
     clearance: float = gain(0.06, "m", "that routes keep between rim and walls", high=10.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
         """Return the memory of robots that have seen nothing yet."""

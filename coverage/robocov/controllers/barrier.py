@@ -10,7 +10,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, nearest_allowed
-from robocov.controllers.gains import gain, response_time_gain, validate_gains
+from robocov.controllers.gains import WithGains, gain, response_time_gain
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -43,7 +43,7 @@ class BarrierMemory:
 
 
 @dataclass(frozen=True)
-class Barrier:
+class Barrier(WithGains):
     """Lloyd's algorithm, filtered by safety barrier certificates (Wang, Ames and Egerstedt 2017).
 
     Two robots that brake as hard as they can must come to rest at the safe distance D_s or before:
@@ -80,9 +80,6 @@ class Barrier:
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = choice_of_cells()
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> BarrierMemory:
         """Return what the robots know of themselves."""

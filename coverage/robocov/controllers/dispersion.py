@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.driving import avoid, drive, summed
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import WithGains, gain
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -41,7 +41,7 @@ class DispersionMemory:
 
 
 @dataclass(frozen=True)
-class Dispersion:
+class Dispersion(WithGains):
     """Local dispersion, the anonymous variant (Batalin and Sukhatme 2002, "Spreading out").
 
     Three behaviours, the first that has something to say before the others. *Avoid*: whatever is
@@ -76,9 +76,6 @@ class Dispersion:
     response_time: float = gain(
         0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
     )
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> DispersionMemory:
         """Return what the robots know of themselves."""

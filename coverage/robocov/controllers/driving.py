@@ -59,18 +59,9 @@ def limit_approach_speed(
 ) -> Array:
     """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards what is close.
 
-    The distance to each thing falls to its clearance exponentially at most, and no faster than a robot
-    can brake; inside it, the velocity leads out. Where not all of that is possible, nothing is approached.
-
-    Parameters
-    ----------
-    wanted : (n, 2) m/s
-    away : (n, k, 2) m
-        From the things that are close to the robot; nan where there is none.
-    clearance, braking : (n, k) m, m/s²
-    rate : float, 1/s
-    speed : (n,) m/s
-        The largest.
+    The distance to each thing (`away` from it is the robot, (n, k, 2) m, nan for none) falls to its clearance
+    (m) exponentially at most, with a rate (1/s), and no faster than a robot can brake (m/s²); inside it, the
+    velocity leads out. Where not all of that is possible, nothing is approached.
     """
     distance = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2)
     normal = away / np.where(distance > 0.0, distance, np.nan)[..., None]

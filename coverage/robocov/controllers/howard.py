@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.driving import summed
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import WithGains, gain
 from robocov.controllers.returns import last_returns
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -44,7 +44,7 @@ class HowardMemory:
 
 
 @dataclass(frozen=True)
-class Howard:
+class Howard(WithGains):
     """Potential field of Howard, Mataric and Sukhatme (DARS 2002).
 
     Every robot is an electric charge among charges: the potential is the sum of k / r over all that the
@@ -71,9 +71,6 @@ class Howard:
     k_robots: float = gain(3.0, "N m²", "charge of the other robots")
     k_obs: float = gain(1.0, "N m²", "charge of the obstacles, over a full turn of rays")
     friction: float = gain(2.0, "N s/m", "nu of the law, in place of the robots' own", high=20.0)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> HowardMemory:
         """Return what the robots know of themselves."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.gains import choice, gain, validate_gains
+from robocov.controllers.gains import WithGains, choice, gain
 from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -33,7 +33,7 @@ class LloydMemory:
 
 
 @dataclass(frozen=True)
-class Lloyd:
+class Lloyd(WithGains):
     """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
 
     Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the
@@ -54,9 +54,6 @@ class Lloyd:
     cells: str = choice_of_cells()
     target: str = choice("centroid", TARGETS, MEANING)
     height: float = gain(1.0, "m", HEIGHT, low=1e-6)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> LloydMemory:
         """Return what the robots know of themselves."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.controllers.cells import cells_seen
 from robocov.controllers.driving import approach, drive
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import WithGains, gain
 from robocov.controllers.lloyd import LloydMemory
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -18,7 +18,7 @@ from robocov.voronoi.disc_cells import disc_limited, disc_polygons
 
 
 @dataclass(frozen=True)
-class RangeLimited:
+class RangeLimited(WithGains):
     """Lloyd's algorithm with limited-range interactions (Cortés, Martínez and Bullo 2005).
 
     The cell of a robot is the part of its Voronoi cell within half the communication range r, so that
@@ -50,9 +50,6 @@ class RangeLimited:
     response_time: float = gain(
         0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
     )
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> LloydMemory:
         """Return what the robots know of themselves."""

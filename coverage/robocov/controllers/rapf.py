@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.gains import choice, gain, validate_gains
+from robocov.controllers.gains import WithGains, choice, gain
 from robocov.controllers.repulsion import forces_seen
 from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
@@ -16,7 +16,7 @@ from robocov.voronoi.delaunay import Mesh
 
 
 @dataclass(frozen=True)
-class Rapf:
+class Rapf(WithGains):
     """Repulsive and attractive potential field (Renzaglia and Martinelli), equations (23)-(28).
 
     As RPF, but every robot is also drawn to the centroid of its Voronoi cell of the known convex
@@ -44,9 +44,6 @@ class Rapf:
     cells: str = choice_of_cells()
     target: str = choice("centroid", TARGETS, MEANING)
     height: float = gain(1.0, "m", HEIGHT, low=1e-6)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered yet; later, the triangulation from which the next cells start."""

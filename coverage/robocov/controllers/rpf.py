@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import WithGains, gain
 from robocov.controllers.repulsion import forces_seen
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -13,7 +13,7 @@ from robocov.robots import Team
 
 
 @dataclass(frozen=True)
-class Rpf:
+class Rpf(WithGains):
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
     Every robot is pushed away from the neighbours within `rho_0` and from the single closest
@@ -29,9 +29,6 @@ class Rpf:
 
     k_rep: float = gain(3.0, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered."""

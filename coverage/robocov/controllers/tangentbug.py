@@ -13,7 +13,7 @@ from robocov.arrays import Array, ComplexArray, frozen
 from robocov.compiled import kernel
 from robocov.controllers.cells import cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive
-from robocov.controllers.gains import gain, response_time_gain, validate_gains
+from robocov.controllers.gains import WithGains, gain, response_time_gain
 from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -85,7 +85,7 @@ class TangentBugMemory:
 
 
 @dataclass(frozen=True)
-class TangentBug:
+class TangentBug(WithGains):
     """Voronoi coverage of non-convex environments (Breitenmoser et al., ICRA 2010).
 
     The goal of every robot is the centroid of its Voronoi cell of the convex region, as Lloyd's
@@ -129,9 +129,6 @@ class TangentBug:
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     cells: str = choice_of_cells()
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> TangentBugMemory:
         """Return what the robots know of themselves."""
