@@ -146,7 +146,7 @@ class RunOptions:
         }
         if self.team is None:
             return Team.homogeneous(self.robots, **said)
-        from robocov.robots.teamfile import read_team
+        from robocov.robots import read_team
 
         return read_team(self.team, said)
 

@@ -59,8 +59,7 @@ if TYPE_CHECKING:
     from robocov.observation.region import Region
     from robocov.optimum import Optimum
     from robocov.record import Record
-    from robocov.robots import Team
-    from robocov.robots.teamfile import read_team
+    from robocov.robots import Team, read_team
     from robocov.sensor import RangeSensor
     from robocov.simulating import simulate_many
     from robocov.simulation import Simulation
@@ -94,8 +93,7 @@ _NAMES = {
     "observation.region": "Region",
     "optimum": "Optimum",
     "record": "Record",
-    "robots": "Team",
-    "robots.teamfile": "read_team",
+    "robots": "Team read_team",
     "sensor": "RangeSensor",
     "simulating": "simulate_many",
     "simulation": "Simulation",

@@ -163,6 +163,9 @@ class Kernel:
 class _ForeignCall(Kernel):
     """`call_c` as numba's own instruction."""
 
+    # of this instruction; what Python does instead is nowhere in machine code
+    _identity = "call_c 1"
+
     @cached_property
     def _inner(self) -> Any:
         numba = _numba()

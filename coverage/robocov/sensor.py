@@ -55,14 +55,7 @@ class RangeSensor:
         return RangeSensor(self._pieces, self._movers)
 
     def show(self, time: float, failed_robots: Array | None = None) -> None:
-        """Let all that is asked from now on be of a time, s, with robots that failed among the obstacles.
-
-        Parameters
-        ----------
-        time : float, s
-        failed_robots : (w, 3) m or None
-            x, y and radius of each.
-        """
+        """Move to a time, s, at which some robots have failed, and are obstacles: x, y, radius, (w, 3) m."""
         for body, mover in zip(self._bodies, self._movers, strict=True):
             body.position = tuple(mover.path.shift(time).tolist())
             self._space.reindex_shapes_for_body(body)
@@ -75,18 +68,7 @@ class RangeSensor:
             self._failed[x, y, radius] = disc
 
     def nearest(self, positions: Array, ranges: Array) -> Array:
-        """Return the closest solid point of each robot within its range.
-
-        Parameters
-        ----------
-        positions : (n, 2) m
-        ranges : (n,) m
-
-        Returns
-        -------
-        (n, 2) m
-            nan where nothing is in range.
-        """
+        """Return the closest solid point of each robot at (n, 2) m within its range, (n,) m; nan if none."""
         points = np.array(positions, dtype=float)
         if self._addresses is not None:
             _nearest(self._addresses, points, ranges, np.empty(6))
@@ -97,21 +79,7 @@ class RangeSensor:
         return points
 
     def scan(self, position: Array, rays: int, reach: float) -> tuple[Array, Array]:
-        """Cast `rays` rays evenly round a full turn, the first along +x.
-
-        Parameters
-        ----------
-        position : (2,) m
-        rays : int
-        reach : float, m
-
-        Returns
-        -------
-        distances : (rays,) m
-            `reach` where the ray meets nothing.
-        points : (rays, 2) m
-            Where each ray ends.
-        """
+        """Return distances, (rays,) m, and ends, (rays, 2) m, of rays from one place; see `scans`."""
         distances, _ = self.scans(np.asarray(position)[None], rays, np.array([reach]))
         return distances[0], position + distances[0][:, None] * headings(rays)
 

@@ -288,11 +288,8 @@ class Simulation:
         forces : (n, 2) N or None
             In place of the controller's, as by one who learns.
 
-        Raises
-        ------
-        ParameterError
-            When the controller returns anything but finite forces of shape (n, 2), or the external
-            forces are not.
+        Raises ParameterError when the controller returns anything but finite forces of shape (n, 2), or the
+        external forces are not.
         """
         snapshot = self.snapshot
         decision = snapshot.decision
@@ -308,10 +305,7 @@ class Simulation:
     def restart(self, run: int, positions: Array) -> None:
         """Put the robots of a run to other places, at rest; time goes on.
 
-        Raises
-        ------
-        StartError
-            When a robot would start in a wall or in another robot of that run.
+        Raises StartError when a robot would start in a wall or in another robot of that run.
         """
         rows = self._each_run[run]
         check_starts(self.environment.at(self.time), positions, self.team[rows], 1e-6, None)
@@ -433,13 +427,7 @@ def _copied(memory: Any) -> Any:
 
 
 def check_dt(dt: float) -> None:
-    """Check a control period.
-
-    Raises
-    ------
-    ParameterError
-        When it is out of range.
-    """
+    """Check a control period; raises ParameterError when it is out of range."""
     if not 1e-4 <= dt <= 1.0:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
 

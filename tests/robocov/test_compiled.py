@@ -16,14 +16,14 @@ ROOT = Path(__file__).parents[2]
 FACTOR = 3.0
 
 SCRIPT = """
-import sys
-from robocov.compiled import kernel, on_compile
+import ctypes, sys
+from robocov.compiled import call_c, kernel, on_compile
 assert "numba" not in sys.modules
 on_compile.append(print)
 @kernel
-def doubled(x):
-    return 2.0 * x
-print(doubled(0.5))
+def doubled(x, address):
+    return 2.0 * x if call_c(address, (0, x)) else x
+print(doubled(0.5, ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value))
 """
 
 

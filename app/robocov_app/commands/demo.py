@@ -139,7 +139,7 @@ def command(options: Arguments) -> int:
 def session_of(options: Arguments) -> Session:
     """Return the session that the options describe."""
     from robocov.mapfile import load_map
-    from robocov.robots.teamfile import read_team
+    from robocov.robots import read_team
     from robocov_app.demo.scenario import Law, Limits, Scenario
     from robocov_app.demo.session import Session
 

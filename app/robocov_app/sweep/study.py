@@ -14,8 +14,7 @@ from robocov.controllers import controller_kind
 from robocov.controllers.user_modules import Source, own_modules
 from robocov.errors import InputError, ParameterError, place, shown, unknown_name
 from robocov.mapfile import to_json
-from robocov.robots import DEFAULT_RADIUS, Team
-from robocov.robots.teamfile import team_of_groups
+from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.options import MOST_ROWS
 from robocov_app.sweep.circumstances import GROUPS, TeamValue, condition_axes, conditions_of

@@ -101,10 +101,7 @@ class Conditions:
     seed : int
         Of all random numbers in this.
 
-    Raises
-    ------
-    ParameterError
-        On a value out of range; the message names it.
+    Raises ParameterError on a value out of range; the message names it.
     """
 
     loss: float = 0.0
@@ -165,10 +162,8 @@ class Conditions:
     def check_team(self, count: int) -> None:
         """Check that a team of `count` robots can be under these conditions.
 
-        Raises
-        ------
-        ParameterError
-            When it has no robot of a number that is to fail or join, or no robot is there at the beginning.
+        Raises ParameterError when it has no robot of a number that is to fail or join, or no robot is there
+        at the beginning.
         """
         for name in ("failures", "joins"):
             for k, each in enumerate(getattr(self, name)):
@@ -217,10 +212,7 @@ class Conditions:
     def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
         """Return the conditions that `to_dict` wrote.
 
-        Raises
-        ------
-        ParameterError
-            When a key is missing or a value cannot be used.
+        Raises ParameterError when a key is missing or a value cannot be used.
         """
         try:
             given: dict[str, Any] = {name: plain[key] for name, (*_, key) in LIMITS.items()}
@@ -245,10 +237,7 @@ _JOIN = re.compile(rf"{_FAILURE.pattern}(?::({_NUMBER}),({_NUMBER}))?", re.ASCII
 def parsed_failure(text: str) -> Failure:
     """Return a failure from a text like ``3@20``: robot 3 fails after 20 s.
 
-    Raises
-    ------
-    ParameterError
-        When it is none.
+    Raises ParameterError when it is none.
     """
     found = _FAILURE.fullmatch(text)
     if found is None:
@@ -259,10 +248,7 @@ def parsed_failure(text: str) -> Failure:
 def parsed_join(text: str) -> Join:
     """Return a join from a text like ``5@30`` or ``5@30:2.5,1``: robot 5 joins after 30 s, at [2.5, 1].
 
-    Raises
-    ------
-    ParameterError
-        When it is none.
+    Raises ParameterError when it is none.
     """
     found = _JOIN.fullmatch(text)
     if found is None:

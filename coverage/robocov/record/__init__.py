@@ -63,10 +63,10 @@ class Record(Drawable):
         The same as shown to people.
     gains : dict of name to value
     start : str or None
-        Name of the start, None where positions were given.
     seed : int or None
+        Where the starts came from.
     dt : float, s
-        The control period. Moments lie that far apart, and farther where the record was thinned.
+        The control period, and between moments of a record that was not thinned.
     time : (T,) s
     positions : (T, n, 2) m
     velocities : (T, n, 2) m/s
@@ -164,10 +164,8 @@ class Record(Drawable):
     def at(self, time: float) -> Snapshot:
         """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
 
-        Raises
-        ------
-        ParameterError
-            When the time is before the first moment or after the last by more than a control period.
+        Raises ParameterError when the time is before the first moment or after the last by more than a
+        control period.
         """
         first, last = float(self.time[0]), float(self.time[-1])
         if not first - self.dt <= time <= last + self.dt:
@@ -179,10 +177,7 @@ class Record(Drawable):
     def until(self, time: float) -> Record:
         """Return the run up to `time`, s, that moment included: the record of a run that was stopped then.
 
-        Raises
-        ------
-        ParameterError
-            When that is before the first moment.
+        Raises ParameterError when that is before the first moment.
         """
         # half a microsecond forgives the rounding of sums of steps
         if not time >= float(self.time[0]) - 5e-7:
@@ -197,10 +192,7 @@ class Record(Drawable):
         Those moments stay that are nearest to multiples of 1/rate seconds from the first, of two as near
         the earlier; and so does the last. Where the record is sparser than that, it stays as it is.
 
-        Raises
-        ------
-        ParameterError
-            When the rate is negative or not finite.
+        Raises ParameterError when the rate is negative or not finite.
         """
         if not 0.0 <= rate < np.inf:
             raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
@@ -216,10 +208,7 @@ class Record(Drawable):
         The columns are time_s, robot (from 0; pictures number robots from 1), x_m, y_m, vx_m_s, vy_m_s, fx_N,
         fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m: the arrays of the record.
 
-        Raises
-        ------
-        RobocovError
-            When pandas is not installed: it comes with ``robocov[pandas]``.
+        Raises RobocovError when pandas is not installed: it comes with ``robocov[pandas]``.
         """
         pandas = extra("pandas", "pandas")
         moments, robots = self.positions.shape[:2]
@@ -262,12 +251,9 @@ class Record(Drawable):
     def save(
         self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> None:
-        """Write ``record.npz`` and ``run.json`` to `folder`, made where missing; each whole or not at all.
+        """Write ``record.npz`` and ``run.json`` to a folder, made where missing; each whole or not at all.
 
-        Raises
-        ------
-        OutputError
-            When they cannot be written.
+        Raises OutputError when they cannot be written.
         """
         folder = Path(folder)
         settle(folder)
@@ -286,11 +272,8 @@ class Record(Drawable):
     def load(cls, folder: Path | str) -> Record:
         """Return the record that `save` wrote to `folder`; the controller is not loaded, only named.
 
-        Raises
-        ------
-        InputError
-            When the folder holds no run, or one that cannot be read: the file, the place in it, the value and
-            what was wanted.
+        Raises InputError when the folder holds no run, or one that cannot be read: the file, the place in
+        it, the value and what was wanted.
         """
         from robocov.mapfile import from_json
         from robocov.record.run_document import read_run

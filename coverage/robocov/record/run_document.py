@@ -9,8 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from robocov.conditions import LIMITS as CONDITION_LIMITS
 from robocov.files.documents import Document, read_document, wanted
-from robocov.robots import LIMITS, json_key
-from robocov.robots.teamfile import MOST_ROBOTS
+from robocov.robots import LIMITS, MOST_ROBOTS, json_key
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -126,9 +125,6 @@ class RunDocument(Document):
 def read_run(path: Path) -> RunDocument:
     """Return the content of a file ``run.json``.
 
-    Raises
-    ------
-    InputError
-        When it is none; the message names the file, the place in it, the value and what was wanted.
+    Raises InputError with the file, the place in it, the value and what was wanted.
     """
     return read_document(path, RunDocument, FORMAT, VERSION)

@@ -1,14 +1,38 @@
-"""The team: what the robots are and what they can do, one row for each robot."""
+"""The team: what the robots are and what they can do, one row for each robot; files that say so.
+
+Team files, TOML or JSON, list groups of robots that are alike:
+
+    [[group]]
+    count = 2
+    max_speed = 1.5
+
+    [[group]]
+    count = 4
+    max_speed = 0.5
+    radius = 0.15
+"""
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robocov.arrays import Array, frozen
-from robocov.errors import ParameterError, counted, shown
+from robocov.errors import (
+    InputError,
+    ParameterError,
+    counted,
+    is_number,
+    one_line,
+    place,
+    shown,
+    unknown_name,
+)
+from robocov.files.strictjson import parse, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -64,10 +88,7 @@ class Team:
     communication_range : m
         Two robots are neighbours when both are in range of each other. Infinite: everybody hears everybody.
 
-    Raises
-    ------
-    ParameterError
-        On a value out of range; the message names the attribute and the value.
+    Raises ParameterError on a value out of range; the message names the attribute and the value.
     """
 
     radius: Array
@@ -163,10 +184,7 @@ class Team:
     def from_dict(cls, plain: Mapping[str, Any]) -> Team:
         """Return the team that `to_dict` wrote.
 
-        Raises
-        ------
-        ParameterError
-            When a key is missing or a value is not a number.
+        Raises ParameterError when a key is missing or a value is not a number.
         """
         try:
             n = int(plain["robots"])
@@ -178,3 +196,96 @@ class Team:
         except (KeyError, TypeError, ValueError) as error:
             raise ParameterError(f"team: cannot be read ({error!r})") from error
         return cls(*arrays)
+
+
+MOST_ROBOTS = 10_000
+
+NO_LIMIT = "null"
+"""Stands for a range without limit where there is no null."""
+
+_RANGES = ("sensing_range", "communication_range")
+
+
+def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = None) -> Team:
+    """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
+
+    What a group leaves open is as in `defaults`, then `Team.homogeneous`; None is a range without limit.
+
+    Raises InputError with the file, the key, the value and what was wanted.
+    """
+    path = Path(path)
+    where = one_line(path)
+    content = read_bytes(path)
+    if path.suffix.lower() == ".json":
+        document = parse(content, where)
+    else:
+        document = _toml(content, where)
+    if not isinstance(document, dict):
+        raise InputError(f"{where}: {shown(document)}, but an object with a list group was wanted")
+    for key in document:
+        if key != "group":
+            raise InputError(f"{where}: {unknown_name('key', key, ['group'])}")
+    try:
+        return team_of_groups(document.get("group"), ("group",), defaults)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def team_of_groups(
+    groups: object, path: tuple[str | int, ...], defaults: Mapping[str, float | None] | None = None
+) -> Team:
+    """Return the team of groups as they stand in a file at a path of keys; see `read_team`.
+
+    Raises InputError, which begins with the place.
+    """
+    if not isinstance(groups, list) or not groups:
+        found = "missing" if groups is None else shown(groups)
+        raise InputError(f"{place(path)}: {found}, but at least one table [[{place(path)}]] was wanted")
+    parts = [_group(group, (*path, k), dict(defaults or {})) for k, group in enumerate(groups)]
+    if sum(map(len, parts)) > MOST_ROBOTS:
+        raise InputError(
+            f"{place(path)}: {sum(map(len, parts))} robots, but at most {MOST_ROBOTS} were wanted"
+        )
+    return Team.joined(parts)
+
+
+def _group(group: object, path: tuple[str | int, ...], values: dict[str, float | None]) -> Team:
+    if not isinstance(group, dict):
+        raise InputError(f"{place(path)}: {shown(group)}, but a table was wanted")
+    for key in group:
+        if key not in ("count", *LIMITS):
+            raise InputError(f"{place(path)}: {unknown_name('key', str(key), ['count', *LIMITS])}")
+    count = group.get("count")
+    if not is_number(count, int) or not 1 <= count <= MOST_ROBOTS:
+        found = "missing" if count is None else shown(count)
+        wanted = f"a whole number from 1 to {MOST_ROBOTS}"
+        raise InputError(f"{place((*path, 'count'))}: {found}, but {wanted} was wanted")
+    for key in LIMITS:
+        if key in group:
+            values[key] = _value(key, group[key], (*path, key))
+    known = {name: np.inf if value is None else value for name, value in values.items()}
+    return Team.homogeneous(count, **known)
+
+
+def _value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
+    if name in _RANGES and value in (None, NO_LIMIT):
+        return None
+    if not is_number(value):
+        raise InputError(f"{place(path)}: {shown(value)}, but a number was wanted")
+    try:
+        Team.homogeneous(1, **{name: float(value)})
+    except ParameterError as error:
+        raise InputError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+    return float(value)
+
+
+def _toml(content: bytes, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
+    except ValueError as error:  # of TOML, or of a whole number with thousands of digits
+        text = one_line(error)
+        raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
+    except RecursionError:
+        raise InputError(f"{where}: nested too deeply") from None

@@ -56,10 +56,7 @@ class World:
     runs : int
         In so many worlds at once, each with its part of the robots, which never meet those of the others.
 
-    Raises
-    ------
-    ParameterError
-        When a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
+    Raises ParameterError when a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
     """
 
     _positions: Array
@@ -128,17 +125,10 @@ class World:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Move on by `dt` seconds under `forces`, (n, 2) N.
+        """Move on by `dt` seconds under the controllers' forces, (n, 2) N, viscosity and limits.
 
-        The forces are the controllers'; viscosity and limits are added here, the same for all.
-
-        Parameters
-        ----------
-        forces : (n, 2) N
-        dt : float, s
-        external_forces : (n, 2) N or None
-            As by a hand. They know no limits; a robot that they have made faster than it can be by itself
-            brakes as hard as it can.
+        External forces, (n, 2) N, as by a hand, know no limits; a robot that they have made faster than it
+        can be by itself brakes as hard as it can.
         """
         if external_forces is not None:
             external_forces = np.array(external_forces, dtype=float)

@@ -76,10 +76,7 @@ class ChangingWorld:
     ) -> None:
         """Move on by `dt` seconds, as `World.step`; then robots fail and join whose time has come.
 
-        Raises
-        ------
-        StartError
-            When there is no room for a robot that joins.
+        Raises StartError when there is no room for a robot that joins.
         """
         rows = self._rows
         self.positions, self.velocities = self.positions.copy(), np.zeros_like(self.velocities)

@@ -41,11 +41,6 @@ class ContactSolver:
     """Moves those robots on that touch each other, walls, or obstacles that move.
 
     It keeps nothing from one call to the next: what pymunk remembers of contacts goes with the discs.
-
-    Parameters
-    ----------
-    pieces, team, movers, failed_robots
-        As of `World`.
     """
 
     def __init__(
@@ -65,19 +60,10 @@ class ContactSolver:
         self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}
 
     def moved(self, rows: IntArray, state: Array, forces: Array, motion: Array, dt: float) -> Array:
-        """Return the positions and velocities of some robots after `dt` seconds, (k, 4) m and m/s.
+        """Return the state, (k, 4) m and m/s, of the robots of ascending rows after `dt` seconds.
 
-        Parameters
-        ----------
-        rows : (k,)
-            The robots, ascending.
-        state : (k, 4) m and m/s
-            Their positions and velocities.
-        forces : (k, 2) N
-            Net, and constant.
-        motion : (m, 4) m and m/s
-            Of the obstacles that move.
-        dt : float, s
+        `state` is that before, `forces` (k, 2) N are net and constant, `motion` (m, 4) m and m/s is that of
+        the obstacles that move.
         """
         reached = state[:, 2:] + forces * (dt / self._team.mass[rows, None])
         square = np.maximum((state[:, 2:] ** 2).sum(axis=1), (reached**2).sum(axis=1)).max()

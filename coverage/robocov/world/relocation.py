@@ -27,10 +27,7 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
 
     Who fits stays where it is, unless others that have to go somewhere push it.
 
-    Raises
-    ------
-    StartError
-        When there is no room; the message names a robot.
+    Raises StartError when there is no room; the message names a robot.
     """
     places = np.array(positions, dtype=float)
     room = {
@@ -72,10 +69,7 @@ def nearest_free(
 
     `others` is (n, 2) m, `radii` (n,) m or None: as the robot's.
 
-    Raises
-    ------
-    StartError
-        When there is none.
+    Raises StartError when there is none.
     """
     beside = np.full(len(others), radius) if radii is None else radii
     apart = np.hypot(*(others - point).T)
@@ -97,10 +91,7 @@ def check_starts(
 ) -> None:
     """Check that robots, (n, 2) m, or those that are `there`, (n,), are free but for `slack` metres.
 
-    Raises
-    ------
-    StartError
-        When a robot is in a wall or in another one; the message names it.
+    Raises StartError when a robot is in a wall or in another one; the message names it.
     """
     there = np.ones(len(positions), dtype=bool) if there is None else there
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
