@@ -316,7 +316,7 @@ class _Example:
         """Return what the function returns; keep the call, unless another kernel's function makes it."""
         if self._inside:
             return function(*args)
-        self.calls.append((kernel, tuple(map(_numba().typeof, args))))
+        self.calls.append((kernel, tuple(map(kernel._dispatcher.typeof_pyval, args))))
         self._inside = True
         try:
             return function(*args)
