@@ -79,4 +79,4 @@ def weighted_mean(values: Array, weights: Array | None = None) -> float:
     if weights is None:
         return float(values.mean()) if len(values) else np.nan
     total = float(weights.sum())
-    return float(weights @ values) / total if total > 0.0 else np.nan
+    return float((weights * values).sum()) / total if total > 0.0 else np.nan

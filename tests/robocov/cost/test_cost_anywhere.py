@@ -153,6 +153,17 @@ def test_every_bundled_map(name):
     assert compared(environment, 32, robots) < 1e-12
 
 
+@pytest.mark.parametrize("name", ["rooms", "corridor"])
+def test_medium_maps_agree_with_the_brute_force(name):
+    environment = load_map(name)
+    cost = CoverageCost(environment, 6)
+    places = [p for p in environment.start("uniform").sample(12, seed=5).tolist() if _well(environment, p)]
+    points = [p for p in cost.points.tolist() if _well(environment, p)]
+    expected = brute.distances(environment.free, places, points).min(axis=0)
+    found = cost(np.array(places)).distances[[p in points for p in cost.points.tolist()]]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * cost.geodesics.size)
+
+
 @pytest.mark.parametrize(("lattice", "robots"), [(32, 1000), (128, 1), (256, 300), (512, 50)])
 def test_lattices_and_teams_of_every_size(lattice, robots):
     environment = drawn_map("polygons", 40, 5)

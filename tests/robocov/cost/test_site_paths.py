@@ -1,7 +1,13 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from cost_cases import OFFICE
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -71,3 +77,48 @@ def test_coinciding_robots_share_as_the_first_of_them(count):
 def test_many_robots(count):
     rng = np.random.default_rng(count)
     checked_owners(60, rng.random((count, 2)))
+
+
+def test_round_corners_too_the_first_of_equal_robots_counts():
+    cost = CoverageCost(OFFICE, 24)
+    places = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
+    alone, doubled = cost(places), cost(np.concatenate([places, places]))
+    assert (alone.corner >= 0).any()
+    for name in ("owner", "distances", "corner", "last_corner"):
+        np.testing.assert_array_equal(getattr(doubled, name), getattr(alone, name))
+
+
+SAME_BITS = """
+import sys
+sys.path.insert(0, {folder!r})
+import numpy as np
+from cost_cases import OFFICE
+from robocov.cost import CoverageCost
+from robocov.density import Gaussian, Gaussians
+from robocov.environment import Environment
+density = Gaussians((Gaussian((3.0, 2.0), 1.0, 2.0),))
+office = Environment("office", OFFICE.boundary, OFFICE.obstacles, density=density)
+cost = CoverageCost(office, 12)
+for speeds in (None, np.array([0.3, 0.7, 0.3])):
+    result = cost(np.array([[1.0, 1.0], [10.0, 1.0], [5.5, 7.3]]), speeds)
+    numbers = result.value, result.mean_distance, *result.distances, *result.gradient.ravel(), *result.owner
+    print(*(float(number).hex() for number in numbers))
+"""
+
+
+def test_as_python_and_on_any_processor_the_bits_are_the_same():
+    script = SAME_BITS.format(folder=str(Path(__file__).parents[1]))
+    settings = (
+        {},
+        {"NUMBA_DISABLE_JIT": "1"},
+        {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "OPENBLAS_CORETYPE": "Prescott"},
+    )
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", script], env=os.environ | each, capture_output=True, text=True, check=True
+        ).stdout
+        for each in settings
+    ]
+    assert len(answers[0].split()) > 100
+    assert answers[1] == answers[0]
+    assert answers[2] == answers[0]
