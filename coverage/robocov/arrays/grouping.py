@@ -44,32 +44,6 @@ def ranges(first: IntArray, count: IntArray) -> IntArray:
     return np.asarray(np.arange(total) + (first - end + count).repeat(count))
 
 
-def least(target: IntArray, value: Array, best: Array, *labels: tuple[IntArray, IntArray]) -> None:
-    """Lower `best` (m,) to the least value given for each target; and label that, the first of equals.
-
-    Parameters
-    ----------
-    target : (p,)
-    value : (p,)
-    best : (m,)
-        Changed where a value is as low, or lower.
-    labels : pairs of (m,) and (p,)
-        Labels of the best, changed like it, and of the values.
-
-    Examples
-    --------
-    >>> best, robot = np.array([9.0, 2.0]), np.array([7, 7])
-    >>> least(np.array([0, 0, 0, 1]), np.array([6.0, 5.0, 5.0, 3.0]), best, (robot, np.array([0, 1, 2, 3])))
-    >>> best, robot
-    (array([5., 2.]), array([1, 7]))
-    """
-    np.minimum.at(best, target, value)
-    # of equals the first is written last
-    hit = (value == best[target]).nonzero()[0][::-1]
-    for label, given in labels:
-        label[target[hit]] = given[hit]
-
-
 def weighted_mean(values: Array, weights: Array | None = None) -> float:
     """Return the weighted mean of (m,) values, of none, or of none with a weight, nan.
 

@@ -1,125 +1,53 @@
 """Pieces of boundary that are circular arcs or segments, and what they enclose, in closed form.
 
-A piece is stored by its two ends and the signed half of the angle that it spans about its circle's centre.
-Zero is a segment, and an arc that is almost one loses no digit, however large its radius. What Green's
-theorem asks of a piece is the triangle that its chord spans with the origin, and the circular segment
-between chord and arc.
+A piece is a row x, y, u, v, a: its ends (m), and half of the angle that it spans about its circle's centre,
+from -pi/2 to pi/2, positive where it turns left. Zero is a segment, and an arc that is almost one loses no
+digit, however large its radius. Green's theorem asks for the triangle that the chord spans with the
+origin, and for the circular segment between chord and arc. What is enclosed lies to the left.
 """
 
 from __future__ import annotations
 
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.compiled import inner_kernel, kernel
 
 _SERIES_BELOW = 0.04
 """sin² of the half angle below which the series is taken: the closed form divides rounding by it."""
 
-_SERIES = tuple(2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1))
+_SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
 """Of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
 
-class Arcs(NamedTuple):
-    """Pieces of boundary, m of them, each with the area that it bounds to its left.
-
-    Attributes
-    ----------
-    start, end : (m, 2) m
-    half_angle : (m,) rad
-        Half of the angle that the piece spans about its circle's centre, from -pi/2 to pi/2: positive
-        where it turns left, so that it bulges out, negative where it turns right, zero on a segment.
-    """
-
-    start: Array
-    end: Array
-    half_angle: Array
-
-    def moments(self) -> tuple[Array, Array, Array]:
-        """Return what each piece adds to the area, and to the first and polar moments about the origin.
-
-        Returns
-        -------
-        area : (m,) m²
-        first : (m, 2) m³
-        polar : (m,) m⁴
-            Their sums over a whole boundary are the integrals of 1, q and |q|² over what it encloses.
-        """
-        (x, y), (u, v) = self.start.T, self.end.T
+@kernel
+def _moments(pieces: Array, n: int, series: Array) -> Array:
+    sums = np.zeros((n, 4))
+    for k in range(len(pieces)):
+        x, y, u, v = pieces[k, 0], pieces[k, 1], pieces[k, 2], pieces[k, 3]
         cross = x * v - u * y
-        middle = 0.5 * (self.start + self.end)
+        middle_x, middle_y = 0.5 * (x + u), 0.5 * (y + v)
         # to the right of the chord, as long as it is
-        out = np.column_stack([v - y, x - u])
-        square = out[:, 0] ** 2 + out[:, 1] ** 2
-        bulge, lever, spread = _segment(self.half_angle)
-        bulge, spread = bulge * square, spread * square * square
-        lever = lever[:, None] * square[:, None] * out
-        area = 0.5 * cross + bulge
-        first = middle * (cross / 3.0 + bulge)[:, None] + lever
+        out_x, out_y = v - y, x - u
+        square = out_x * out_x + out_y * out_y
+        area, lever, spread = _segment(pieces[k, 4], series)
+        area, lever, spread = area * square, lever * square, spread * square * square
+        i = int(pieces[k, 5])
+        sums[i, 0] += 0.5 * cross + area
+        sums[i, 1] += middle_x * (cross / 3.0 + area) + lever * out_x
+        sums[i, 2] += middle_y * (cross / 3.0 + area) + lever * out_y
         ends = x * (x + u) + u * u + y * (y + v) + v * v
-        away = middle[:, 0] ** 2 + middle[:, 1] ** 2
-        along = middle[:, 0] * lever[:, 0] + middle[:, 1] * lever[:, 1]
-        return area, first, cross * ends / 12.0 + spread + 2.0 * along + bulge * away
-
-    def points(self, sagitta: float) -> list[Array]:
-        """Return each piece as a line of chords, (k, 2) m with both ends, at most `sagitta` from it."""
-        out = np.column_stack([self.end[:, 1] - self.start[:, 1], self.start[:, 0] - self.end[:, 0]])
-        sine = np.sin(self.half_angle)
-        radius = 0.5 * np.hypot(out[:, 0], out[:, 1]) / np.maximum(np.abs(sine), 1e-300)
-        # a chord of half angle x leaves its arc by r (1 - cos x)
-        step = np.sqrt(2.0 * np.minimum(sagitta / np.maximum(radius, 1e-300), 0.5))
-        count = np.maximum(np.ceil(np.abs(self.half_angle) / np.maximum(step, 1e-3)), 1.0)
-        count[np.abs(radius * self.half_angle**2) < 2.0 * sagitta] = 1.0
-        lines = []
-        for k, parts in enumerate(count.astype(int).tolist()):
-            if parts == 1:
-                lines.append(np.stack([self.start[k], self.end[k]]))
-                continue
-            angle = self.half_angle[k] * np.linspace(-1.0, 1.0, parts + 1)
-            middle = 0.5 * (self.start[k] + self.end[k])
-            rise = 0.5 * (np.cos(angle) - np.cos(self.half_angle[k])) / sine[k]
-            run = 0.5 * np.sin(angle) / sine[k]
-            along = self.end[k] - self.start[k]
-            line = middle + run[:, None] * along + rise[:, None] * out[k]
-            line[0], line[-1] = self.start[k], self.end[k]
-            lines.append(line)
-        return lines
+        along = lever * (middle_x * out_x + middle_y * out_y)
+        away = middle_x * middle_x + middle_y * middle_y
+        sums[i, 3] += cross * ends / 12.0 + spread + 2.0 * along + area * away
+    return sums
 
 
-def rings(arcs: Arcs, sagitta: float) -> list[Array]:
-    """Return the closed lines that pieces in any order make up, as polygons, (k, 2) m each.
-
-    What the pieces enclose lies to the left: outlines run counter-clockwise, those of holes clockwise.
-
-    Parameters
-    ----------
-    arcs : Arcs
-        Every piece ends where another one begins, up to rounding.
-    sagitta : float, m
-        How far a polygon may leave its arcs.
-    """
-    lines = arcs.points(sagitta)
-    left = list(range(len(lines)))
-    found = []
-    while left:
-        first = k = left.pop(0)
-        ring = [lines[k][:-1]]
-        while True:
-            home = np.hypot(*(arcs.start[first] - arcs.end[k]))
-            away = arcs.start[left] - arcs.end[k]
-            distance = np.hypot(away[:, 0], away[:, 1])
-            if not left or home <= distance.min():
-                break
-            k = left.pop(int(distance.argmin()))
-            ring.append(lines[k][:-1])
-        found.append(np.concatenate(ring))
-    return found
-
-
-def _segment(half_angle: Array) -> tuple[Array, Array, Array]:
-    """Return area, lever and spread of circular segments with a chord of length 1, (m,) each.
+@inner_kernel
+def _segment(half_angle: float, series: Array) -> tuple[float, float, float]:
+    """Return area, lever and spread of the circular segment on a chord of length 1.
 
     The lever is the first moment about the chord's line, away from the centre; the spread is the polar
     moment about the middle of the chord. With s and c the sine and cosine of the half angle x, and
@@ -127,14 +55,63 @@ def _segment(half_angle: Array) -> tuple[Array, Array, Array]:
     """
     s, c = np.sin(half_angle), np.cos(half_angle)
     square = s * s
-    h = np.full_like(square, _SERIES[0])
-    for coefficient in _SERIES[1:]:
-        h *= square
-        h += coefficient
-    wide = (square > _SERIES_BELOW).nonzero()[0]
-    x, t = half_angle[wide], s[wide]
-    h[wide] = ((x - t * c[wide]) / t**3 - 2.0 / 3.0) / square[wide]
+    if square > _SERIES_BELOW:
+        h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / square
+    else:
+        h = 0.0
+        for coefficient in series:
+            h = h * square + coefficient
     area = s * (2.0 / 3.0 + square * h) / 4.0
     lever = square * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
-    spread = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - square) * h) / 16.0
-    return area, lever, spread
+    return area, lever, s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - square) * h) / 16.0
+
+
+def moments(pieces: Array, n: int) -> Array:
+    """Return area (m²), first moments x and y (m³) and polar moment (m⁴) of n cells, (n, 4).
+
+    `pieces` (p, 6 or more) are the boundaries; the sixth number is the cell about whose origin each is.
+    """
+    return np.asarray(_moments(np.ascontiguousarray(pieces), n, _SERIES))
+
+
+def chords(pieces: Array, sagitta: float) -> list[Array]:
+    """Return each piece as a line of chords, (k, 2) m with both ends, at most `sagitta` from it."""
+    lines = []
+    for x, y, u, v, half_angle in pieces[:, :5].tolist():
+        radius = 0.5 * np.hypot(u - x, v - y) / max(abs(np.sin(half_angle)), 1e-300)
+        parts = 1
+        if radius * half_angle**2 >= 2.0 * sagitta:
+            # a chord of half angle x leaves its arc by r (1 - cos x)
+            step = np.sqrt(2.0 * min(sagitta / max(radius, 1e-300), 0.5))
+            parts = int(np.ceil(abs(half_angle) / max(step, 1e-3)))
+        if parts == 1:
+            lines.append(np.array([[x, y], [u, v]]))
+            continue
+        angle = half_angle * np.linspace(-1.0, 1.0, parts + 1)
+        rise = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
+        run = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
+        line = np.column_stack([x + run * (u - x) + rise * (v - y), y + run * (v - y) + rise * (x - u)])
+        line[0], line[-1] = (x, y), (u, v)
+        lines.append(line)
+    return lines
+
+
+def rings(pieces: Array, sagitta: float) -> list[Array]:
+    """Return the closed lines that pieces in any order make up, as polygons, (k, 2) m each.
+
+    Outlines run counter-clockwise, those of holes clockwise. Every piece ends where another one begins, up
+    to rounding; the polygons leave the arcs by at most `sagitta` (m).
+    """
+    lines, left, found = chords(pieces, sagitta), list(range(len(pieces))), []
+    while left:
+        first = k = left.pop(0)
+        ring = [lines[k][:-1]]
+        while True:
+            home = np.hypot(*(pieces[first, :2] - pieces[k, 2:4]))
+            away = np.hypot(*(pieces[left, :2] - pieces[k, 2:4]).T)
+            if not left or home <= away.min():
+                break
+            k = left.pop(int(away.argmin()))
+            ring.append(lines[k][:-1])
+        found.append(np.concatenate(ring))
+    return found

@@ -1,4 +1,4 @@
-"""Which parts of many curves bound many cells: the curves are circles and lines, the cells where all agree.
+"""The boundaries of cells by travel time: which parts of lines and circles of Apollonius all others leave.
 
 About its generator, every boundary that a cell may have is a curve a |q|² + b q = c, and the cell lies
 where a |q|² + b q <= c: a line (a = 0), a circle around the cell (a > 0), or one around what is not the
@@ -12,252 +12,285 @@ A curve's point nearest to the generator, r n, and its curvature k = 2 a give it
 which is half the tangent of half the angle on a circle, and half the distance on a line. It runs with the
 cell on its left. Every other curve's condition on q(t) is a quadratic in t, so that all the ends come from
 one square root each. Each meeting is computed once, and is the same place on both curves: they cannot
-disagree.
+disagree. A curve is a row: n (2), r, a, and the values of t between which it is looked at.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.arrays.grouping import beginnings, ranges, sizes
-from robocov.voronoi.arcs import Arcs
-
-_SECTORS = 16
-"""Directions around a generator in which it is asked how far its cell can reach."""
+from robocov.compiled import inner_kernel, kernel
 
 _PARALLEL = 1e-29
 """sin² of the angle at which two curves meet, below which rounding alone decides whether they do and where;
 they are taken to be one within the other, which moves no border by more than rounding does."""
 
-_SLACK = 1.0 + 1e-9
-"""More than rounding can do to a reach."""
 
+@kernel
+def borders(
+    speeds: Array,
+    sides: Array,
+    points: Array,
+    indptr: IntArray,
+    indices: IntArray,
+    offsets: Array,
+    edges: Array,
+    first: IntArray,
+    kind: IntArray,
+) -> Array:
+    """Return the pieces of the boundaries of all cells: five numbers as in `arcs`, whose, and what is beyond.
 
-class Curves(NamedTuple):
-    """Curves that may bound cells, each cell's in one run.
-
-    Attributes
+    Parameters
     ----------
-    cell : (m,)
-        Ascending.
-    beyond : (m,)
-        The robot on the other side, or `REGION`.
-    normal : (m, 2)
-        n, the unit vector away from the generator.
-    near : (m,) m
-        r, how far out along it the curve begins.
-    half_curvature : (m,) 1/m
-        a.
-    begin, end : (m,) m
-        The values of t between which the curve is looked at; infinite on circles.
+    speeds : (n,) m/s
+    sides : (k, 5)
+        As `Region.sides`.
+    points : (n, 2) m
+    indptr : (n + 1,), indices : (m,)
+        Who hears whom, and
+    offsets : (m, 2) m
+        where, relative to the robot.
+    edges : (e, 6)
+        x, y, u, v, cell and beyond of the cells among equally fast robots, and
+    first : (n + 1,)
+        where each cell's begin.
+    kind : (n,), written
+        0 for a cell that only equally fast robots bound, 1 for one with circles, 2 for none: a faster robot
+        is in the same place.
     """
+    found, used = np.empty((len(edges) + 64, 7)), 0
+    for i in range(len(points)):
+        most = indptr[i + 1] - indptr[i] + first[i + 1] - first[i]
+        curves, beyond = np.empty((most, 6)), np.empty(most, np.intp)
+        lines = first[i + 1] - first[i]
+        count = _circles(curves, beyond, lines, speeds, indptr, indices, offsets, edges, first, i)
+        kind[i] = 2 if count < 0 else int(count > lines and lines > 0)
+        if kind[i] == 0:
+            if used + lines > len(found):
+                found = _roomier(found, used + lines)
+            for e in range(first[i], first[i + 1]):
+                for c in range(4):
+                    found[used, c] = edges[e, c]
+                found[used, 4], found[used, 5], found[used, 6] = 0.0, i, edges[e, 5]
+                used += 1
+        elif kind[i] == 1:
+            _lines(curves, beyond, sides, points, indptr, indices, offsets, edges, first, i)
+            meetings = np.empty((count, count, 2))
+            _all_meetings(curves, count, lines, meetings)
+            for c in range(count):
+                if used + 2 * count + 2 > len(found):
+                    found = _roomier(found, used + 2 * count + 2)
+                used = _parts(curves, count, c, meetings[c], found, used, i, beyond[c])
+    return found[:used]
 
-    cell: IntArray
-    beyond: IntArray
-    normal: Array
-    near: Array
-    half_curvature: Array
-    begin: Array
-    end: Array
 
-    def take(self, some: IntArray) -> Curves:
-        """Return some of the curves."""
-        return Curves._make(values[some] for values in self)
+@kernel
+def _roomier(table: Array, wanted: int) -> Array:
+    more = np.empty((2 * wanted, table.shape[1]))
+    more[: len(table)] = table
+    return more
 
 
-class Pieces(NamedTuple):
-    """The pieces of the curves that bound the cells.
+@inner_kernel
+def _circles(
+    curves: Array,
+    beyond: IntArray,
+    count: int,
+    speeds: Array,
+    indptr: IntArray,
+    indices: IntArray,
+    offsets: Array,
+    edges: Array,
+    first: IntArray,
+    i: int,
+) -> int:
+    """Write the circles that may bound a cell after its lines; return the rows, -1 for a cell of nothing."""
+    reach = 0.0
+    for e in range(first[i], first[i + 1]):
+        reach = max(reach, np.sqrt(edges[e, 0] ** 2 + edges[e, 1] ** 2))
+    for k in range(indptr[i], indptr[i + 1]):
+        more = speeds[indices[k]] - speeds[i]
+        distance = np.sqrt(offsets[k, 0] ** 2 + offsets[k, 1] ** 2)
+        if more > 0.0:
+            if distance == 0.0:
+                return -1
+            # the farthest place of a circle around the cell is behind the robot, seen from the faster one
+            reach = min(reach, distance * speeds[i] / more)
+    for k in range(indptr[i], indptr[i + 1]):
+        own, other = speeds[i], speeds[indices[k]]
+        distance = np.sqrt(offsets[k, 0] ** 2 + offsets[k, 1] ** 2)
+        near = distance * (own / (own + other))
+        if own != other and distance > 0.0 and near < reach:
+            curves[count, 0], curves[count, 1] = offsets[k, 0] / distance, offsets[k, 1] / distance
+            curves[count, 2] = near
+            curves[count, 3] = 0.5 * ((other - own) * (own + other) / (own * other)) / distance
+            curves[count, 4], curves[count, 5] = -np.inf, np.inf
+            beyond[count] = indices[k]
+            count += 1
+    return count
 
-    Attributes
-    ----------
-    cell, beyond : (p,)
-    arcs : Arcs
-        Relative to the generators, each with its cell on its left, and at most half a circle.
+
+@inner_kernel
+def _lines(
+    curves: Array,
+    beyond: IntArray,
+    sides: Array,
+    points: Array,
+    indptr: IntArray,
+    indices: IntArray,
+    offsets: Array,
+    edges: Array,
+    first: IntArray,
+    i: int,
+) -> None:
+    """Write the edges of a cell as lines between their ends.
+
+    The directions are those of the bisectors and of the region's sides: an edge may be so short that
+    rounding decides on its own.
     """
+    for e in range(first[i], first[i + 1]):
+        c = e - first[i]
+        x, y, u, v = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        middle_x, middle_y = 0.5 * (x + u), 0.5 * (y + v)
+        beyond[c] = int(edges[e, 5])
+        if beyond[c] >= 0:
+            for k in range(indptr[i], indptr[i + 1]):
+                if indices[k] == beyond[c]:
+                    distance = np.sqrt(offsets[k, 0] ** 2 + offsets[k, 1] ** 2)
+                    nx, ny, near = offsets[k, 0] / distance, offsets[k, 1] / distance, 0.5 * distance
+        else:
+            least = np.inf
+            for s in range(len(sides)):
+                room = sides[s, 4] - (points[i, 0] * sides[s, 2] + points[i, 1] * sides[s, 3])
+                away = abs(middle_x * sides[s, 2] + middle_y * sides[s, 3] - room)
+                if away < least:
+                    least, nx, ny = away, sides[s, 2], sides[s, 3]
+            near = nx * middle_x + ny * middle_y
+        curves[c, 0], curves[c, 1], curves[c, 2], curves[c, 3] = nx, ny, near, 0.0
+        curves[c, 4], curves[c, 5] = 0.5 * (nx * y - ny * x), 0.5 * (nx * v - ny * u)
 
-    cell: IntArray
-    beyond: IntArray
-    arcs: Arcs
 
-    def take(self, some: IntArray) -> Pieces:
-        """Return some of the pieces."""
-        return Pieces(self.cell[some], self.beyond[some], Arcs(*(values[some] for values in self.arcs)))
+@inner_kernel
+def _all_meetings(curves: Array, count: int, lines: int, meetings: Array) -> None:
+    """Write where each curve enters and leaves the cell's side of each other; nan where they do not meet.
 
-
-def in_reach(curves: Curves) -> Curves:
-    """Return the curves without those that are out of reach of what the other curves leave of their cell.
-
-    Lines and circles around the cell have it in a convex set about its generator; in each of some sectors it
-    is bounded by the least of their far ends there, and what is wholly beyond that bounds nothing.
+    A curve of which no part is on the cell's side of another one gets an empty interval. Lines of one cell
+    are not held against each other: between their ends they are its edges.
     """
-    if not len(curves.cell):
-        return curves
-    half = np.pi / _SECTORS
-    turn = 2.0 * half * np.arange(_SECTORS)
-    # cosine and sine of the angle between a curve's normal and a sector's middle, then to its nearest
-    # and farthest direction
-    cosine = curves.normal @ np.stack([np.cos(turn), np.sin(turn)])
-    sine = np.abs(curves.normal @ np.stack([np.sin(turn), -np.cos(turn)]))
-    ahead = np.where(cosine >= np.cos(half), 1.0, cosine * np.cos(half) + sine * np.sin(half))
-    aside = np.where(cosine <= -np.cos(half), -1.0, cosine * np.cos(half) - sine * np.sin(half))
-    first = beginnings(curves.cell)
-    around = curves.half_curvature >= 0.0
-    inside = around & (curves.near > 0.0)
-    far = np.where(inside[:, None], _radius(curves, aside), np.inf)
-    reach = np.minimum.reduceat(far, first).repeat(sizes(first, len(curves.cell)), axis=0)
-    near = _radius(curves, ahead) < _SLACK * reach
-    return curves.take((near.any(axis=1) | (curves.half_curvature == 0.0)).nonzero()[0])
+    for one in range(count):
+        meetings[one, one, 0] = meetings[one, one, 1] = np.nan
+        for other in range(one + 1, count):
+            enter, leave, apart = np.nan, np.nan, 0
+            if other >= lines:
+                enter, leave, apart = _meeting(curves, one, other)
+            if apart & 1:
+                curves[one, 5] = -np.inf
+            if apart & 2:
+                curves[other, 5] = -np.inf
+            meetings[one, other, 0], meetings[one, other, 1] = enter, leave
+            # where a curve leaves the side of another one, that one enters its side: in the same place
+            meetings[other, one, 0] = _parameter(curves, other, *_place(curves, one, leave))
+            meetings[other, one, 1] = _parameter(curves, other, *_place(curves, one, enter))
 
 
-def _radius(curves: Curves, cosine: Array) -> Array:
-    """Return how far from the generator curves (m,) first are at angles (m, s) from their normals."""
-    b = (1.0 - 2.0 * curves.half_curvature * curves.near)[:, None]
-    c = (curves.near * (1.0 - curves.half_curvature * curves.near))[:, None]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        radius = 2.0 * c / (b * cosine + np.sqrt(1.0 - b * b * (1.0 - cosine * cosine)))
-    return np.where(radius >= 0.0, radius, np.inf)
+@inner_kernel
+def _meeting(curves: Array, one: int, other: int) -> tuple[float, float, int]:
+    """Return where a curve enters the cell's side of another one, where it leaves it, and who is apart.
 
-
-def boundaries(curves: Curves) -> Pieces:
-    """Return the pieces of the curves on which all other curves of the same cell agree.
-
-    Lines of one cell are not held against each other: between their ends they are to be its edges.
+    Apart (1 for the first, 2 for the other, 3 for both) is of which no part is on the other one's side.
     """
-    if not len(curves.cell):
-        return _pieces(curves, curves.cell, curves.begin, curves.end)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return _pieces(curves, *_intervals(curves))
-
-
-def _intervals(curves: Curves) -> tuple[IntArray, Array, Array]:
-    """Return the intervals of t on which curves bound their cells: of which curve, from where to where."""
-    one, other = _pairs(curves)
-    apart, enter, leave = _meetings(curves, one, other)
-    # where a curve leaves the side of another one, that one enters its side: in the same place
-    back = _parameter(curves, other, _places(curves, one, leave))
-    forth = _parameter(curves, other, _places(curves, one, enter))
-    curve = np.concatenate([one, other])
-    enter, leave = np.concatenate([enter, back]), np.concatenate([leave, forth])
-
-    begin, end = curves.begin.copy(), curves.end.copy()
-    end[apart] = -np.inf
-    between = (enter <= leave).nonzero()[0]
-    np.maximum.at(begin, curve[between], enter[between])
-    np.minimum.at(end, curve[between], leave[between])
-    gap = ((leave < enter) & (leave < end[curve]) & (enter > begin[curve])).nonzero()[0]
-    return _without_gaps(begin, end, curve[gap], leave[gap], enter[gap])
-
-
-def _pairs(curves: Curves) -> tuple[IntArray, IntArray]:
-    """Return the pairs of curves of one cell, each once, and none of two lines."""
-    first = beginnings(curves.cell)
-    size = sizes(first, len(curves.cell))
-    place = np.arange(len(curves.cell))
-    count = (first + size).repeat(size) - place - 1
-    one, other = place.repeat(count), ranges(place + 1, count)
-    bent = curves.half_curvature != 0.0
-    some = (bent[one] | bent[other]).nonzero()[0]
-    return one[some], other[some]
-
-
-def _meetings(curves: Curves, one: IntArray, other: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return how (p,) pairs of curves meet.
-
-    Returns
-    -------
-    apart : (k,)
-        The curves of which no part is on the cell's side of another one.
-    enter, leave : (p,) m
-        Where the first curve of each pair enters the cell's side of the other one, and where it leaves it;
-        nan where they do not meet.
-    """
-    a, near = curves.half_curvature, curves.near
-    b = curves.normal * (1.0 - 2.0 * a * near)[:, None]  # b² + 4 a c = 1, and a r² + |b| r = c
-    c = near * (1.0 - a * near)
-    a1, r, k = a[one], near[one], 2.0 * a[one]
-    a2, b2, c2 = a[other], b[other], c[other]
-    n1, b1, c1 = curves.normal[one], b[one], c[one]
-    out = b2[:, 0] * n1[:, 0] + b2[:, 1] * n1[:, 1]
-    left = b2[:, 1] * n1[:, 0] - b2[:, 0] * n1[:, 1] + 0.0  # no negative zero
+    n1x, n1y, r, a1 = curves[one, 0], curves[one, 1], curves[one, 2], curves[one, 3]
+    n2x, n2y, r2, a2 = curves[other, 0], curves[other, 1], curves[other, 2], curves[other, 3]
+    # b² + 4 a c = 1, and a r² + |b| r = c
+    b1, b2 = 1.0 - 2.0 * a1 * r, 1.0 - 2.0 * a2 * r2
+    b1x, b1y, c1 = n1x * b1, n1y * b1, r * (1.0 - a1 * r)
+    b2x, b2y, c2 = n2x * b2, n2y * b2, r2 * (1.0 - a2 * r2)
+    out, left = b2x * n1x + b2y * n1y, b2y * n1x - b2x * n1y + 0.0  # no negative zero
+    k = 2.0 * a1
     bend = 2.0 - r * k
     # on the first curve the other one's condition is square t² + 2 left t + constant <= 0
     square = a2 * bend * bend - k * out * bend - c2 * k * k
     constant = a2 * r * r + r * out - c2
-    g = b1[:, 0] * b2[:, 0] + b1[:, 1] * b2[:, 1] + 2.0 * (a1 * c2 + a2 * c1)
     # 1 - g² as a sum of minors: where curves meet at a small angle, it would be nothing but rounding
-    ab, bc = b1 * a2[:, None] - b2 * a1[:, None], b1 * c2[:, None] - b2 * c1[:, None]
-    minors = (b1[:, 0] * b2[:, 1] - b1[:, 1] * b2[:, 0]) ** 2 - 4.0 * (a1 * c2 - a2 * c1) ** 2
-    minors += 4.0 * (ab[:, 0] * bc[:, 0] + ab[:, 1] * bc[:, 1])
-    meet = minors > _PARALLEL
-    root = np.sqrt(np.where(meet, minors, np.nan))
-    large = -left - np.copysign(root, left)
-    early, late = large / square, constant / large
-    enter, leave = np.where(left >= 0.0, early, late), np.where(left >= 0.0, late, early)
-    # without a meeting, one curve is within the other (g >= 1), or neither, or both are out
+    turn, across = b1x * b2y - b1y * b2x, a1 * c2 - a2 * c1
+    minors = turn * turn - 4.0 * across * across
+    minors += 4.0 * (
+        (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
+    )
+    if minors > _PARALLEL:
+        large = -left - np.copysign(np.sqrt(minors), left)
+        if left >= 0.0:
+            return large / square, constant / large, 0
+        return constant / large, large / square, 0
+    # one curve is within the other (g >= 1), or neither, or both are out
     outside = square + constant > 0.0
-    first = one[~meet & outside]
-    second = other[~meet & (outside == (g < 0.0))]
-    return np.concatenate([first, second]), enter, leave
+    g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
+    return np.nan, np.nan, (1 if outside else 0) + (2 if outside == (g < 0.0) else 0)
 
 
-def _without_gaps(
-    begin: Array, end: Array, curve: IntArray, low: Array, high: Array
-) -> tuple[IntArray, Array, Array]:
-    """Return what is left of the intervals from `begin` to `end` of all curves without gaps in them."""
-    count = len(begin)
-    # what is before the interval counts as a gap, too
-    curve = np.concatenate([np.arange(count), curve])
-    low, high = np.concatenate([np.full(count, -np.inf), low]), np.concatenate([begin, high])
-    order = np.lexsort((low, curve))
-    curve, low, high = curve[order], low[order], high[order]
-    # the farthest end of the gaps so far: a running maximum, of ranks, in which later curves count for more
-    rank = np.empty(len(high), dtype=np.intp)
-    by_end = high.argsort(kind="stable")
-    rank[by_end] = np.arange(len(high))
-    farthest = np.maximum.accumulate(rank + curve * len(high)) - curve * len(high)
-    start = high[by_end[farthest]]
-    following = np.concatenate([low[1:], [0.0]])
-    last = np.concatenate([curve[1:] != curve[:-1], [True]])
-    stop = np.where(last, end[curve], np.minimum(following, end[curve]))
-    some = (start < stop).nonzero()[0]
-    return curve[some], start[some], stop[some]
+@inner_kernel
+def _parts(
+    curves: Array, count: int, c: int, meetings: Array, found: Array, used: int, i: int, beyond: int
+) -> int:
+    """Write the parts of a curve that all others leave; return how many pieces there are then."""
+    begin, end = curves[c, 4], curves[c, 5]
+    for o in range(count):
+        if meetings[o, 0] <= meetings[o, 1]:
+            begin, end = max(begin, meetings[o, 0]), min(end, meetings[o, 1])
+    # where another one leaves two parts there is a gap between them: the gaps by their begins
+    gaps = 0
+    for o in range(count):
+        enter, leave = meetings[o, 0], meetings[o, 1]
+        if leave < enter and leave < end and enter > begin:
+            k = gaps
+            while k > 0 and meetings[k - 1, 1] > leave:
+                meetings[k, 0], meetings[k, 1] = meetings[k - 1, 0], meetings[k - 1, 1]
+                k -= 1
+            meetings[k, 0], meetings[k, 1] = enter, leave
+            gaps += 1
+    for k in range(gaps):
+        used = _piece(curves, c, begin, min(meetings[k, 1], end), found, used, i, beyond)
+        begin = max(begin, meetings[k, 0])
+    return _piece(curves, c, begin, end, found, used, i, beyond)
 
 
-def _pieces(curves: Curves, curve: IntArray, begin: Array, end: Array) -> Pieces:
-    # at most half a circle each: cut where t is zero, and where it is infinite they are already
-    cut = ((begin < 0.0) & (end > 0.0) & (curves.half_curvature[curve] != 0.0)).nonzero()[0]
-    curve = np.concatenate([curve, curve[cut]])
-    begin = np.concatenate([begin, np.zeros(len(cut))])
-    end = np.concatenate([end, end[cut]])
-    end[cut] = 0.0
-    order = np.lexsort((begin, curve))
-    curve, begin, end = curve[order], begin[order], end[order]
-    k = 2.0 * curves.half_curvature[curve]
-    angle = np.where(k == 0.0, 0.0, np.arctan(k * end) - np.arctan(k * begin))
-    arcs = Arcs(_places(curves, curve, begin), _places(curves, curve, end), angle)
-    return Pieces(curves.cell[curve], curves.beyond[curve], arcs)
+@inner_kernel
+def _piece(
+    curves: Array, c: int, begin: float, end: float, found: Array, used: int, i: int, beyond: int
+) -> int:
+    """Write a part of a curve, at most half a circle a piece: cut where t is zero."""
+    k = 2.0 * curves[c, 3]
+    while begin < end:
+        stop = 0.0 if begin < 0.0 < end and k != 0.0 else end
+        found[used, 0], found[used, 1] = _place(curves, c, begin)
+        found[used, 2], found[used, 3] = _place(curves, c, stop)
+        found[used, 4] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * begin)
+        found[used, 5], found[used, 6] = i, beyond
+        begin, used = stop, used + 1
+    return used
 
 
-def _places(curves: Curves, curve: IntArray, t: Array) -> Array:
-    """Return q(t), (p, 2) m."""
-    k, normal = 2.0 * curves.half_curvature[curve], curves.normal[curve]
-    small = np.abs(k * t) <= 1.0
-    over = 1.0 / np.where(t == 0.0, 1.0, t)
-    flat, steep = 1.0 + (k * t) ** 2, over * over + k * k
-    left = 2.0 * np.where(small, t / flat, over / steep)
-    out = curves.near[curve] - 2.0 * k * np.where(small, t * t / flat, 1.0 / steep)
-    x = out * normal[:, 0] - left * normal[:, 1]
-    y = out * normal[:, 1] + left * normal[:, 0]
-    return np.column_stack([x, y])
+@inner_kernel
+def _place(curves: Array, c: int, t: float) -> tuple[float, float]:
+    """Return q(t), m."""
+    k = 2.0 * curves[c, 3]
+    if abs(k * t) <= 1.0:
+        flat = 1.0 + (k * t) ** 2
+        left, out = 2.0 * t / flat, curves[c, 2] - 2.0 * k * t * t / flat
+    else:
+        over = 1.0 / t
+        steep = over * over + k * k
+        left, out = 2.0 * over / steep, curves[c, 2] - 2.0 * k / steep
+    return out * curves[c, 0] - left * curves[c, 1], out * curves[c, 1] + left * curves[c, 0]
 
 
-def _parameter(curves: Curves, curve: IntArray, places: Array) -> Array:
-    """Return t where q(t) is nearest to (p, 2) places next to the curves."""
-    k, normal = 2.0 * curves.half_curvature[curve], curves.normal[curve]
-    out = places[:, 0] * normal[:, 0] + places[:, 1] * normal[:, 1] - curves.near[curve]
-    left = places[:, 1] * normal[:, 0] - places[:, 0] * normal[:, 1]
+@inner_kernel
+def _parameter(curves: Array, c: int, x: float, y: float) -> float:
+    """Return t where q(t) is nearest to a place next to the curve."""
+    k = 2.0 * curves[c, 3]
+    out = x * curves[c, 0] + y * curves[c, 1] - curves[c, 2]
+    left = y * curves[c, 0] - x * curves[c, 1]
     over = 2.0 + k * out
-    return np.asarray(np.where(over > 1.0, left / over, -out / (k * left)))
+    t: float = left / over if over > 1.0 else -out / (k * left)
+    return t

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.arrays.grouping import beginnings, least, ranges, sizes
+from robocov.arrays.grouping import beginnings, ranges, sizes
 
 numbers = st.lists(st.integers(0, 4), min_size=1, max_size=30)
 
@@ -22,16 +22,3 @@ def test_ranges(parts):
     first, count = (np.array([part[k] for part in parts], dtype=np.intp) for k in (0, 1))
     expected = [number for begin, size in parts for number in range(begin, begin + size)]
     assert ranges(first, count).tolist() == expected
-
-
-@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 5)), max_size=30))
-def test_least(pairs):
-    target = np.array([target for target, _ in pairs], dtype=np.intp)
-    value = np.array([float(value) for _, value in pairs])
-    best, label = np.full(5, 4.0), np.full(5, -1)
-    least(target, value, best, (label, np.arange(len(pairs))))
-    for k in range(5):
-        given_ = [(v, i) for i, (t, v) in enumerate(pairs) if t == k and v <= 4.0]
-        assert best[k] == min([4.0, *(v for v, _ in given_)])
-        # of equals the first
-        assert label[k] == (min(given_)[1] if given_ else -1)
