@@ -227,46 +227,28 @@ def _short(value: Any) -> Any:
 
 
 def _dumped(document: dict[str, Any]) -> str:
-    lines = []
-    for key, value in document.items():
-        if key in ("obstacles", "starts"):
-            text = _expanded(value, "  ")
-        else:
-            text = _text(value, "  ", len(key) + 6)
-        lines.append(f"  {_compact(key)}: {text}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    return _text(document, "", 0, expanded=True) + "\n"
 
 
-def _text(value: object, indent: str, used: int) -> str:
+def _text(value: Any, indent: str, used: int, *, expanded: bool = False) -> str:
     """Return `value` on one line where it fits or is a list of points, else one item on a line."""
-    line = _compact(value)
-    if used + len(_NUMBER.sub("00", line)) <= _LINE or not isinstance(value, (dict, list)):
-        return line
-    if isinstance(value, list) and all(isinstance(item, list) and not _is_ring(item) for item in value):
-        return line
-    return _expanded(value, indent)
-
-
-def _expanded(value: dict[str, Any] | list[Any], indent: str) -> str:
-    """Return a list or an object with one item on a line."""
+    whole = not isinstance(value, (dict, list)) or not value
+    if whole or not expanded:
+        line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+        points = isinstance(value, list) and all(isinstance(x, list) and not _is_ring(x) for x in value)
+        if whole or points or used + len(_NUMBER.sub("00", line)) <= _LINE:
+            return line
     inner = indent + "  "
-    if not value:
-        return _compact(value)
-    if isinstance(value, list):
-        items = [_text(item, inner, len(inner)) for item in value]
-        return "[\n" + ",\n".join(inner + item for item in items) + f"\n{indent}]"
     items = []
-    for key, item in value.items():
-        head = f"{_compact(key)}: "
-        # the rows of a raster are no points: one on a line
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        head = f"{json.dumps(key, ensure_ascii=False)}: " if isinstance(value, dict) else ""
+        # things stand on lines of their own, and so do the rows of a raster, which are no points
         rows = key == "rows" and isinstance(item, list) and len(item) > 1
-        items.append(head + (_expanded(item, inner) if rows else _text(item, inner, len(inner) + len(head))))
-    return "{\n" + ",\n".join(inner + item for item in items) + f"\n{indent}}}"
+        things = not indent and key in ("obstacles", "starts")
+        items.append(inner + head + _text(item, inner, len(inner) + len(head), expanded=rows or things))
+    left, right = "[]" if isinstance(value, list) else "{}"
+    return left + "\n" + ",\n".join(items) + f"\n{indent}{right}"
 
 
 def _is_ring(value: object) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
-
-
-def _compact(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
