@@ -18,7 +18,7 @@ from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.placement import CoverageDemand, OwnPlace, Table, own_place, team_places
-from robocov.planning.wayfinding import Ways, Window
+from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
 FINEST_CELL, MOST_CELLS = 0.1, 250_000
@@ -74,7 +74,7 @@ class PlannerState:
     tracker: RestTracker
     since: float = 0.0  # when it began, or the robots that it hears became others, s
     planned: DiscoveredMap | None = None  # the map when the last plan was made,
-    ways: Ways | None = None  # and what was computed of it
+    ways: GridPlanner | None = None  # and what was computed of it
     table: Table | None = None
     situation: Array | None = None  # (k, 2) m, where the robots were at the last plan, this one first,
     group: IntArray | None = None  # (k,), who they were,
@@ -254,13 +254,15 @@ class Atlas(WithGains):
         state = replace(state, own=own.goal, node=own.node)
         return self._looking(state, ways, demand, own, place, period)
 
-    def _mapped(self, state: PlannerState, window: Window, clearance: float) -> tuple[PlannerState, Ways]:
+    def _mapped(
+        self, state: PlannerState, window: Window, clearance: float
+    ) -> tuple[PlannerState, GridPlanner]:
         """Return a state with the ways of the present map; where no wall is new these are the former ones."""
         ways, blocked = state.ways, window.cut(state.known.blocked, True)
         # nodes of another window have other numbers
         node = state.node if ways is not None and ways.window == window else -1
         if ways is None or ways.window != window or not np.array_equal(ways.blocked, blocked):
-            ways = Ways(state.known.raster, window, blocked, clearance)
+            ways = GridPlanner(state.known.raster, window, blocked, clearance)
             state = replace(state, ways=ways, table=None, node=node)
         return state, ways
 
@@ -281,7 +283,7 @@ class Atlas(WithGains):
         if table is None:
             window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
             blocked = window.cut(known.blocked, True)
-            table = Table.of(Ways(known.raster, window, blocked, ways.clearance))
+            table = Table.of(GridPlanner(known.raster, window, blocked, ways.clearance))
         weights = CoverageDemand(known, table.ways.window, seen.density, sure).weights
         fixed = np.concatenate([[False], still])
         begin = situation.copy()
@@ -296,7 +298,7 @@ class Atlas(WithGains):
     def _looking(
         self,
         state: PlannerState,
-        ways: Ways,
+        ways: GridPlanner,
         demand: CoverageDemand,
         own: OwnPlace,
         place: Array,

@@ -1,6 +1,6 @@
 """Where the robots of a team should be, for all that one of them knows: plans on a lattice of ways.
 
-The cost is (22) on the nodes of `Ways`, weighted with the area (times the density) that each stands for:
+The cost is (22) on the nodes of `GridPlanner`, each weighted with its area (times the density):
 
     J(P) = sum over q of w_q min_j d(q, p_j)
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from robocov.density import Density
     from robocov.planning.discovered import DiscoveredMap
-    from robocov.planning.wayfinding import Ways, Window
+    from robocov.planning.wayfinding import GridPlanner, Window
 
 MOST_SOURCES = 180
 """A plan for a team chooses among at most so many nodes; its own goal each robot then finds among all."""
@@ -139,7 +139,7 @@ def _best_view(
 class Table:
     """Distances from some nodes, among which a plan for a team chooses, to all."""
 
-    ways: Ways
+    ways: GridPlanner
     sources: IntArray  # (c,)
     distance: Array  # (c, m) m
 
@@ -147,7 +147,7 @@ class Table:
         return self
 
     @classmethod
-    def of(cls, ways: Ways) -> Table:
+    def of(cls, ways: GridPlanner) -> Table:
         """Return the table of every k-th node in both directions, as many as are allowed."""
         row, column = np.divmod(np.arange(len(ways.nodes)), ways.window.columns)
         for k in count(1):
@@ -230,7 +230,7 @@ class OwnPlace:
 
 
 def own_place(
-    ways: Ways, weights: Array, others: Array, begin: int, former: Array, rest: float, steps: int = 6
+    ways: GridPlanner, weights: Array, others: Array, begin: int, former: Array, rest: float, steps: int = 6
 ) -> OwnPlace:
     """Return a local minimum of the cost by the place of one robot alone, for given places of the others.
 
@@ -271,7 +271,7 @@ def own_place(
     return OwnPlace(goal, node, mine, costs[node])
 
 
-def _neighbours(ways: Ways, node: int) -> list[int]:
+def _neighbours(ways: GridPlanner, node: int) -> list[int]:
     """Return the nodes right of, above, left of and below a node, -1 where there is none to go to."""
     high, wide = ways.window.rows, ways.window.columns
     row, column = divmod(node, wide)
@@ -281,7 +281,7 @@ def _neighbours(ways: Ways, node: int) -> list[int]:
 
 
 def _refined(
-    ways: Ways, node: int, around: list[int], cost: Mapping[int, float], former: Array
+    ways: GridPlanner, node: int, around: list[int], cost: Mapping[int, float], former: Array
 ) -> tuple[Array, float]:
     """Return the minimum of the parabolas round a node, and how far the former goal is above it."""
     right, up, left, down = around

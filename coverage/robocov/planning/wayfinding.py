@@ -93,7 +93,7 @@ def _stepped(middle: int, half: int, most: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
+class GridPlanner:
     """Distances and routes among the blocked cells of a window.
 
     Attributes
@@ -112,7 +112,7 @@ class Ways:
     clearance: float
     _known: dict[int, Array] = field(default_factory=dict)
 
-    def __deepcopy__(self, memo: object) -> Ways:
+    def __deepcopy__(self, memo: object) -> GridPlanner:
         return self
 
     @property

@@ -8,7 +8,7 @@ from robocov.density import Gaussian, Gaussians
 from robocov.observation.region import Region
 from robocov.planning.discovered import FREE, WALL, DiscoveredMap, Raster
 from robocov.planning.placement import CoverageDemand, Table, own_place, team_places
-from robocov.planning.wayfinding import Ways, Window
+from robocov.planning.wayfinding import GridPlanner, Window
 
 REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0]]))
 RASTER = Raster(REGION, 0.1)
@@ -22,8 +22,8 @@ def known(*walls: tuple[slice, slice]) -> DiscoveredMap:
     return DiscoveredMap(RASTER, state)
 
 
-def ways(on: DiscoveredMap) -> Ways:
-    return Ways(RASTER, WINDOW, WINDOW.cut(on.blocked, True), 0.15)
+def ways(on: DiscoveredMap) -> GridPlanner:
+    return GridPlanner(RASTER, WINDOW, WINDOW.cut(on.blocked, True), 0.15)
 
 
 HALVES = (slice(0, 28), slice(39, 41))

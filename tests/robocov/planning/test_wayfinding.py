@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 from robocov.observation.region import Region
 from robocov.planning.discovered import Raster, dilate
-from robocov.planning.wayfinding import Ways, Window
+from robocov.planning.wayfinding import GridPlanner, Window
 
 REGION = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]]))
 RASTER = Raster(REGION, 0.1)
 
 
-def ways(blocked: np.ndarray, clearance: float = 0.15, most: int = 150) -> Ways:
+def ways(blocked: np.ndarray, clearance: float = 0.15, most: int = 150) -> GridPlanner:
     window = Window.around(RASTER, np.array([3.0, 2.0]), math.inf, most)
-    return Ways(RASTER, window, window.cut(blocked, True), clearance)
+    return GridPlanner(RASTER, window, window.cut(blocked, True), clearance)
 
 
 def walled(door: slice = slice(30, 37)) -> np.ndarray:
