@@ -13,8 +13,7 @@ import numpy as np
 from robocov.controllers import make_controller
 from robocov.cost.momentary_cost import MomentaryCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
-from robocov.record import Record
-from robocov.record.recorder import Recorder
+from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.building import FILM_LATTICE, built_cost, cost_for_pictures

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.controllers import CONTROLLERS, remembers
-from robocov.record import ARRAYS
-from robocov.record.recorder import Recorder
+from robocov.record import ARRAYS, Recorder
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, Simulation
 

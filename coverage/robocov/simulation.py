@@ -22,8 +22,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.decisions import checked_decision, detached, given_forces
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.scans import Scanning, Scans
-from robocov.record import Record
-from robocov.record.recorder import Recorder
+from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
 from robocov.world import MAX_PENETRATION, World

@@ -29,7 +29,7 @@ from robocov.controllers import remembers
 from robocov.environment import CircleObstacle
 from robocov.errors import RobocovError
 from robocov.observation import Decision, Snapshot
-from robocov.record.recorder import Recorder
+from robocov.record import Recorder
 from robocov_app.demo.editing import with_obstacle
 from robocov_app.demo.history import State
 from robocov_app.demo.lane import simulation_of

@@ -13,8 +13,7 @@ from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import close_pairs
 from robocov.observation.scans import Scanning
-from robocov.record import Record
-from robocov.record.recorder import Recorder
+from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning.driving import driving_forces

@@ -21,8 +21,7 @@ from robocov.errors import RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.record import ARRAYS, versions
-from robocov.record.recorder import Recorder
+from robocov.record import ARRAYS, Recorder, versions
 from robocov.simulation import Simulation
 from robocov_app.output import csv_text, finite
 from robocov_app.run import cost_columns, cost_rows

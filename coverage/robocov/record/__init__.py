@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import platform
+import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions
-from robocov.controllers import short_name
+from robocov.controllers import gain_values, short_name
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, shown
@@ -32,6 +33,7 @@ from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from robocov.controllers.base import Controller
     from robocov.controllers.gains import Value
 
 _COLUMNS = {
@@ -306,6 +308,62 @@ class Record(Drawable):
             session=run.session.model_dump(exclude_unset=True),
             conditions=conditions,
             **_arrays_of(folder / "record.npz", len(team)),
+        )
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Collects snapshots into a `Record`; what was collected can be had at any time.
+
+    `name` is the controller's where it is not its own, as in ``mine.py:MyController``.
+
+    Raises ParameterError where a gain of the controller cannot be recorded.
+    """
+
+    environment: Environment
+    team: Team
+    controller: Controller
+    dt: float
+    _: KW_ONLY
+    name: str | None = None
+    start: str | None = None
+    seed: int | None = None
+    conditions: Conditions | None = None
+
+    def __post_init__(self) -> None:
+        self.name = self.controller.name if self.name is None else self.name
+        self._gains = gain_values(getattr(self.controller, "law", self.controller))
+        for gain, value in self._gains.items():
+            number = isinstance(value, int | float) and abs(value) <= sys.float_info.max
+            if not (value is None or isinstance(value, str) or number):
+                raise ParameterError(
+                    f"controller {self.name!r}: {gain}: {shown(value)}, but a finite number was wanted, for "
+                    f"the record"
+                )
+        self._moments: list[tuple[float | Array, ...]] = []
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Append one moment; its arrays are copied."""
+        seen, decision = snapshot.seen, snapshot.decision
+        goals = np.full_like(seen.positions, np.nan) if decision.goals is None else decision.goals
+        arrays = snapshot.positions, seen.velocities, decision.forces, goals, seen.obstacle_points
+        self._moments.append((seen.time, *(array.copy() for array in arrays)))
+
+    def record(self) -> Record:
+        """Return what was collected so far."""
+        columns = zip(*self._moments, strict=True) if self._moments else [()] * len(ARRAYS)
+        arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(ARRAYS, columns, strict=True)}
+        return Record(
+            environment=self.environment,
+            team=self.team,
+            controller=str(self.name),
+            label=self.controller.label,
+            gains=self._gains,
+            start=self.start,
+            seed=self.seed,
+            dt=self.dt,
+            conditions=self.conditions,
+            **arrays,
         )
 
 

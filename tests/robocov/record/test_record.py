@@ -18,8 +18,7 @@ from robocov.files.atomic import written
 from robocov.mapfile import from_json
 from robocov.metrics import sample_moments
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.record import ARRAYS, Record
-from robocov.record.recorder import Recorder
+from robocov.record import ARRAYS, Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
 

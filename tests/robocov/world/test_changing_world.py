@@ -44,6 +44,7 @@ def test_who_failed_stands_still_and_is_in_the_way() -> None:
     forces = np.array([[4.0, 0.0], [4.0, 0.0]])
     for step in range(200):
         changing.step(forces, 0.05, time=step * 0.05)
+        assert changing.working[1] == bool(changing.velocities[1].any())
     moved = changing.positions[1, 0] - 5.0
     assert 0.1 < moved < 0.5
     assert (changing.velocities[1] == 0.0).all()
