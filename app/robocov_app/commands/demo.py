@@ -109,10 +109,14 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the window, or render it."""
+    from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.demo.opening import Opening
+    from robocov_app.demo.screen import show_compiling
     from robocov_app.view.picture import checked_layers
 
+    if not options.headless:
+        on_compile.append(lambda _: show_compiling(options.pixels() or (900, 600)))
     session = session_of(options)
     opening = Opening(
         session,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pygame
 
 from robocov_app.demo.layout import SMALLEST
+from robocov_app.view.fonts import label
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +24,18 @@ def shown(size: tuple[int, int]) -> pygame.Surface:
         warnings.simplefilter("ignore", DeprecationWarning)
         pygame.Window.from_display_module().minimum_size = SMALLEST
     return screen
+
+
+def show_compiling(size: tuple[int, int]) -> None:
+    """Say on the window, or on a new one of a size, why nothing else is there yet."""
+    with suppress(pygame.error):
+        pygame.display.init()
+        screen = pygame.display.get_surface() or shown(size)
+        screen.fill("white")
+        words = label("compiling the simulation, once", 18, (60, 60, 60))
+        screen.blit(words, words.get_rect(center=screen.get_rect().center))
+        pygame.display.flip()
+        pygame.event.pump()
 
 
 @contextmanager

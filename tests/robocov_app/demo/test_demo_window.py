@@ -15,6 +15,7 @@ from touched_run import RAPF, begun
 
 from robocov_app.demo.opening import Opening
 from robocov_app.demo.overlays import Palette
+from robocov_app.demo.screen import show_compiling
 from robocov_app.demo.settings import FOLDER
 from robocov_app.demo.status import cursor_words
 
@@ -311,3 +312,10 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
         assert second.desk.theme == "dark" and second.desk.fade and second.panel.tab == "show"
         assert "cells" not in second.desk.shown and "robots" in second.desk.shown
         second.close()
+
+
+def test_while_kernels_are_compiled_the_window_says_so() -> None:
+    show_compiling((300, 200))
+    pixels = pygame.surfarray.array3d(pygame.display.get_surface())
+    assert (pixels == 255).mean() > 0.5
+    assert (pixels < 128).any()
