@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,7 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import Conditions
-from robocov.controllers import Controller, Lloyd, Rapf, Rpf
+from robocov.controllers import CONTROLLERS as ALL
+from robocov.controllers import Controller, Lloyd, Rapf, Rpf, make_controller
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle
 from robocov.environment.obstacle_path import ObstaclePath
@@ -36,30 +38,38 @@ def digest(record: Record) -> str:
     return together.hexdigest()
 
 
-_PROCESS = """
-import sys
-sys.path[:0] = {path!r}
-import test_simulation as t
-from robocov.mapfile import load_map
-room = load_map("rooms")
-for controller in t.CONTROLLERS:
-    print(t.digest(t.Simulation(room, controller, room.start().sample(6, seed=3)).run(8.0)))
-"""
-
-
-def test_the_same_run_in_another_process_has_the_same_bits() -> None:
+def digests() -> list[str]:
+    """Return what says whether runs of all laws, and of one under conditions, are the same bit for bit."""
     room = load_map("rooms")
-    here = [digest(Simulation(room, each, room.start().sample(6, seed=3)).run(8.0)) for each in CONTROLLERS]
-    for hash_seed in ("0", "1"):
-        script = _PROCESS.format(path=[str(Path(__file__).parent)])
-        there = subprocess.run(
-            [sys.executable, "-c", script],
-            env={**os.environ, "PYTHONHASHSEED": hash_seed},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert there.stdout.split() == here
+    starts, noisy = (
+        room.start().sample(6, seed=3),
+        Conditions(0.2, 0.1, position_noise=0.02, failure_rate=0.01),
+    )
+    runs = [Simulation(room, make_controller(name), starts, dt=1 / 20) for name in ALL]
+    runs += [Simulation(room, each, starts, dt=1 / 20, conditions=noisy) for each in CONTROLLERS]
+    return [digest(each.run(2.0)) for each in runs]
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {
+            "PYTHONHASHSEED": "1",
+            "OPENBLAS_CORETYPE": "Prescott",
+            "NPY_DISABLE_CPU_FEATURES": "AVX512_SKX AVX2",
+        },
+        # all kernels are compiled anew for it
+        pytest.param({"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, marks=pytest.mark.slow),
+    ],
+    ids=["libraries", "instructions"],
+)
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names of x86 processors")
+def test_another_process_on_any_x86_processor_has_the_same_bits(environment: dict[str, str]) -> None:
+    script = "import sys; sys.path.insert(0, sys.argv[1]); import test_simulation as t; print(*t.digests())"
+    command = [sys.executable, "-W", "ignore", "-c", script, str(Path(__file__).parent)]
+    done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=True)
+    here = digests()
+    assert done.stdout.split() == here
     assert len(set(here)) == len(here)
 
 

@@ -96,6 +96,18 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
             assert ages[k] == pytest.approx((step - when) * DT)
 
 
+@pytest.mark.parametrize(("delay", "steps"), [(1.1, 11), (0.7, 7), (0.71, 8)])
+def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, steps: int) -> None:
+    """Also where 1.1 / 0.1 is more than 11, and 3 x 0.1 more than 0.3."""
+    radio = Radio(Conditions(delay=delay, forget_after=0.3), np.ones(2), DT)
+    inbox, working, heard = Inbox.empty(2), np.ones(2, dtype=bool), []
+    for step in range(16):
+        places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message
+        inbox = radio.exchange(inbox, step, places, places, working)
+        heard.append(len(radio.reports(inbox, step, working)[1]) > 0)
+    assert np.flatnonzero(heard).tolist() == list(range(steps, steps + 4))
+
+
 def test_an_inbox_is_replaced_and_never_changed() -> None:
     """So that a copy of a run can hold the same one."""
     radio = Radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)

@@ -62,6 +62,7 @@ def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
         Conditions(failures=((3, 1),)).check_team(2)
     with pytest.raises(ParameterError, match="at least one from the start"):
         Conditions(joins=((1, 1), (2, 2))).check_team(2)
+    Conditions(joins=((1, 0), (2, 2))).check_team(2)
 
 
 def test_who_works_when() -> None:
@@ -86,6 +87,7 @@ def test_a_moment_is_the_same_whatever_steps_lead_there() -> None:
     assert steps[-1] < 0.8
     assert conditions.failed(float(steps[-1]), 1).all()
     assert not conditions.failed(0.79, 1).any()
+    assert Conditions(joins=((1, 0.8),)).working(float(steps[-1]), 2).all()
 
 
 def test_lifetimes_are_exponential() -> None:
@@ -94,7 +96,8 @@ def test_lifetimes_are_exponential() -> None:
     lives = ends - np.maximum(begins, 0.0)
     assert abs(lives.mean() * rate - 1.0) < 5 / math.sqrt(count)
     assert abs((lives > 50.0).mean() - math.exp(-1.0)) < 5 * 0.5 / math.sqrt(count)
-    assert ends[0] > 30.0
+    late = Conditions(failure_rate=rate, seed=5, joins=((1, 1e5),)).lives(1)[1]
+    assert late[0] - 1e5 == pytest.approx(ends[0] - 30.0), "it lives as long wherever it begins"
     # each robot's own, whatever the size of the team
     assert (Conditions(failure_rate=rate, seed=5).lives(3)[1][1:] == ends[1:3]).all()
     assert (

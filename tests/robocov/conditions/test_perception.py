@@ -18,6 +18,7 @@ from robocov.simulation import Simulation
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)), (CircleObstacle((5.0, 4.0), 1.0),))
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5], [8.0, 6.0]])
+NOISE = ("position_noise", "sensing_noise")
 BAD = Conditions(
     loss=0.3,
     delay=0.11,
@@ -110,8 +111,26 @@ def test_the_seed_of_the_conditions_is_all_their_chance() -> None:
     assert one.positions.tobytes() != other.positions.tobytes()
 
 
+def test_a_distance_is_never_measured_as_none_and_always_towards_the_point() -> None:
+    ideal, noisy = simulation(None).observe(), simulation(Conditions(sensing_noise=50.0)).observe()
+    true, found = (each.obstacle_points - STARTS for each in (ideal, noisy))
+    lengths = np.hypot(*found.T)
+    assert lengths.min() == pytest.approx(NEAREST) and lengths.max() > 10.0
+    np.testing.assert_allclose(found / lengths[:, None], true / np.hypot(*true.T)[:, None], atol=1e-9)
+
+
+def test_who_is_heard_is_said_by_where_robots_are_not_by_where_they_think_they_are() -> None:
+    lost = simulation(Conditions(position_noise=100.0), reach=2.5).observe()
+    ideal = simulation(None, reach=2.5).observe()
+    assert lost.neighbours.pairs()[0].tolist() == ideal.neighbours.pairs()[0].tolist() != []
+
+
 def test_streams_are_independent() -> None:
     """That messages are lost does not change what a sensor measures at the first step."""
+    where, what = (simulation(Conditions(**{name: 0.1}, seed=2)).observe() for name in NOISE)
+    away = np.hypot(*(what.obstacle_points - STARTS).T)
+    away -= np.hypot(*(simulation(None).observe().obstacle_points - STARTS).T)
+    assert not np.isclose(away, (where.positions - STARTS)[:, 0]).any()
     noise = {"position_noise": 0.1, "sensing_noise": 0.1, "seed": 2}
     one = simulation(Conditions(**noise)).observe()  # type: ignore[arg-type]
     other = simulation(Conditions(loss=0.5, **noise)).observe()  # type: ignore[arg-type]

@@ -29,6 +29,13 @@ def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
     assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more
 
 
+def test_what_passes_from_hole_to_hole_is_met() -> None:
+    frame = shapely.box(0, 0, 10, 4) - shapely.box(1, 1, 4, 3) - shapely.box(5, 1, 9, 3)
+    area = swept_area(frame, ObstaclePath(((0.0, 0.0), (-2.5, 0.0)), 1.0))
+    assert area.covers(shapely.box(1.5, 1, 4, 3)), "the bar between them comes by"
+    assert area.area == pytest.approx(12.5 * 4 - 2 * (1.5 - 1 + 9 - 2.5 - 5))
+
+
 def test_a_hole_is_filled_only_as_far_as_its_rim_comes() -> None:
     wide = PolygonObstacle(((0, 0), (4, 0), (4, 4), (0, 4)), (((1, 1), (3, 1), (3, 3), (1, 3)),))
     area = swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))

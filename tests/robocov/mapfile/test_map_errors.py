@@ -84,6 +84,14 @@ GEOMETRIC = [
         "obstacles[0].vertices[0]: the edge from here meets the edge from obstacles[0].vertices[2]",
     ),
     (
+        changed("boundary", [[0, 4], [2, 0], [4, 4], [4, 0], [0, 0]]),  # a vertex on a later edge
+        "boundary[0]: the edge from here meets the edge from boundary[3] near [2, 0]",
+    ),
+    (
+        changed("boundary", [[2, 0], [2, 0], [4, 4], [4, 0], [0, 0], [0, 4]]),  # which is given twice
+        "boundary[1]: the edge from here meets the edge from boundary[3] near [2, 0]",
+    ),
+    (
         changed("boundary", [[5, 0], [10, 6], [0, 6], [5, 0], [0, -6], [10, -6]]),  # an hourglass
         "boundary[0]: the edge from here meets the edge from boundary[2] near [5, 0]",
     ),

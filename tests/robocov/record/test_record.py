@@ -12,6 +12,7 @@ import pytest
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf, Rpf, gain_values, make_controller
+from robocov.controllers.individual import Individually
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.atomic import written
@@ -21,6 +22,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov.voronoi.weighted_cells import weighted_partition
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +85,30 @@ def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttere
     assert [list(live.seen.neighbours.of(i)) for i in range(4)] == [
         list(saved.seen.neighbours.of(i)) for i in range(4)
     ]
+
+
+def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Environment) -> None:
+    team = replace(Team.homogeneous(3), max_speed=np.array([0.3, 0.6, 1.2]))
+    starts, failing = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]], Conditions(failures=((1, 0.1),))
+    made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
+    assert made.by_time and not replace(made, team=Team.homogeneous(3)).by_time
+    assert made.snapshot(-1).seen.neighbours.pairs()[0].tolist() == [1, 2]
+    expected = weighted_partition(made.positions[-1, 1:], team.max_speed[1:], empty.region)
+    assert made.cells().mass.tolist() == expected.mass.tolist()
+    for part in (made.until(0.1), made.thinned(10.0)):
+        assert not any(np.shares_memory(getattr(part, name), getattr(made, name)) for name in ARRAYS)
+
+
+def test_the_gains_of_a_law_for_each_robot_are_recorded(empty: Environment) -> None:
+    @dataclass(frozen=True)
+    class Drift:
+        pull: float = 0.5
+
+        def force(self, own: object) -> list[float]:
+            return [self.pull, 0.0]
+
+    made = Simulation(empty, Individually(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
+    assert made.gains == {"pull": 0.25}
 
 
 def test_a_law_without_goals_has_none_in_its_record(empty: Environment) -> None:
