@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, counted, shown
 from robocov.metrics import CostHistory, clearances, robot_gaps
-from robocov.metrics.sight import Covered, Walls, covered
+from robocov.metrics.sight import Covered, covered
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record, nearest_moments
 
@@ -130,13 +130,11 @@ def run_metrics(
     since = np.concatenate([[0], moments[:-1] + 1])
     work, effort, way = _integrals(record)
     areas, parts, connectivity = [], [], []
-    walls: Walls | None = None
     for k in moments.tolist():
         some = np.flatnonzero(working[k])
         places = record.positions[k, some]
-        if walls is None or record.environment.moves:
-            walls = Walls.of(record.environment.at(float(record.time[k])).free)
-        areas.append(covered(walls, places, team.sensing_range[some]))
+        free = record.environment.at(float(record.time[k])).free
+        areas.append(covered(free, places, team.sensing_range[some]))
         found = connections(places, team.communication_range[some])
         parts.append(found[0])
         connectivity.append(found[1])

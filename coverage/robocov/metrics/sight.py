@@ -13,43 +13,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
-
-_PAIRS = 1 << 19
-"""Pairs of directions and walls looked at at once, which bounds the memory."""
+from robocov.arrays import Array, IntArray
+from robocov.compiled import inner_kernel
 
 _QUARTER = 128
 """Sides of a quarter of the polygon that stands for a disc of sensing: its area is 2.5e-5 too small."""
 
 
-class Walls(NamedTuple):
-    """The boundary of a free space.
-
-    Attributes
-    ----------
-    free : shapely geometry
-    start, along : (w, 2) m
-        Where the walls begin, and from there to their ends.
-    """
-
-    free: BaseGeometry
-    start: Array
-    along: Array
-
-    @classmethod
-    def of(cls, free: BaseGeometry) -> Walls:
-        """Return the walls of a free space, of one or several polygons."""
-        starts, ends = [np.empty((0, 2))], [np.empty((0, 2))]
-        for part in shapely.get_parts(free):
-            for ring in (part.exterior, *part.interiors):
-                corners = np.asarray(ring.coords)
-                starts.append(corners[:-1])
-                ends.append(corners[1:])
-        start = np.concatenate(starts)
-        return cls(free, start, np.concatenate(ends) - start)
-
-
-def visibility_polygon(walls: Walls, place: Array) -> BaseGeometry:
+def visibility_polygon(free: BaseGeometry, place: Array) -> BaseGeometry:
     """Return what is seen from a place, (2,) m, within the free space: a polygon, empty from outside.
 
     Examples
@@ -57,71 +28,62 @@ def visibility_polygon(walls: Walls, place: Array) -> BaseGeometry:
     An L of three squares of 1 m, seen from the middle of one end:
 
     >>> room = shapely.Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
-    >>> visibility_polygon(Walls.of(room), np.array([0.5, 1.5])).area
+    >>> visibility_polygon(room, np.array([0.5, 1.5])).area
     2.5
     """
-    if not shapely.contains_xy(walls.free, *place):
+    if not shapely.contains_xy(free, *place):
         return shapely.Polygon()
-    start = walls.start - place
-    turns = np.unique(np.arctan2(start[:, 1], start[:, 0]))
+    rings = map(shapely.get_coordinates, shapely.get_rings(shapely.get_parts(free)))
+    walls = np.concatenate([np.hstack([ring[:-1] - place, np.diff(ring, axis=0)]) for ring in rings])
+    turns = np.unique(np.arctan2(walls[:, 1], walls[:, 0]))
     begin, end = turns, np.append(turns[1:], turns[0] + 2.0 * np.pi)
-    wall = _nearest(start, walls.along, (begin + end) / 2.0)
+    middle, wall = (begin + end) / 2.0, np.empty(len(turns), dtype=np.int64)
+    _nearest_walls(walls, np.column_stack([np.cos(middle), np.sin(middle)]), wall)
     seen = wall >= 0
-    begin, end, wall = begin[seen], end[seen], wall[seen]
-    a, along = start[wall], walls.along[wall]
-    corners = np.stack([_meeting(a, along, begin), _meeting(a, along, end)], axis=1)
-    view = shapely.Polygon(place + corners.reshape(-1, 2))
+    corners = [_meeting(walls[wall[seen]], angles[seen]) for angles in (begin, end)]
+    view = shapely.Polygon(place + np.stack(corners, axis=1).reshape(-1, 2))
     # it may touch itself where corners are in line
     return view if shapely.is_valid(view) else shapely.make_valid(view)
 
 
-def _nearest(start: Array, along: Array, angles: Array) -> Array:
-    """Return the number of the wall that rays from the origin at (m,) angles hit first, -1 for none."""
-    wall = np.full(len(angles), -1)
-    size = max(1, _PAIRS // max(len(start), 1))
-    for k in range(0, len(angles), size):
-        part = angles[k : k + size, None]
-        x, y = np.cos(part), np.sin(part)
-        # the origin, the ray and the wall: a + s along = t (x, y)
-        across = x * along[:, 1] - y * along[:, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / across
-            s = (start[:, 0] * y - start[:, 1] * x) / across
-        t = np.where((s >= 0.0) & (s <= 1.0) & (t > 0.0), t, np.inf)
-        nearest = t.argmin(axis=1)
-        wall[k : k + size] = np.where(np.isfinite(t[np.arange(len(t)), nearest]), nearest, -1)
-    return wall
+@inner_kernel
+def _nearest_walls(walls: Array, rays: Array, nearest: IntArray) -> None:
+    """Write which of (w, 4) walls, start and along, (m, 2) rays from the origin hit first, -1 for none."""
+    for m in range(len(rays)):
+        x, y = rays[m, 0], rays[m, 1]
+        least, nearest[m] = np.inf, -1
+        for k in range(len(walls)):
+            ax, ay, ux, uy = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
+            # the origin, the ray and the wall: a + s u = t (x, y)
+            across = x * uy - y * ux
+            if across != 0.0:
+                t, s = (ax * uy - ay * ux) / across, (ax * y - ay * x) / across
+                if 0.0 <= s <= 1.0 and 0.0 < t < least:
+                    least, nearest[m] = t, k
 
 
-def _meeting(start: Array, along: Array, angles: Array) -> Array:
+def _meeting(walls: Array, angles: Array) -> Array:
     """Return where rays at (m,) angles meet the lines of walls, (m, 2), within the walls."""
-    x, y = np.cos(angles), np.sin(angles)
+    x, y, along = np.cos(angles), np.sin(angles), walls[:, 2:]
     across = x * along[:, 1] - y * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = (start[:, 0] * y - start[:, 1] * x) / across
+        s = (walls[:, 0] * y - walls[:, 1] * x) / across
     s = np.where(np.isfinite(s), np.clip(s, 0.0, 1.0), 0.0)
-    return np.asarray(start + s[:, None] * along)
+    return np.asarray(walls[:, :2] + s[:, None] * along)
 
 
 class Covered(NamedTuple):
-    """How much of the free space a team covers, in m².
-
-    Attributes
-    ----------
-    sensed : float
-        Within the sensing range of a robot and in its line of sight.
-    within_range : float
-        Within the sensing range of a robot, walls or not: Gage's blanket coverage by discs.
-    visible : float
-        In line of sight of a robot at any distance: the guards of an art gallery.
-    """
+    """How much of the free space a team covers, m²."""
 
     sensed: float
+    """Within the sensing range of a robot and in its line of sight."""
     within_range: float
+    """Within the sensing range of a robot, walls or not: Gage's blanket coverage by discs."""
     visible: float
+    """In line of sight of a robot at any distance: the guards of an art gallery."""
 
 
-def covered(walls: Walls, places: Array, ranges: Array) -> Covered:
+def covered(free: BaseGeometry, places: Array, ranges: Array) -> Covered:
     """Return what robots at (n, 2) m with sensing ranges (n,) m cover of the free space.
 
     Areas in line of sight are exact up to rounding where nothing limits the range; discs are polygons of 512
@@ -130,18 +92,17 @@ def covered(walls: Walls, places: Array, ranges: Array) -> Covered:
     Source: D. Gage, *Command control for many-robot systems*, 1992, for blanket coverage; J. O'Rourke, *Art
     Gallery Theorems and Algorithms*, 1987, for the other.
     """
-    inside = shapely.contains_xy(walls.free, *places.T)
+    inside = shapely.contains_xy(free, *places.T)
     places, ranges = places[inside], ranges[inside]
     if not len(places):
         return Covered(0.0, 0.0, 0.0)
-    views = [visibility_polygon(walls, place) for place in places]
+    views = [visibility_polygon(free, place) for place in places]
     visible = float(shapely.union_all(views).area)
     if np.isinf(ranges).all():
-        whole = [
-            part for part in shapely.get_parts(walls.free) if shapely.intersects_xy(part, *places.T).any()
-        ]
+        whole = [part for part in shapely.get_parts(free) if shapely.intersects_xy(part, *places.T).any()]
         return Covered(visible, float(sum(part.area for part in whole)), visible)
-    far = float(np.hypot(*np.ptp(walls.start, axis=0)))
+    low_x, low_y, high_x, high_y = free.bounds
+    far = float(np.hypot(high_x - low_x, high_y - low_y))
     discs = shapely.buffer(shapely.points(places), np.minimum(ranges, far), quad_segs=_QUARTER)
     sensed = float(shapely.union_all([view & disc for view, disc in zip(views, discs, strict=True)]).area)
-    return Covered(sensed, float((shapely.union_all(discs) & walls.free).area), visible)
+    return Covered(sensed, float((shapely.union_all(discs) & free).area), visible)

@@ -7,7 +7,7 @@ from cost_cases import OFFICE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.metrics.sight import Walls, covered, visibility_polygon
+from robocov.metrics.sight import covered, visibility_polygon
 
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = shapely.box(0, 0, 6, 3) - shapely.box(2.9, 0, 3.1, 2)
@@ -37,7 +37,7 @@ def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
     place = targets[rng.integers(len(targets))] + rng.uniform(-0.01, 0.01, 2)
     if not shapely.contains_xy(free, *place):
         return
-    view = visibility_polygon(Walls.of(free), place)
+    view = visibility_polygon(free, place)
     # places on the rim of the view are for rounding to decide
     clear = shapely.distance(view.boundary, shapely.points(targets)) > 1e-9
     inside = shapely.contains_xy(view, *targets.T)
@@ -45,7 +45,7 @@ def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
 
 
 def test_a_convex_room_is_seen_whole_from_anywhere() -> None:
-    walls = Walls.of(shapely.box(0, 0, 4, 3))
+    walls = shapely.box(0, 0, 4, 3)
     for place in ([0.1, 0.1], [2.0, 1.5], [3.999, 2.999]):
         assert visibility_polygon(walls, np.array(place)).area == pytest.approx(12.0, rel=1e-12)
     assert visibility_polygon(walls, np.array([5.0, 1.0])).is_empty
@@ -53,7 +53,7 @@ def test_a_convex_room_is_seen_whole_from_anywhere() -> None:
 
 def test_corners_in_line_with_the_eye() -> None:
     """From (0.5, 2) the two corners of the wall's head are on one level ray, which grazes it."""
-    view = visibility_polygon(Walls.of(ROOMS), np.array([0.5, 2.0]))
+    view = visibility_polygon(ROOMS, np.array([0.5, 2.0]))
     assert view.area == pytest.approx(2.9 * 3 + 3.1 * 1, rel=1e-12)
 
 
@@ -64,7 +64,7 @@ def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: 
     free = OFFICE.free
     targets = lattice(free, 90)
     places = targets[rng.choice(len(targets), n, replace=False)]
-    found = covered(Walls.of(free), places, np.full(n, reach))
+    found = covered(free, places, np.full(n, reach))
     discs = shapely.union_all(shapely.buffer(shapely.points(places), reach, quad_segs=1000))
     assert found.within_range == pytest.approx(shapely.intersection(discs, free).area, rel=1e-4)
     seen = np.stack([seen_one_by_one(free, place, targets) for place in places])
@@ -76,11 +76,11 @@ def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: 
 
 
 def test_a_disc_in_the_open_and_one_behind_a_wall() -> None:
-    walls = Walls.of(shapely.box(0, 0, 10, 10))
+    walls = shapely.box(0, 0, 10, 10)
     assert covered(walls, np.array([[5.0, 5.0]]), np.array([2.0])).sensed == pytest.approx(
         4 * np.pi, rel=5e-5
     )
-    halves = Walls.of(shapely.box(0, 0, 4, 4) - shapely.box(1.9, 0, 2.1, 4))
+    halves = shapely.box(0, 0, 4, 4) - shapely.box(1.9, 0, 2.1, 4)
     found = covered(halves, np.array([[1.0, 2.0]]), np.array([np.inf]))
     assert found == pytest.approx((1.9 * 4, 1.9 * 4, 1.9 * 4))
     found = covered(halves, np.array([[1.0, 2.0]]), np.array([3.0]))
@@ -88,6 +88,6 @@ def test_a_disc_in_the_open_and_one_behind_a_wall() -> None:
 
 
 def test_robots_that_are_nowhere_cover_nothing() -> None:
-    walls = Walls.of(ROOMS)
+    walls = ROOMS
     assert covered(walls, np.empty((0, 2)), np.empty(0)) == (0.0, 0.0, 0.0)
     assert covered(walls, np.array([[3.0, 1.0]]), np.array([2.0])) == (0.0, 0.0, 0.0)
