@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from statistics import median
 from time import perf_counter
 from typing import Any, TypeAlias
@@ -25,7 +25,7 @@ class Row:
     Attributes
     ----------
     part : str
-        ``step``, ``cost``, ``render``, ``window`` or ``start``.
+        ``step``, ``cost``, ``learning``, ``sweep``, ``render``, ``window`` or ``start``.
     name : str
         What is timed: ``one step``.
     parameters : dict
@@ -42,6 +42,8 @@ class Row:
         Longest time that is wanted.
     note : str
         The time in other words: ``95 x real time``.
+    before : float or None
+        The ratio in the last version without compiled kernels (commit 8838167), measured the same way.
     """
 
     part: str
@@ -53,6 +55,7 @@ class Row:
     goal: float | None = None
     goal_seconds: float | None = None
     note: str = ""
+    before: float | None = None
 
     @property
     def ratio(self) -> float | None:
@@ -79,19 +82,8 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as JSON."""
-        return {
-            "part": self.part,
-            "name": self.name,
-            "parameters": self.parameters,
-            "seconds": self.seconds,
-            "yardstick": self.yardstick,
-            "yardstick_seconds": self.yardstick_seconds,
-            "ratio": self.ratio,
-            "goal": self.goal,
-            "goal_seconds": self.goal_seconds,
-            "met": self.met,
-            "note": self.note,
-        }
+        plain = {each.name: getattr(self, each.name) for each in fields(self)}
+        return plain | {"ratio": self.ratio, "met": self.met}
 
 
 def _worded(name: str, value: int | str) -> str:

@@ -1,4 +1,4 @@
-"""The ratios of a benchmark as a figure: curves over the lattice for the cost, a dot each for the rest."""
+"""The ratios of a benchmark as a figure: a dot each."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
 
     from robocov_app.bench.measure import Row
 
 WIDTH = 1100
 
-ABOVE, PANEL, ROW, LEFT, RIGHT = 92, 270, 26, 400, 90
-"""Pixels: for the title, for a panel of the cost, for a line, for its words, for its value."""
+ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90
+"""Pixels: for the title, for a line, for its words, for its value."""
 
 GAP = 66
 """Pixels between what belongs to one part and the next, for its heading."""
 
-HEADINGS = {"step": "Simulated step", "render": "Pictures", "window": "Window", "start": "Start"}
-
-MARKS = ("o", "s", "^", "D")
+HEADINGS = {
+    "step": "Simulated step", "maps": "Exact coverage cost on maps",
+    "cost": "Exact coverage cost among random obstacles", "learning": "Learning environments",
+    "sweep": "Sweeps", "render": "Pictures", "window": "Window", "start": "Start",
+}  # fmt: skip
 
 
 def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
@@ -42,10 +43,9 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
         As `save_figure`.
     """
     rows = [row for row in rows if row.ratio is not None]
-    cost = [row for row in rows if row.part == "cost"]
-    parts = [(part, list(group)) for part, group in groupby(rows, key=lambda row: row.part) if part != "cost"]
+    parts = [(part, list(group)) for part, group in groupby(rows, key=lambda row: row.part)]
     below = sum(GAP + ROW * len(group) + 16 for _, group in parts)
-    height = ABOVE + (GAP + PANEL + 76 if cost else 0) + below
+    height = ABOVE + below
     with plain_style():
         page = Page((WIDTH, height), theme, scale=1.0)
         page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
@@ -54,68 +54,10 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
         )
         page.text(note, 24, 58, colour=theme.faint)
         top = float(ABOVE)
-        if cost:
-            _draw_cost(page, cost, top)
-            top += GAP + PANEL + 76
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)
             top += GAP + ROW * len(group) + 16
     save_figure(page.figure, path)
-
-
-def _draw_cost(page: Page, rows: Sequence[Row], top: float) -> None:
-    """Draw a panel for each number of vertices, in each a curve for each number of robots."""
-    theme = page.theme
-    page.text(f"Exact coverage cost / {rows[0].yardstick}", 24, top + 16, points=TEXT + 1.5, bold=True)
-    vertices = sorted({_number(row, "vertices") for row in rows})
-    robots = sorted({_number(row, "robots") for row in rows})
-    lattices = sorted({_number(row, "lattice") for row in rows})
-    ratios = np.array([cast("float", row.ratio) for row in rows] + [row.goal for row in rows if row.goal])
-    low, high = 0.8 * ratios.min(), 1.25 * ratios.max()
-    slot = (WIDTH - 68 - 24) / len(vertices)
-    handles: list[Line2D] = []
-    for number, many in enumerate(vertices):
-        axes = page.axes((68 + number * slot, top + GAP, slot - 24, PANEL))
-        _plain(axes, theme)
-        axes.set_xscale("log", base=2)
-        axes.set_yscale("log")
-        axes.axhline(1.0, color=tone(theme.faint), linewidth=1)
-        handles = []
-        for hue, n in enumerate(robots):
-            some = [row for row in rows if (_number(row, "vertices"), _number(row, "robots")) == (many, n)]
-            colour = tone(theme.trail(hue + 2))
-            x = [_number(row, "lattice") for row in some]
-            y = [cast("float", row.ratio) for row in some]
-            (line,) = axes.plot(
-                x, y, MARKS[hue % len(MARKS)] + "-", color=colour, markersize=5, linewidth=1.6
-            )
-            line.set_label(f"{n} robots")
-            handles.append(line)
-            for row in some:
-                if row.goal is not None:
-                    place = _number(row, "lattice")
-                    axes.plot(
-                        [place / 1.12, place * 1.12], [row.goal] * 2, color=colour, linewidth=3.5, alpha=0.5
-                    )
-        axes.set_xlim(lattices[0] / 1.25, lattices[-1] * 1.25)
-        axes.set_ylim(low, high)
-        axes.set_xticks(lattices, [f"{n} x {n}" for n in lattices], fontsize=SMALL)
-        ticks = _ticks(low, high)
-        axes.set_yticks(
-            ticks, [f"{tick:g}" for tick in ticks] if not number else [""] * len(ticks), fontsize=SMALL
-        )
-        axes.minorticks_off()
-        axes.set_title(f"{many} vertices", fontsize=TEXT, color=tone(theme.ink), loc="left")
-    page.figure.legend(
-        handles=handles,
-        loc="center right",
-        bbox_to_anchor=page.at(WIDTH - 24, top + 16),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=SMALL,
-        labelcolor=tone(theme.ink),
-    )
-    page.text("sites", 68 + (WIDTH - 92) / 2, top + GAP + PANEL + 36, points=SMALL, colour=theme.faint)
 
 
 def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pymunk
 from scipy.spatial import Delaunay
 
@@ -14,15 +15,24 @@ from robocov.simulation import Simulation
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from robocov.arrays import Array
 
-GOALS = {6: None, 50: 5.0, 200: 2.5, 1000: 1.2}
-"""Wanted multiples of the time of the triangulation, by number of robots."""
+GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
+"""Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
+
+BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}
+"""What these were; see `Row.before`."""
+
+TOGETHER, TOGETHER_GOAL = 64, 5.0
+"""Runs of six robots that are moved on together, and the wanted multiple of bare physics for each."""
 
 REAL_TIME = {6: 60.0}
 """Wanted multiples of real time."""
+
+BARE = "bare Space.step"
+"""The physics engine alone: the same bodies in an empty space."""
 
 WARM_UP = 120
 """Steps before the first that counts: two seconds, by when the team is on its way."""
@@ -30,7 +40,7 @@ WARM_UP = 120
 
 def cases(*, quick: bool = False) -> list[Case]:
     """Return a case for each size of a team that RAPF moves on the large map."""
-    return [partial(_rows, n, quick) for n in GOALS]
+    return [*(partial(_rows, n, quick) for n in GOALS), partial(_together, quick)]
 
 
 def _rows(n: int, quick: bool) -> Iterator[Row]:
@@ -51,8 +61,30 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
     slowest = simulation.dt / REAL_TIME[n] if n in REAL_TIME else None
     size: Parameters = {"robots": n}
     triangulated = "Qhull's Delaunay", taken["delaunay"]
-    yield Row("step", "one step", size, step, *triangulated, GOALS[n], slowest, note)
-    yield Row("step", "one step", size, step, "bare Space.step", taken["space"])
+    (goal, bare_goal), (before, bare_before) = GOALS[n], BEFORE[n]
+    yield Row("step", "one step", size, step, *triangulated, goal, slowest, note, before)
+    yield Row("step", "one step", size, step, BARE, taken["space"], bare_goal, before=bare_before)
+
+
+def _together(quick: bool) -> Iterator[Row]:
+    """Measure a step of many runs of six robots, for one of them."""
+    campus, n = load_map("campus"), 6
+    starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
+    simulation = Simulation(campus, Rapf(), np.concatenate(starts), runs=TOGETHER)
+    for _ in range(WARM_UP):
+        simulation.step()
+    space = _bare_space(simulation.positions[:n])
+    # as often as there are runs: what one call takes is too short for the clock
+    bare = [partial(space.step, simulation.dt)] * TOGETHER
+    calls: dict[str, Callable[[], object]] = {
+        "step": simulation.step,
+        "space": lambda: [call() for call in bare],
+    }
+    taken = InTurn(calls).rounds(60 if quick else 300)
+    size: Parameters = {"robots": n, "runs together": TOGETHER}
+    each, space_each = taken["step"] / TOGETHER, taken["space"] / TOGETHER
+    before = BEFORE[n][1]
+    yield Row("step", "one step of one run", size, each, BARE, space_each, TOGETHER_GOAL, before=before)
 
 
 def _bare_space(positions: Array) -> pymunk.Space:

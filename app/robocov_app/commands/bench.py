@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import json
 import os
 import platform
@@ -20,11 +20,14 @@ if TYPE_CHECKING:
 
     from robocov_app.bench.measure import Row
 
-PARTS = ("step", "cost", "render", "window", "start")
+PARTS = ("step", "cost", "learning", "sweep", "render", "window", "start")
 
 TITLES = {
     "step": "A step of RAPF on campus",
-    "cost": "The exact coverage cost, in a unit square with random obstacles",
+    "maps": "The exact coverage cost on maps",
+    "cost": "The exact coverage cost in a unit square with random obstacles",
+    "learning": "Learning environments on rooms, with the exact cost in the reward of each step",
+    "sweep": "A sweep of short runs on three maps, processor time",
     "render": "Pictures of 1280 x 720",
     "window": "The window of 1280 x 720 on rooms, in use",
     "start": "Until a command begins",
@@ -44,10 +47,12 @@ class Arguments:
     """
 
     part: Annotated[
-        tyro.conf.Positional[Literal["step", "cost", "render", "window", "start", "all"]],
+        tyro.conf.Positional[
+            Literal["step", "cost", "learning", "sweep", "render", "window", "start", "all"]
+        ],
         tyro.conf.arg(metavar="PART"),
     ] = "all"
-    """What to measure: step, cost, render, window, start or all."""
+    """What to measure: step, cost, learning (needs 'robocov[rl]'), sweep, render, window, start or all."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
     json: bool = False
@@ -67,7 +72,9 @@ def command(options: Arguments) -> int | None:
         from robocov_app.plots.runs import check_figure_path
 
         check_figure_path(options.plot)
-    parts = PARTS if options.part == "all" else (options.part,)
+    parts: tuple[str, ...] = PARTS if options.part == "all" else (options.part,)
+    if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
+        parts = tuple(part for part in parts if part != "learning")
     modules = [importlib.import_module(f"robocov_app.bench.{part}") for part in parts]
     if "cost" in parts and not modules[parts.index("cost")].has_yardstick():
         missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
@@ -120,7 +127,7 @@ def print_tables(rows: Sequence[Row]) -> None:
         table = Table(box=None, pad_edge=False, header_style="bold", title_justify="left", title=TITLES[part])
         table.add_column("")
         table.add_column("")
-        for title in ("time", "yardstick", "ratio", "goal"):
+        for title in ("time", "yardstick", "ratio", "before", "goal"):
             table.add_column(title, justify="right", no_wrap=True)
         table.add_column("", no_wrap=True)
         table.add_column("")
@@ -133,6 +140,7 @@ def print_tables(rows: Sequence[Row]) -> None:
                 duration(row.seconds),
                 "" if row.yardstick_seconds is None else duration(row.yardstick_seconds),
                 "" if row.ratio is None else f"{row.ratio:.2f}",
+                "" if row.before is None else f"{row.before:.2f}",
                 goals(row),
                 "" if row.yardstick is None else f"/ {row.yardstick}",
                 row.note,
@@ -142,6 +150,7 @@ def print_tables(rows: Sequence[Row]) -> None:
         out.print()
     facts = machine()
     packages = ", ".join(f"{name} {number}" for name, number in facts["packages"].items())
+    out.print("before: the ratio when nothing was compiled, at commit 8838167")
     out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
 
 

@@ -12,13 +12,13 @@ import pytest
 from called import complaint
 from matplotlib.figure import Figure
 
-from robocov_app.bench import cost, plot, render, start, step, window
+from robocov_app.bench import cost, learning, plot, render, start, step, sweep, window
 from robocov_app.bench.measure import InTurn, Row
 from robocov_app.cli import main
 from robocov_app.commands import bench
 
-KEYS = ["part", "name", "parameters", "seconds", "yardstick", "yardstick_seconds", "ratio", "goal"]
-KEYS += ["goal_seconds", "met", "note"]
+KEYS = ["part", "name", "parameters", "seconds", "yardstick", "yardstick_seconds", "goal"]
+KEYS += ["goal_seconds", "note", "before", "ratio", "met"]
 
 
 class Clock:
@@ -88,7 +88,12 @@ def test_without_a_yardstick_there_is_no_ratio_to_want():
 
 def small(monkeypatch):
     """Make every part a matter of a second or two."""
-    monkeypatch.setattr(step, "GOALS", {6: None})
+    monkeypatch.setattr(step, "GOALS", {6: (None, 16.0)})
+    monkeypatch.setattr(step, "TOGETHER", 2)
+    monkeypatch.setattr(cost, "BEFORE", {("rooms", 64, 6): 4.5})
+    monkeypatch.setattr(learning, "TOGETHER", 2)
+    monkeypatch.setattr(sweep, "MAPS", ("square",))
+    monkeypatch.setattr(sweep, "DURATION", 1.0)
     monkeypatch.setattr(step, "WARM_UP", 2)
     monkeypatch.setattr(cost, "random_map", lambda vertices: cost_map(vertices))
     monkeypatch.setattr(start, "WORDS", {"import robocov": ("-c", "import robocov")})
@@ -105,7 +110,7 @@ def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     target = tmp_path / "ratios.png"
     assert main(["bench", "all", "--quick", "--json", "--plot", str(target)]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {row["part"] for row in found["rows"]} == {"step", "cost", "render", "window", "start"}
+    assert {row["part"] for row in found["rows"]} == {*bench.PARTS, "maps"}
     assert set(found["machine"]) == {"python", "system", "processor", "cores", "packages"}
     for row in found["rows"]:
         assert list(row) == KEYS
@@ -122,7 +127,7 @@ def test_a_table_for_people(monkeypatch, capsys):
     assert "Qhull's Delaunay" in said.out
     assert "x real time" in said.out
     assert "numpy" in said.out
-    assert re.search(r"measuring: 1 of 1 in", said.err)
+    assert re.search(r"measuring: 2 of 2 in", said.err)
 
 
 def test_the_cost_is_measured_beside_its_yardstick(monkeypatch):
@@ -161,7 +166,7 @@ def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
     assert main(["bench", "all", "--quick", "--json"]) == 0
     said = capsys.readouterr()
     assert "pip install 'robocov[bench]'" in said.err
-    rows = [row for row in json.loads(said.out)["rows"] if row["name"] == "evaluated"]
+    rows = [row for row in json.loads(said.out)["rows"] if row["part"] == "cost"]
     assert rows
     assert all(row["ratio"] is None and row["met"] is None for row in rows)
 
@@ -220,7 +225,7 @@ def test_every_word_of_the_plot_is_inside_and_alone(rows, tmp_path, monkeypatch)
         assert box.y1 <= height
     said = {text.get_text() for text in texts}
     for row in rows:
-        if row.part != "cost":
+        if row.ratio is not None:
             assert f"{row.ratio:.2f}" in said
     for k, one in enumerate(boxes):
         for other in boxes[:k]:

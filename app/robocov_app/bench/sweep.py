@@ -1,0 +1,49 @@
+"""A sweep of short runs by two workers, per run, against an interpreter that imports numpy."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from itertools import count
+from typing import TYPE_CHECKING
+
+from robocov.mapfile import load_map
+from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.sweeping import sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+BEFORE = 6.0
+"""See `Row.before`."""
+
+MAPS, CONTROLLERS, DURATION, WORKERS = ("rooms", "museum", "campus"), ("rapf", "lloyd"), 20.0, 2
+
+
+def cases(*, quick: bool = False) -> list[Case]:
+    """Return the one case."""
+    return [partial(_rows, 1 if quick else 84)]
+
+
+def _rows(seeds: int) -> Iterator[Row]:
+    maps = tuple(StudyMap(name, load_map(name)) for name in MAPS)
+    study = Study(maps=maps, controllers=CONTROLLERS, seeds=range(seeds), robots=(6,), duration=DURATION)
+    folders = count()
+    with tempfile.TemporaryDirectory() as folder:
+        calls = {
+            "sweep": lambda: sweep(study, f"{folder}/{next(folders)}", workers=WORKERS, quiet=True),
+            "numpy": lambda: [subprocess.run([sys.executable, "-c", "import numpy"]) for _ in range(5)],
+        }
+        # processor time of all processes: a sweep takes all cores there are
+        taken = InTurn(calls, clock=lambda: sum(os.times()[:4])).rounds(1)
+    size: Parameters = {"runs": len(study), "workers": WORKERS}
+    each = taken["sweep"] / len(study)
+    note = f"{WORKERS / each:.1f} runs a second, all cores free"
+    yield Row(
+        *("sweep", f"a run of {DURATION:g} s", size, each, "import numpy", taken["numpy"] / 5),
+        goal=BEFORE / 4, note=note, before=BEFORE,
+    )  # fmt: skip
