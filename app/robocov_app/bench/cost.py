@@ -2,8 +2,8 @@
 
 The tree (scipy's `cKDTree`) finds the nearest robot of the same sites as the crow flies, through walls: the
 least that any coverage cost takes.
-Fast marching of second order, by scikit-fmm, travels over the same lattice from the cells that hold a robot; it
-is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
+Fast marching of second order, by scikit-fmm, travels over the same lattice from the cells that hold a robot;
+it is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
 """
 
 from __future__ import annotations
