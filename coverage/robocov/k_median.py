@@ -9,11 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
+
+Beat: TypeAlias = Callable[[], None]
+"""Called once a pass; it may raise, to give up."""
 
 _FALL = 1e-9  # part of the cost by which a step must lower it, far more than rounding: none is undone
 _PASSES = 60  # rounds of `improved`; a few are usual
@@ -43,17 +47,16 @@ def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
 
 
 def lloyd_iterations(
-    table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Callable[[], None] | None = None
+    table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Beat = lambda: None
 ) -> IntArray:
     """Return (k,) sources after Lloyd's iteration: targets go to the nearest, sources to the best for theirs.
 
-    Those that are `fixed` stay. `beat` is called once a pass; it may raise, to give up.
+    Those that are `fixed` stay.
     """
     stay = np.zeros(len(sources), dtype=bool) if fixed is None else fixed
     former, total = sources, np.inf
     while True:
-        if beat is not None:
-            beat()
+        beat()
         lower, after = _lloyd_step(table, sources, stay)
         if not lower < total * (1.0 - _FALL):
             return former
@@ -138,21 +141,19 @@ def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float
     least, place, source = np.inf, -1, -1
     for s in range(table.shape[1]):
         for k in range(len(sources)):
-            if not taken[s] and not fixed[k] and with_new[s] + without_own[k, s] < least:
-                least, place, source = with_new[s] + without_own[k, s], k, s
+            after = with_new[s] + without_own[k, s]
+            if after < least and not taken[s] and not fixed[k]:
+                least, place, source = after, k, s
     return total, least, place, source
 
 
-def best_swaps(table: Array, sources: IntArray, beat: Callable[[], None] | None = None) -> IntArray:
-    """Return the sources after the best swaps, as long as these lower the cost; see `lloyd_iterations`."""
-    nobody = np.zeros(len(sources), dtype=bool)
-    while True:
-        if beat is not None:
-            beat()
-        after = best_swap(table, sources, nobody, _FALL)
-        if after is sources:
-            return sources
-        sources = after
+def best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:
+    """Return the sources after the best swaps, as long as these lower the cost."""
+    fixed, former = np.zeros(len(sources), dtype=bool), None
+    while sources is not former:
+        beat()
+        former, sources = sources, best_swap(table, sources, fixed, _FALL)
+    return sources
 
 
 def improved(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib.abc
-import importlib.machinery
 import importlib.util
 import os
 import sys
@@ -16,6 +15,7 @@ import sysconfig
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib.machinery import ModuleSpec, PathFinder
 from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from robocov.errors import ParameterError, shown, unknown_name
 
 if TYPE_CHECKING:
-    from types import CodeType, ModuleType
+    from types import CodeType
 
 _MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
 _OURS = str(Path(__file__).parents[1])
@@ -46,10 +46,7 @@ class Source(NamedTuple):
 
 
 def fault_of(where: str, error: BaseException, when: str = "") -> ParameterError:
-    """Return the error that tells what went wrong in code that is not ours, and in which line of it.
-
-    Its message begins with `where`: whose code, and what it was to do; it ends with `when`.
-    """
+    """Return the error that tells where and when code that is not ours went wrong, and in which line."""
     frames = _frames(error)
     theirs = [frame for frame in frames if frame[0].startswith(_MODULE)]
     theirs = theirs or [frame for frame in frames if not frame[1].startswith((_OURS, "<"))]
@@ -65,10 +62,8 @@ def users_fault(error: BaseException) -> ParameterError | None:
 
 def _frames(error: BaseException) -> list[tuple[str, str, int]]:
     """Return module, file and line of each call that led to an error."""
-    return [
-        (str(frame.f_globals.get("__name__")), frame.f_code.co_filename, line)
-        for frame, line in traceback.walk_tb(error.__traceback__)
-    ]
+    calls = traceback.walk_tb(error.__traceback__)
+    return [(str(call.f_globals.get("__name__")), call.f_code.co_filename, line) for call, line in calls]
 
 
 def class_in_file(name: str, source: Source | None) -> type[Any]:
@@ -91,28 +86,24 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
             spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise fault_of(f"{where}: {file} cannot be run", error) from error
-    kind = vars(module).get(class_name)
-    if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
-        if kind is not None:
-            wanted = "has neither a method decide(seen, memory) nor force(own)"
-            raise ParameterError(f"{where}: {class_name} {wanted}")
-        kinds = [
-            key for key, each in vars(module).items() if hasattr(each, "decide") or hasattr(each, "force")
-        ]
+    kind, wrong = vars(module).get(class_name), ""
+    if kind is None:
+        kinds = [key for key, each in vars(module).items() if isinstance(each, type)]
         raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
-    parameters = getattr(kind, "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen:
-        wanted = "is not a frozen dataclass; @dataclass(frozen=True) above it was wanted"
-        raise ParameterError(f"{where}: {class_name} {wanted}")
+    if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
+        wrong = "has neither a method decide(seen, memory) nor force(own)"
+    elif not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
+        wrong = "is not a frozen dataclass; @dataclass(frozen=True) above it was wanted"
+    if wrong:
+        raise ParameterError(f"{where}: {class_name} {wrong}")
     return kind
 
 
 def own_modules(text: str) -> dict[str, Module]:
     """Return the modules that a text imports, and those that these import, as far as they are its author's.
 
-    They are found on ``sys.path`` without being executed, also where they are imported only inside functions.
-    The standard library, installed packages and robocov are left out; so is what is imported by a name that
-    is put together while the program runs, and what cannot be read.
+    They are found on ``sys.path`` without being executed. The standard library, installed packages and
+    robocov are left out; so is what cannot be read, and what is imported by a name put together at run time.
     """
     importlib.invalidate_caches()
     found: dict[str, Module] = {}
@@ -122,7 +113,7 @@ def own_modules(text: str) -> dict[str, Module]:
         where: list[str] | None = None
         for part in accumulate(waiting.pop().split("."), "{}.{}".format):
             if part not in places:
-                spec = importlib.machinery.PathFinder.find_spec(part, where)
+                spec = PathFinder.find_spec(part, where)
                 places[part] = None if spec is None else list(spec.submodule_search_locations or ())
                 if spec is None or not _is_own(spec):
                     places[part] = None
@@ -154,7 +145,7 @@ def _imported(text: str, package: str) -> Iterator[str]:
             yield from (f"{base}.{alias.name}" for alias in node.names if base)
 
 
-def _is_own(spec: importlib.machinery.ModuleSpec) -> bool:
+def _is_own(spec: ModuleSpec) -> bool:
     """Return whether a module is neither installed nor a part of Python or robocov."""
     built_in = spec.origin is not None and not spec.has_location  # or frozen
     if built_in or spec.name.partition(".")[0] in ("robocov", "robocov_app"):
@@ -187,14 +178,10 @@ class _TextFinder(importlib.abc.MetaPathFinder):
     def __init__(self, modules: Mapping[str, Module]) -> None:
         self.modules = modules
 
-    def find_spec(
-        self, fullname: str, path: object, target: ModuleType | None = None
-    ) -> importlib.machinery.ModuleSpec | None:
+    def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
         module = self.modules.get(fullname)
-        if module is None:
-            return None
-        if not module.path:
-            return importlib.machinery.ModuleSpec(fullname, None, is_package=True)
+        if module is None or not module.path:
+            return None if module is None else ModuleSpec(fullname, None, is_package=True)
         loader = _TextLoader(module.path, module.text)
         return importlib.util.spec_from_file_location(fullname, module.path, loader=loader)
 

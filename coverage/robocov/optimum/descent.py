@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 
 from robocov.arrays import Array, IntArray
 from robocov.environment.starts import GAP
+from robocov.k_median import Beat
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from shapely import MultiPolygon
     from shapely.geometry.base import BaseGeometry
 
@@ -48,10 +47,7 @@ class Room:
         shapely.prepare(list(self.parts))
 
     def nearest(self, positions: Array, component: IntArray) -> Array | None:
-        """Return (n, 2) positions near the given ones where all robots fit, each in its component.
-
-        None where pushing them apart does not make them fit.
-        """
+        """Return (n, 2) positions near the given ones where all fit, each in its component, or else None."""
         positions = self._inside(positions, component)
         for _ in range(_PUSHES):
             pairs = cKDTree(positions).query_pairs(self.spacing * (1.0 - 1e-9), output_type="ndarray")
@@ -89,11 +85,7 @@ class Room:
 
 
 def descended(
-    cost: CoverageCost,
-    room: Room,
-    positions: Array,
-    component: IntArray,
-    beat: Callable[[], None] | None = None,
+    cost: CoverageCost, room: Room, positions: Array, component: IntArray, beat: Beat = lambda: None
 ) -> CoverageResult:
     """Return the coverage cost of a local minimum near the given positions, which is never higher.
 
@@ -108,24 +100,31 @@ def descended(
     slope = _slope(result)
     learnt: deque[tuple[Array, Array]] = deque(maxlen=_MEMORY)
     falls: deque[float] = deque(maxlen=_SLOW[0])
+
+    def lower(way: Array, halvings: int) -> CoverageResult | None:
+        """Return the cost after the first of ever shorter steps that lowers it enough, None for none."""
+        for k in range(halvings):
+            there = room.nearest(result.positions + 0.5**k * way, component)
+            promised = 0.0 if there is None else float((slope * (there - result.positions)).sum())
+            if there is not None and promised < 0.0:
+                after = cost(there)
+                if after.mean_distance <= result.mean_distance + _ARMIJO * promised:
+                    return after
+        return None
+
     for _ in range(_STEPS):
-        if beat is not None:
-            beat()
+        beat()
         scale = _curvature(result, cost.spacing / 2.0)[:, None]
-        after = None
-        if learnt:
-            way = _direction(slope, scale, learnt)
-            after = _shorter(cost, room, component, result, slope, way, _HALVINGS[0])
+        after = lower(_direction(slope, scale, learnt), _HALVINGS[0]) if learnt else None
         if after is None:
             learnt.clear()
-            after = _shorter(cost, room, component, result, slope, -slope / scale, _HALVINGS[1])
+            after = lower(-slope / scale, _HALVINGS[1])
         if after is None:
             break
         slope_after = _slope(after)
         step, bend = after.positions - result.positions, slope_after - slope
-        along = float(np.vdot(step, bend))
         # only where it curves upwards the direction stays one of descent
-        if along > 1e-10 * float(np.vdot(bend, bend)):
+        if (step * bend).sum() > 1e-10 * (bend * bend).sum():
             learnt.append((step, bend))
         falls.append(result.mean_distance - after.mean_distance)
         result, slope = after, slope_after
@@ -142,10 +141,7 @@ def _slope(result: CoverageResult) -> Array:
 
 
 def _curvature(result: CoverageResult, least: float) -> Array:
-    """Return the sum of the inverse distances to the first way-points over the number of sites, (n,) 1/m.
-
-    Where sites have weights, these are summed in place of ones.
-    """
+    """Return the mean over the sites, by weight, of the inverse distances to first way-points, (n,) 1/m."""
     site = np.nonzero(result.owner >= 0)[0]
     owner = result.owner[site]
     toward = result.first[site] - result.positions[owner]
@@ -167,28 +163,3 @@ def _direction(slope: Array, scale: Array, learnt: deque[tuple[Array, Array]]) -
     root = np.sqrt(scale * (bend[-1] @ (bend[-1] / scale) / (step[-1] @ bend[-1])))
     way = LbfgsInvHessProduct(step * root, bend / root) @ (slope.ravel() / root)
     return np.asarray(-(way / root).reshape(slope.shape))
-
-
-def _shorter(
-    cost: CoverageCost,
-    room: Room,
-    component: IntArray,
-    result: CoverageResult,
-    slope: Array,
-    way: Array,
-    halvings: int,
-) -> CoverageResult | None:
-    """Return the cost after the first of ever shorter steps that lowers it enough, None for none."""
-    length = 1.0
-    for _ in range(halvings):
-        positions = room.nearest(result.positions + length * way, component)
-        length /= 2.0
-        if positions is None:
-            continue
-        promised = float(np.vdot(slope, positions - result.positions))
-        if not promised < 0.0:
-            continue
-        after = cost(positions)
-        if after.mean_distance <= result.mean_distance + _ARMIJO * promised:
-            return after
-    return None

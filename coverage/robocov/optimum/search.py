@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError, checked, is_number, shown
-from robocov.k_median import best_swaps, lloyd_iterations, seeded
+from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
 from robocov.optimum.descent import Room, descended
 from robocov.robots import DEFAULT_RADIUS
 
@@ -117,9 +117,8 @@ def optimum(
     tell(_TABLED)
 
     best: CoverageResult | None = None
-    best_restart = 0
+    best_restart, outcomes = 0, []
     known: dict[tuple[int, ...], tuple[float, float]] = {}
-    outcomes = []
     for restart in range(restarts):
         part = _TABLED + (1.0 - _TABLED) * restart / restarts
         beat = partial(tell, part)
@@ -153,10 +152,9 @@ def _rank(result: CoverageResult) -> tuple[float, float]:
 
 
 class _Search:
-    """What the restarts have in common: the cost, the room for the robots and the table of distances.
+    """What the restarts have in common: the cost, the room for the robots, places and the table of distances.
 
-    The `table`, (m, c) m, holds the sums of the geodesic distances from the sites of each target, by their
-    weights, to each source; `places` are those of the sources, and `component` says in which they are.
+    This, (m, c) m, holds the sums of the geodesic distances from the sites of each target, by their weights.
     """
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
@@ -197,7 +195,7 @@ class _Search:
         table[np.isinf(table)] = _UNREACHED * cost.geodesics.size
         return np.ascontiguousarray((table * weight).T)
 
-    def sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
+    def sources(self, rng: np.random.Generator, beat: Beat) -> IntArray:
         """Return the sources where one restart ends on the table, sorted, (n,).
 
         The table knows the cost only about: what came before stays where the exact cost says so.
@@ -207,7 +205,7 @@ class _Search:
         stages = best_swaps(self.table, lloyd, beat), lloyd, drawn
         return min(map(np.sort, stages), key=lambda some: _rank(self.cost(self.places[some])))
 
-    def descended(self, sources: IntArray, beat: Callable[[], None]) -> tuple[float, CoverageResult]:
+    def descended(self, sources: IntArray, beat: Beat) -> tuple[float, CoverageResult]:
         """Return the mean distance with robots at the sources, and the cost after the descent from there."""
         places, component = self.places[sources], self.component[sources]
         before = self.cost(places).mean_distance
