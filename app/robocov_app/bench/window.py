@@ -29,7 +29,7 @@ SIZE = (1280, 720)
 DRAWING_GOAL = {50: 4e-3}
 """Wanted seconds for the drawing of a frame, by number of robots."""
 
-FRAME_GOALS = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30}
+FRAME_GOALS = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 """Wanted seconds for everything that a frame takes."""
 
 LONGEST = 50e-3
@@ -41,7 +41,7 @@ _CROWD = 100
 
 def cases(*, quick: bool = False) -> list[Case]:
     """Return a case for each size of a team."""
-    return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200)]
+    return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200, 1000)]
 
 
 def _used(n: int, seconds: float) -> Iterator[Row]:

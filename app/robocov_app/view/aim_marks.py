@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.aims import CENTROID, GOAL, are_centroids
-from robocov_app.view.canvas import Canvas
+from robocov_app.view.canvas import Canvas, Sprite
 from robocov_app.view.layers import Layer, LegendEntry, drawn_radii, rounded
 from robocov_app.view.scene import Scene
 from robocov_app.view.spacing import mark_size
@@ -33,12 +36,12 @@ class Centroids(Layer):
         away = np.hypot(*(centers - canvas.camera.to_pixels(scene.snapshot.positions)).T)
         there = np.isfinite(away)
         arm = rounded(0.5 * mark_size(centers[there], 5.0 * canvas.scale, 11.0 * canvas.scale))
-        for center in centers[there & (away > drawn_radii(canvas, scene))].tolist():
-            sign(canvas, center[0], center[1], arm)
+        seen = centers[there & (away > drawn_radii(canvas, scene))]
+        canvas.stamps([sign(canvas, arm)] * len(seen), seen)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         known, _ = _shown(scene)
-        return [LegendEntry(known, _times if known == GOAL else _plus)] if known else []
+        return [LegendEntry(known, _glyph(_times if known == GOAL else _plus))] if known else []
 
 
 class Goals(Layer):
@@ -53,14 +56,14 @@ class Goals(Layer):
             return
         goals = canvas.camera.to_pixels(scene.snapshot.decision.goals)
         centers = canvas.camera.to_pixels(scene.snapshot.positions)
-        for goal, center in zip(goals, centers, strict=True):
-            if np.isfinite(goal).all():
-                canvas.dashes(center.tolist(), goal.tolist(), canvas.theme.faint)
-                _times(canvas, float(goal[0]), float(goal[1]))
+        there = np.isfinite(goals).all(axis=1)
+        for center, goal in zip(centers[there].tolist(), goals[there].tolist(), strict=True):
+            canvas.dashes(center, goal, canvas.theme.faint)
+        canvas.stamps([_times(canvas)] * len(goals), goals)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         known = scene.snapshot is not None and scene.snapshot.decision.goals is not None
-        return [LegendEntry(GOAL, _times)] if known else []
+        return [LegendEntry(GOAL, _glyph(_times))] if known else []
 
 
 def _shown(scene: Scene) -> tuple[str, Array]:
@@ -77,13 +80,19 @@ def _shown(scene: Scene) -> tuple[str, Array]:
     return GOAL, goals
 
 
-def _plus(canvas: Canvas, x: float, y: float, arm: float | None = None) -> None:
+def _plus(canvas: Canvas, arm: float | None = None) -> Sprite:
     arm = 5.5 * canvas.scale if arm is None else arm
-    width, theme = min(1.3 * canvas.scale, 0.3 * arm), canvas.theme
-    canvas.stamp(lambda shift: sprites.cross(arm, theme.ink, theme.background, width, False, shift), (x, y))
+    theme = canvas.theme
+    return partial(sprites.cross, arm, theme.ink, theme.background, min(1.3 * canvas.scale, 0.3 * arm), False)
 
 
-def _times(canvas: Canvas, x: float, y: float, arm: float | None = None) -> None:
+def _times(canvas: Canvas, arm: float | None = None) -> Sprite:
     arm = 5.5 * canvas.scale if arm is None else arm
-    width, theme = min(1.8 * canvas.scale, 0.4 * arm), canvas.theme
-    canvas.stamp(lambda shift: sprites.cross(arm, theme.final, theme.background, width, True, shift), (x, y))
+    theme = canvas.theme
+    return partial(
+        sprites.cross, arm, theme.final, theme.background, min(1.8 * canvas.scale, 0.4 * arm), True
+    )
+
+
+def _glyph(sign: Callable[[Canvas], Sprite]) -> Callable[[Canvas, float, float], None]:
+    return lambda canvas, x, y: canvas.stamp(sign(canvas), (x, y))

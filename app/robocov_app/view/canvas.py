@@ -155,14 +155,22 @@ class Canvas:
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
         """Put a sprite where it belongs to a quarter of a pixel."""
-        if self._far_off(center):
-            return
+        self.stamps([sprite], np.array([center], dtype=float))
+
+    def stamps(self, many: Sequence[Sprite], centers: Array) -> None:
+        """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other."""
+        near = np.flatnonzero(
+            ((centers > -500) & (centers < np.add(self.surface.get_size(), 500))).all(axis=1)
+        )
         # as for lines, whole numbers are the middles of pixels
-        quarters_x, quarters_y = (round((place + 0.5) * sprites.FINE) for place in center)
-        (x, shift_x), (y, shift_y) = divmod(quarters_x, sprites.FINE), divmod(quarters_y, sprites.FINE)
-        picture = sprite((shift_x, shift_y))
-        half = picture.get_width() // 2
-        self.surface.blit(picture, (x - half, y - half), special_flags=pygame.BLEND_PREMULTIPLIED)
+        quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
+        places, shifts = np.divmod(quarters, sprites.FINE)
+        pictures = []
+        for k, (x, y), shift in zip(near.tolist(), places.tolist(), shifts.tolist(), strict=True):
+            picture = many[k](tuple(shift))
+            half = picture.get_width() // 2
+            pictures.append((picture, (x - half, y - half)))
+        self.surface.fblits(pictures, pygame.BLEND_PREMULTIPLIED)
 
     def _far_off(self, pixel: Pixel) -> bool:
         """Whether what is small and drawn at `pixel` cannot be seen."""

@@ -19,7 +19,7 @@ import shapely
 from robocov.arrays import Array
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera, round_length
-from robocov_app.view.canvas import Canvas
+from robocov_app.view.canvas import Canvas, Sprite
 from robocov_app.view.scene import Scene
 from robocov_app.view.spacing import fitted_radii, mark_size
 from robocov_app.view.theme import mix
@@ -265,17 +265,18 @@ class Starts(Layer):
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
             self._kept = scene.starts, view, centers, radius
         centers, radius = self._kept[2:]
-        for center in centers.tolist():
-            self._ring(canvas, center[0], center[1], radius)
+        canvas.stamps([self._ring(canvas, radius)] * len(centers), centers)
 
     @staticmethod
-    def _ring(canvas: Canvas, x: float, y: float, radius: float | None = None) -> None:
-        radius = 4.5 * canvas.scale if radius is None else radius
-        width, colour = min(1.6 * canvas.scale, 0.4 * radius), canvas.theme.start
-        canvas.stamp(lambda shift: sprites.ring(radius, colour, width, shift), (x, y))
+    def _ring(canvas: Canvas, radius: float) -> Sprite:
+        width = min(1.6 * canvas.scale, 0.4 * radius)
+        return partial(sprites.ring, radius, canvas.theme.start, width)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
-        return [LegendEntry("start", self._ring)] if scene.starts is not None else []
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            canvas.stamp(self._ring(canvas, 4.5 * canvas.scale), (x, y))
+
+        return [LegendEntry("start", glyph)] if scene.starts is not None else []
 
 
 class Robots(Layer):
@@ -287,17 +288,18 @@ class Robots(Layer):
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.snapshot is None:
             return
-        radii = drawn_radii(canvas, scene)
-        edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
-        centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist()
-        theme = canvas.theme
-        for robot, (center, radius) in enumerate(zip(centers, radii, strict=True)):
-            fill = theme.robots[canvas.hues[robot]]
-            ring = min(1.6 * canvas.scale, rounded(0.3 * radius))
+        theme, scale = canvas.theme, canvas.scale
+        edge = mix(theme.background, theme.ink, 0.55)
+        discs = []
+        for robot, (hue, radius) in enumerate(
+            zip(canvas.hues.tolist(), drawn_radii(canvas, scene), strict=True)
+        ):
+            ring = min(1.6 * scale, rounded(0.3 * radius))
             text = str(scene.number(robot))
-            if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * canvas.scale:
+            if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * scale:
                 text = ""
-            canvas.stamp(partial(sprites.disc, radius, fill, theme.robot_ring, ring, edge, text), center)
+            discs.append(partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, text))
+        canvas.stamps(discs, canvas.camera.to_pixels(scene.snapshot.positions))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:

@@ -281,32 +281,34 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
         pairs = previous[adjacency]
         if (pairs[:, 0] != pairs[:, 1]).all():
             return previous
-    neighbours: list[list[int]] = [[] for _ in range(n)]
-    for first, second in adjacency.tolist():
-        neighbours[first].append(second)
-        neighbours[second].append(first)
-    if previous is None or len(previous) != n:
-        return np.array(_dsatur(neighbours), dtype=np.intp)
-    hues = _repaired(previous.tolist(), neighbours)
-    return np.array(hues if hues is not None else _dsatur(neighbours), dtype=np.intp)
+    hues = None if previous is None or len(previous) != n else _repaired(previous.copy(), adjacency)
+    if hues is None:
+        neighbours: list[list[int]] = [[] for _ in range(n)]
+        for first, second in adjacency.tolist():
+            neighbours[first].append(second)
+            neighbours[second].append(first)
+        hues = np.array(_dsatur(neighbours), dtype=np.intp)
+    return hues
 
 
-def _repaired(hues: list[int], neighbours: list[list[int]]) -> list[int] | None:
+def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
     """Recolour the vertices that conflict, and few others; None when that goes round in circles."""
-    n = len(hues)
-    visits = [0] * n
-    waiting = [v for v in range(n) if any(hues[w] == hues[v] for w in neighbours[v])]
+    visits = np.zeros(len(hues), dtype=int)
+    pairs = hues[adjacency]
+    waiting = np.unique(adjacency[pairs[:, 0] == pairs[:, 1]]).tolist()
     while waiting:
         vertex = waiting.pop()
-        around = [hues[other] for other in neighbours[vertex]]
+        row, side = np.nonzero(adjacency == vertex)
+        neighbours = adjacency[row, 1 - side]
+        around = hues[neighbours].tolist()
         if hues[vertex] not in around:
             continue
         visits[vertex] += 1
         if visits[vertex] > MAP_COLOURS:
             return None
-        turn = vertex + visits[vertex]
+        turn = vertex + int(visits[vertex])
         hues[vertex] = min(range(MAP_COLOURS), key=lambda h: (around.count(h), (h + turn) % MAP_COLOURS))
-        waiting += [other for other in neighbours[vertex] if hues[other] == hues[vertex]]
+        waiting += neighbours[hues[neighbours] == hues[vertex]].tolist()
     return hues
 
 
