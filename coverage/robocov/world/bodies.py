@@ -215,13 +215,13 @@ class World:
         _free_substep(
             engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
         )
-        touching, each = self._touching(), len(forces) // self._runs
-        touched = {row // each for row in touching}
-        for run in touched:
-            rows = np.array([row for row in touching if row // each == run])
-            self._resolve_contacts(rows, self._rows(run), state, dt, limit)
+        by_run: dict[int, list[int]] = {}
+        for row in self._touching():
+            by_run.setdefault(row * self._runs // len(forces), []).append(row)
+        for run, rows in by_run.items():
+            self._resolve_contacts(np.array(rows), self._rows(run), state, dt, limit)
         self._set_state(state)
-        for run in touched:
+        for run in by_run:
             self._write_state(engine, run)
         if external_forces is not None or self._fast:
             self._fast = self._anybody_fast()

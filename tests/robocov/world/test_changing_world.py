@@ -201,3 +201,20 @@ def test_who_failed_earlier_stays_in_the_way_when_another_one_fails() -> None:
     assert changing.working.tolist() == [False, True, False, True]
     with pytest.raises(ValueError, match="read-only"):
         changing.working[...] = True
+
+
+def test_two_that_join_in_one_place_stand_beside_each_other() -> None:
+    places = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
+    changing = world(Conditions(joins=((2, 0.2, (5.0, 4.0)), (3, 0.2, (5.0, 4.0)))), places)
+    for step in range(6):
+        changing.step(np.zeros((3, 2)), 0.05, time=step * 0.05)
+    assert changing.positions[1].tolist() == [5.0, 4.0]
+    assert 0.2 <= np.hypot(*(changing.positions[2] - [5.0, 4.0])) < 0.21
+
+
+def test_who_joins_and_fails_within_a_step_was_never_there() -> None:
+    changing = world(Conditions(joins=((2, 0.21),), failures=((2, 0.22),)))
+    for step in range(8):
+        changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
+        assert changing.working.tolist() == [True, False, True, True]
+        assert len(changing.failed_robots) == 0
