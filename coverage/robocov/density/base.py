@@ -153,7 +153,9 @@ def masses_of_polygons(density: Density, polygons: Sequence[shapely.Polygon]) ->
             pieces.append(np.hstack([points[:-1], points[1:]]))
             owners += [k] * (len(points) - 1)
     ends = np.concatenate(pieces)
-    return np.maximum(density.moments(_edges(ends[:, :2], ends[:, 2:], np.array(owners)), origins)[:, 0], 0.0)
+    return np.maximum(
+        density.moments(_edges(ends[:, :2].copy(), ends[:, 2:].copy(), np.array(owners)), origins)[:, 0], 0.0
+    )
 
 
 def means_over_squares(density: Density, middles: Array, side: float) -> Array:

@@ -157,7 +157,7 @@ def _edges(
     n, edges = len(points), np.empty((count, 6))
     mesh = mesh.copy() if mesh.shape[1] and mesh[0, 0] >= 0 else _NO_MESH
     cells_of(points.copy(), sides, known, indptr, indices, n, mesh, np.empty(n), np.empty((n, 2)), edges)
-    return CellEdges(edges[:, :2], edges[:, 2:4], *edges[:, 4:].T.astype(np.intp))
+    return CellEdges(edges[:, :2].copy(), edges[:, 2:4].copy(), *edges[:, 4:].T.astype(np.intp))
 
 
 def _weighted(cells: VoronoiPartition, density: Density) -> VoronoiPartition:
