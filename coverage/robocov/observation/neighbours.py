@@ -139,6 +139,12 @@ def close_pairs(positions: Array, reach: float) -> tuple[IntArray, IntArray, Arr
     return first, second, distance
 
 
+@inlined_kernel
+def row_of(along: float, scale: float) -> int:
+    """Return the number of the row, or the column, of bins so far from the first; 0 of no number."""
+    return int(along * scale) if along * scale > 0.0 else 0
+
+
 @inner_kernel
 def binned(
     points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
@@ -168,7 +174,7 @@ def binned(
     # no more bins than points, and more than rounding wider than the reach
     side = max(1.000001 * reach, np.sqrt(width * height / count), max(width, height) / count)
     scale = 1.0 / side if count >= _BINNED_FROM and 0.0 < side < np.inf else 0.0
-    columns, rows = int(width * scale) + 1, int(height * scale) + 1
+    columns, rows = row_of(width, scale) + 1, row_of(height, scale) + 1
     for b in range(columns * rows + 2):
         starts[b] = 0
     for i in range(first, stop):
@@ -180,12 +186,6 @@ def binned(
         order[starts[b]] = i
         starts[b] += 1
     return left, low, scale, columns, rows
-
-
-@inlined_kernel
-def row_of(along: float, scale: float) -> int:
-    """Return the number of the row, or the column, of bins so far from the first; 0 of no number."""
-    return int(along * scale) if along * scale > 0.0 else 0
 
 
 @kernel

@@ -117,7 +117,7 @@ def _measured(mesh: Mesh, points: Array, cotangent: Array, h: int) -> bool:
         ax, ay = points[i, 0] - points[apex, 0], points[i, 1] - points[apex, 1]
         bx, by = points[j, 0] - points[apex, 0], points[j, 1] - points[apex, 1]
         cross = ax * by - ay * bx
-        cotangent[h + k] = (ax * bx + ay * by) / abs(cross)
+        cotangent[h + k] = (ax * bx + ay * by) / max(abs(cross), 1e-300)
         upright &= cross > 0.0
     return upright
 
