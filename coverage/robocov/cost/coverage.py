@@ -19,7 +19,7 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, checked, counted, shown
 from robocov.geodesic import Geodesics
-from robocov.geodesic.distances import BINS, CORNER_BINS
+from robocov.geodesic.distances import BINS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,68 +29,45 @@ if TYPE_CHECKING:
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
-_BLOCK = 64
-"""Corners that look at the sites between two words of progress."""
-
 
 @dataclass(frozen=True, eq=False)
 class CoverageResult(Drawable):
-    """The coverage cost of one set of positions, and what it is made of.
-
-    Attributes
-    ----------
-    mean_distance : float, m
-        Mean geodesic distance of the sites to their nearest robot, over the components of the free
-        space that hold robots, each site weighed by φ; nan if these are too small to hold a site.
-    value : float, m³
-        Equation (22), with φ as in (4): `mean_distance` times the exact integral of φ over these
-        components, which is their area where there is no density. With `speeds` it is m² s, `mean_time` times
-        that integral.
-    uncovered_area : float, m²
-        Area of the components without a robot.
-    distances : (m,) m
-        Geodesic distance to the nearest robot, or with `speeds` to the one that is there first; inf where
-        none can come.
-    owner : (m,)
-        That robot (the geodesic Voronoi partition), -1 where none can come.
-    corner : (m,)
-        The row in `corners` where the way from the owner to the site bends first, -1 where it is straight.
-    last_corner : (m,)
-        The row where it bends last, -1 where it is straight.
-    positions : (n, 2) m
-    points : (m, 2) m
-        The sites.
-    corners : (k, 2) m
-        All places where ways can bend.
-    environment : Environment or None
-        The map, and
-    sites : Sites or None
-        its lattice, for plots.
-    weights : (m,) or None
-        The mean of φ over the cell of each site; None where every place counts the same.
-    speeds : (n,) m/s or None
-        How fast each robot goes, if not the nearest robot counts but the one that is there first.
-    mean_time : float, s, or None
-        Mean time, with `speeds`, until the first robot is at a site.
-    """
+    """The coverage cost of one set of positions, and what it is made of."""
 
     _drawn_as = "result"
 
     mean_distance: float
+    """Mean geodesic distance, m, of the sites to their nearest robot, over the components of the free space
+    that hold robots, each site weighed by φ; nan if these are too small to hold a site."""
     value: float
+    """Equation (22), m³, with φ as in (4): `mean_distance` times the integral of φ over these components,
+    their area without a density. With `speeds` it is m² s, `mean_time` times that integral."""
     uncovered_area: float
+    """Area, m², of the components without a robot."""
     distances: Array
+    """(m,) m, to the nearest robot, or with `speeds` to the one that is there first; inf for none."""
     owner: IntArray
+    """(m,) That robot (the geodesic Voronoi partition), of equals the first, -1 where none can come."""
     corner: IntArray
+    """(m,) The row in `corners` where the way from the owner to the site bends first, -1 for nowhere,"""
     last_corner: IntArray
+    """(m,) and where it bends last."""
     positions: Array
+    """(n, 2) m"""
     points: Array
+    """(m, 2) m, the sites."""
     corners: Array
+    """(k, 2) m, all places where ways can bend."""
     environment: Environment | None = None
+    """The map, and"""
     sites: Sites | None = None
+    """its lattice, for plots."""
     weights: Array | None = None
+    """(m,) The mean of φ over the cell of each site; None where every place counts the same."""
     speeds: Array | None = None
+    """(n,) m/s, if not the nearest robot counts but the one that is there first."""
     mean_time: float | None = None
+    """Mean time, s, with `speeds`, until the first robot is at a site."""
 
     def __repr__(self) -> str:
         robots = counted(len(self.positions), "robot")
@@ -163,18 +140,11 @@ class CoverageCost:
 
     Attributes
     ----------
-    environment : Environment
+    environment, geodesics
     points : (m, 2) m
-        The sites, row by row from the lower left.
-    cells : (m,)
-        The sites' numbers among all cells, ``row * lattice + column``.
-    spacing : float, m
-        Side of a cell.
-    sites : Sites
-        All of these.
+        The sites, row by row from the lower left; `sites` knows their `cells` and the `spacing`, m, too.
     corners : (k, 2) m
         Where ways can bend.
-    geodesics : Geodesics
     weights : (m,) or None
         The mean of φ over the cell of each site; None where every place counts the same.
 
@@ -202,12 +172,15 @@ class CoverageCost:
         self.lattice = int(checked("lattice", lattice, 1, MAX_LATTICE, whole=True))
         self.environment = environment
         beat = None if progress is None else partial(progress, 0.0)
-        self.geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
+        self.geodesics = geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
         self._areas = np.array([part.area for part in environment.free.geoms])
         self._masses = environment.free_masses
-        self.corners = frozen(self.geodesics.corners)
-        self.sites, self._tiles = lattice_of(self.geodesics, self.lattice)
-        self._views = self._corner_views(progress)
+        self.corners = frozen(geodesics.corners)
+        self.sites, self._tiles = tiles = lattice_of(geodesics, self.lattice)
+        rows, spans = geodesics.of_corners(partial(corner_views, geodesics.walls, tiles[1]), progress)
+        order = np.argsort(rows[:, 1], kind="stable")
+        first = np.searchsorted(rows[order, 1], np.arange(len(tiles[1].first)))
+        self._views = CornerViews(first, rows[order][:, [0, 2]], spans[order])
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         self.weights = self._weights()
 
@@ -230,23 +203,6 @@ class CoverageCost:
         if density is None or density.uniform:
             return None
         return frozen(means_over_squares(density, self.points, self.spacing))
-
-    def _corner_views(self, progress: Callable[[float], None] | None) -> CornerViews:
-        """Return what the corners see of the sites."""
-        walls, tiles, count = self.geodesics.walls, self._tiles, len(self.corners)
-        pieces = [(np.empty((0, 3), dtype=np.int64), np.empty((0, 2)))]
-        for begin in range(0, count, _BLOCK):
-            if progress is not None:
-                progress(begin / count)
-            part = begin, min(begin + _BLOCK, count)
-            found = self.geodesics.with_room(
-                1, CORNER_BINS, lambda *room, part=part: corner_views(walls, tiles, *part, *room)
-            )
-            pieces.append(found[1:])
-        rows, spans = map(np.concatenate, zip(*pieces, strict=True))
-        order = np.argsort(rows[:, 1], kind="stable")
-        first = np.searchsorted(rows[order, 1], np.arange(len(tiles.first)))
-        return CornerViews(first, rows[order][:, [0, 2]], spans[order])
 
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.

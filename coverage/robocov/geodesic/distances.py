@@ -8,6 +8,7 @@ other holds all that is needed.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ BINS, CORNER_BINS = 64, 256
 """Angular bins of a source; a corner looks at many targets."""
 
 _BLOCK = 64
-"""Corners that are looked at between two beats."""
+"""Corners that are looked at between two words of progress."""
 
 _TARGETS = 1024
 """Targets whose views are held at once."""
@@ -72,14 +73,9 @@ def seen_corners(walls: Walls, index: AngularWallIndex, i: int, least: int, out:
 
 @inner_kernel
 def _corner_links(
-    walls: Walls,
-    begin: int,
-    end: int,
-    seen: IntArray,
-    index: AngularWallIndex,
-    links: IntArray,
+    walls: Walls, seen: IntArray, begin: int, end: int, index: AngularWallIndex, links: IntArray,
     lengths: Array,
-) -> int:
+) -> int:  # fmt: skip
     """Write the linked pairs of a corner, from `begin` to `end`, and one of higher number, and their lengths.
 
     Return how many there are, -1 if there is no room.
@@ -214,20 +210,27 @@ class Geodesics:
         # so many entries for each source were enough so far
         self._room = {BINS: 256, CORNER_BINS: 1 << 14}
         count = len(self.corners)
-        seen, pieces = np.empty(count, np.int64), [(np.empty((0, 3), np.int64), np.empty((0, 2)))]
-        for begin in range(0, count, _BLOCK):
-            if beat is not None:
-                beat()
-            part = begin, min(begin + _BLOCK, count), seen
-            found = self.with_room(
-                1, CORNER_BINS, lambda *room, part=part: _corner_links(self.walls, *part, *room)
-            )
-            pieces.append(found[1:])
-        links, lengths = map(np.concatenate, zip(*pieces, strict=True))
+        seen = np.empty(count, np.int64)
+        links, lengths = self.of_corners(
+            partial(_corner_links, self.walls, seen), beat and (lambda _: beat())
+        )
         one, other = np.concatenate([links[:, :2], links[:, 1::-1]]).T
         order = np.lexsort((other, one))
         first = np.searchsorted(one[order], np.arange(count + 1))
         self.graph = Graph(first, other[order], np.tile(lengths[:, 0], 2)[order])
+
+    def of_corners(
+        self, look: Callable[..., int], progress: Callable[[float], None] | None
+    ) -> tuple[IntArray, Array]:
+        """Return what `look` writes about the corners, some at a time; tell which part is done."""
+        count, pieces = len(self.corners), [(np.empty((0, 3), np.int64), np.empty((0, 2)))]
+        for begin in range(0, count, _BLOCK):
+            if progress is not None:
+                progress(begin / count)
+            some = partial(look, begin, min(begin + _BLOCK, count))
+            pieces.append(self.with_room(1, CORNER_BINS, some)[1:])
+        numbers, lengths = map(np.concatenate, zip(*pieces, strict=True))
+        return numbers, lengths
 
     def with_room(
         self, n: int, bins: int, fill: Callable[[AngularWallIndex, IntArray, Array], int]
