@@ -100,6 +100,18 @@ def test_kernels_call_kernels():
     assert tripled(2.0) == 6.0
 
 
+def test_arrays_that_may_not_be_written_are_no_other_type():
+    @kernel
+    def first(values):
+        return values[0]
+
+    values = np.arange(3.0)
+    assert first(values) == 0.0
+    values.setflags(write=False)
+    assert first(values) == 0.0
+    assert len(first._dispatcher.signatures) == 1
+
+
 def test_what_is_compiled_is_told(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     told = []

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, inner_kernel, kernel
@@ -191,16 +189,33 @@ def binned(
 @kernel
 def _pairs(points: Array, ranges: Array) -> tuple[IntArray, IntArray, IntArray, Array]:
     """Return rows, first and second points, and distances of the directed pairs in range of each other."""
-    n, reach = len(points), 0.0
+    n = len(points)
+    indptr, none, no_distance = np.zeros(n + 1, np.intp), np.empty(0, np.intp), np.empty(0)
+    starts, order = np.empty(2 * n + 8, np.intp), np.empty(n, np.intp)
+    total = _walked(points, ranges, starts, order, indptr, none, none, no_distance)
+    first, second, distance = np.empty(total, np.intp), np.empty(total, np.intp), np.empty(total)
+    _walked(points, ranges, starts, order, indptr, first, second, distance)
+    return indptr, first, second, distance
+
+
+@inner_kernel
+def _walked(
+    points: Array,
+    ranges: Array,
+    starts: IntArray,
+    order: IntArray,
+    indptr: IntArray,
+    first: IntArray,
+    second: IntArray,
+    distance: Array,
+) -> int:
+    """Write the pairs, as many as there is room for; return how many there are."""
+    n, total, reach = len(points), 0, 0.0
     for i in range(n):
         reach = max(reach, ranges[i])
-    starts, order = np.empty(2 * n + 8, np.intp), np.empty(n, np.intp)
-    left, low, scale, columns, rows = (
-        binned(points, 0, n, reach, starts, order) if n else (0.0, 0.0, 0.0, 1, 1)
-    )
-    indptr, size = np.zeros(n + 1, np.intp), 8 * n
-    first, second, distance = np.empty(size, np.intp), np.empty(size, np.intp), np.empty(size)
-    total = 0
+    left, low, scale, columns, rows = 0.0, 0.0, 0.0, 1, 1
+    if n:
+        left, low, scale, columns, rows = binned(points, 0, n, reach, starts, order)
     for i in range(n):
         x, y = points[i, 0], points[i, 1]
         column, row = row_of(x - left, scale), row_of(y - low, scale)
@@ -208,28 +223,20 @@ def _pairs(points: Array, ranges: Array) -> tuple[IntArray, IntArray, IntArray, 
             b = r * columns
             for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
                 j = order[k]
-                dx, dy, limit = points[j, 0] - x, points[j, 1] - y, min(ranges[i], ranges[j])
+                dx, dy = points[j, 0] - x, points[j, 1] - y
                 away = np.sqrt(dx * dx + dy * dy)
-                if away <= limit and j != i:
-                    if total == size:
-                        size *= 2
-                        first, second, distance = _grown(first), _grown(second), _grown(distance)
+                if not away <= min(ranges[i], ranges[j]) or j == i:
+                    continue
+                if total < len(second):
                     # sorted in: those of one bin ascend already
                     place = total
                     while place > indptr[i] and second[place - 1] > j:
                         second[place], distance[place] = second[place - 1], distance[place - 1]
                         place -= 1
                     first[total], second[place], distance[place] = i, j, away
-                    total += 1
+                total += 1
         indptr[i + 1] = total
-    return indptr, first[:total].copy(), second[:total].copy(), distance[:total].copy()
-
-
-@kernel
-def _grown(values: NDArray[Any]) -> NDArray[Any]:
-    grown = np.empty(2 * len(values), values.dtype)
-    grown[: len(values)] = values
-    return grown
+    return total
 
 
 def _distances(positions: Array, first: IntArray, second: IntArray) -> Array:
