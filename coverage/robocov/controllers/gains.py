@@ -38,17 +38,18 @@ class Gain:
     high: float
     meaning: str
     optional: bool = False
+    whole: bool = False
 
     def validated(self, value: object, where: str) -> float | None:
         """Return `value` as the gain takes it, or raise a ParameterError that names `where`."""
         if value is None and self.optional:
             return None
-        if not (is_number(value) and self.low <= value <= min(self.high, sys.float_info.max)):
-            unit = f" {self.unit}" if self.unit else ""
-            also = ", or null for no limit," if self.optional else ""
-            wanted = f"a number from {self.low:g} to {self.high:g}{unit}{also} was wanted"
-            raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {wanted}")
-        return float(value)
+        inside = is_number(value) and self.low <= value <= min(self.high, sys.float_info.max)
+        if is_number(value) and inside and (not self.whole or value == int(value)):
+            return float(value)
+        what = f"a {'whole ' if self.whole else ''}number from {self.low:g} to {self.high:g} {self.unit}"
+        also = ", or null for no limit," if self.optional else ""
+        raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {what.rstrip()}{also} was wanted")
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ def gain(
     low: float = 0.0,
     high: float = 1e6,
     optional: bool = False,
+    whole: bool = False,
 ) -> Any:
     """Declare a gain as a dataclass field.
 
@@ -89,7 +91,8 @@ def gain(
     >>> gains_of(Mine)["k"].unit
     'N/m'
     """
-    return field(default=default, metadata={"gain": Gain("", default, unit, low, high, meaning, optional)})
+    known = Gain("", default, unit, low, high, meaning, optional, whole)
+    return field(default=default, metadata={"gain": known})
 
 
 def response_time_gain() -> Any:

@@ -12,10 +12,10 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.driving import approach, drive
-from robocov.controllers.gains import gain, response_time_gain, validate_gains
+from robocov.controllers.gains import WithGains, gain, response_time_gain
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -37,7 +37,7 @@ class GeodesicMemory:
 
 
 @dataclass(frozen=True)
-class GeodesicLloyd:
+class GeodesicLloyd(WithGains):
     """Lloyd's algorithm with geodesic Voronoi cells of the known map.
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) descend the cost with the
@@ -64,19 +64,12 @@ class GeodesicLloyd:
     information: ClassVar[str] = "whole map"
 
     exponent: float = gain(2.0, "1", "s: f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
-    lattice: float = gain(48.0, "cells", "cells of the lattice along a side", low=4.0, high=512.0)
+    lattice: float = gain(48.0, "cells", "of the lattice along a side", low=4.0, high=512.0, whole=True)
     clearance: float = gain(0.03, "m", "distance that ways keep from walls, beyond the radius", high=10.0)
     period: float = gain(0.2, "s", "time from one planning to the next", high=60.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of way to the goal", high=100.0)
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
-        if self.lattice != int(self.lattice):
-            raise ParameterError(
-                f"{self.name}.lattice: {shown(self.lattice)}, but a whole number of cells was wanted"
-            )
 
     def informed(self, environment: Environment) -> GeodesicLloyd:
         """Return the same law with the map."""

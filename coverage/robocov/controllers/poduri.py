@@ -9,9 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.driving import summed
-from robocov.controllers.gains import gain, validate_gains
+from robocov.controllers.gains import WithGains, gain
 from robocov.controllers.repulsion import forces_seen
-from robocov.errors import ParameterError, shown
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.potential import CONTACT_DISTANCE, separation
@@ -25,7 +24,7 @@ _STRETCHED = 0.999
 
 
 @dataclass(frozen=True)
-class Poduri:
+class Poduri(WithGains):
     """Constrained coverage (Poduri and Sukhatme, ICRA 2004): area, with a degree of at least K.
 
     Two robots have a link when they are at most R_c apart. F_cover pushes every linked pair apart with
@@ -47,19 +46,12 @@ class Poduri:
     label: ClassVar[str] = "Constrained coverage"
     summary: ClassVar[str] = "spreads, but keeps at least K neighbours within R_c (Poduri and Sukhatme 2004)"
 
-    neighbours: float = gain(2.0, "robots", "K, the neighbours that each robot keeps", high=100.0)
+    neighbours: float = gain(2.0, "robots", "K, the neighbours that each robot keeps", high=100.0, whole=True)
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
     k_cover: float = gain(10.0, "N m²", "strength of F_cover")
     eta: float = gain(0.9, "R_c", "distance at which the two forces are equal", low=0.1, high=0.99)
     k_obs: float = gain(0.1, "N m³", "strength of the repulsion from the closest obstacle point")
     rho_obs: float = gain(2.0, "m", "range of that repulsion", low=0.01, high=1e4)
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
-        if self.neighbours != int(self.neighbours):
-            raise ParameterError(
-                f"{self.name}.neighbours: {shown(self.neighbours)}, but a whole number of robots was wanted"
-            )
 
     def begin(self, region: Region, team: Team) -> Array:
         """Return the range of each robot's links, (n,) m."""
