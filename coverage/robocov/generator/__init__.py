@@ -33,8 +33,7 @@ _DISC = (
     0.1,
 )  # radius of a start, in sides of a square per obstacle, and at most, in shorter sides of the map
 _LEAST = 0.4  # part of that radius that is left at least where walls are near
-_MARGIN = 0.02  # distance of the disc in a corner from the boundary, in shorter sides of the map
-_OFF = 0.3  # how far the disc near the middle may be from there, in shorter sides of the map
+_MARGIN, _OFF = 0.02, 0.3  # of the discs from the boundary, and from the middle at most, in shorter sides
 
 
 @dataclass(frozen=True)
@@ -77,10 +76,9 @@ def generated_map(
 ) -> Environment:
     """Return a random map; the same seed and parameters give the same one.
 
-    The free space of a map is one piece without a passage narrower than `gap`, and the blocked part of its
-    area is `area` to within `AREA_TOLERANCE`. There are three starts: ``corner``, a disc in one of the
-    corners, ``centre``, a disc near the middle, and ``uniform``. Coordinates are whole centimetres, or
-    millimetres where the gap is narrow. What was asked for stands in the map's `extra`.
+    Its free space is one piece without a passage narrower than `gap`, and the blocked part of its area is
+    `area` to within `AREA_TOLERANCE`. The starts are ``corner``, a disc in one of the corners, ``centre``,
+    one near the middle, and ``uniform``. What was asked for stands in the map's `extra`.
 
     Parameters
     ----------
@@ -209,11 +207,10 @@ def _centre(environment: Environment, request: Request, corner: DiscStart) -> Di
 
 
 def _fulfils(environment: Environment, request: Request) -> bool:
-    share = 1.0 - environment.free_area / environment.area
-    if abs(share - request.area) > AREA_TOLERANCE or len(environment.free.geoms) != 1:
+    free, share = environment.free, 1.0 - environment.free_area / environment.area
+    if abs(share - request.area) > AREA_TOLERANCE or len(free.geoms) != 1:
         return False
-    narrowest = narrowest_gap(environment.free)
-    if narrowest is not None and narrowest.width < request.gap - 1e-6:
-        return False
+    narrowest = narrowest_gap(free)
+    wide = narrowest is None or narrowest.width >= request.gap - 1e-6
     # where a disc as wide as the gap may be must hang together
-    return isinstance(environment.free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon)
+    return wide and isinstance(free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon)

@@ -27,10 +27,7 @@ _HALVINGS = 16
 
 
 class Edge(NamedTuple):
-    """An edge of a convex cell, by the point (m) where it begins; a block keeps its distance from it.
-
-    That is `setback` metres, and `more` times what streets are wider than they must be.
-    """
+    """An edge of a cell, from (x, y) m; blocks keep `setback` off it, and `more` of what is to spare."""
 
     x: float
     y: float

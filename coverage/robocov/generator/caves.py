@@ -45,8 +45,7 @@ _CLOSE = 0.5  # part of the tolerance of the blocked area that is made use of; r
 def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return the rock around a cave and the pillars in it; None where a draw leads nowhere.
 
-    The level is chosen first, by halving, so that about as much is blocked as is wanted, then the radius
-    so that it is.
+    The level is chosen first, by halving, so that about as much is blocked as is wanted, then the radius.
     """
     unit, width, height = request.unit, float(request.width), float(request.height)
     fine = min(_FINE * unit, _FINEST * min(width, height))
@@ -172,8 +171,7 @@ def tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
     """Return lines that join all parts, as short as can be, with a bend in each: a spanning tree."""
     found: list[LineString] = []
     tree, joined = shapely.STRtree(parts), DisjointSet(range(len(parts)))
-    left, bottom, right, top = shapely.total_bounds(parts).tolist()
-    reach = max(right - left, top - bottom) / len(parts)
+    reach = float(np.ptp(shapely.total_bounds(parts).reshape(2, 2), axis=0).max()) / len(parts)
     while joined.n_subsets > 1:
         i, j = tree.query(parts, "dwithin", reach)
         i, j = i[i < j], j[i < j]

@@ -53,17 +53,18 @@ def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
     while walls.any() and walls.sum() >= least:
         lines = list(trails(walls))
 
-        def built(steps: int, lines: list[list[Post]] = lines) -> list[WallObstacle]:
+        def built(steps: int, lines: list[list[Post]] = lines) -> tuple[list[WallObstacle], float]:
             wide = round(steps * request.step, request.digits)
             x, y = _grid(request, shape, wide)
-            return [WallObstacle(tuple((x[i], y[k]) for i, k in line), wide) for line in lines]
+            found = [WallObstacle(tuple((x[i], y[k]) for i, k in line), wide) for line in lines]
+            return found, float(shapely.union_all([wall.polygon for wall in found]).area)
 
         # the thickness whose blocked area is nearest to what is wanted
         low, high = 1, math.ceil(min(request.width / shape[0], request.height / shape[1]) / request.step)
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (middle, high) if _area(built(middle)) < request.blocked else (low, middle)
-        found = min(map(built, (low, high)), key=lambda each: abs(_area(each) - request.blocked))
+            low, high = (middle, high) if built(middle)[1] < request.blocked else (low, middle)
+        found, area = min(map(built, (low, high)), key=lambda each: abs(each[1] - request.blocked))
         thickness = found[0].width
         x, y = _grid(request, shape, thickness)
         # the boundary has no thickness
@@ -77,7 +78,7 @@ def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
         inside = shapely.intersects(shapely.box(*(begin - beside).T, *(end + beside).T), disc)
         if inside.any():
             walls[tuple(at[inside].T)] = False
-        elif abs(_area(found) - request.blocked) <= enough:
+        elif abs(area - request.blocked) <= enough:
             return [*found]
         else:
             _open(walls, rng)
@@ -103,10 +104,6 @@ def _grid(request: Request, shape: Cell, thickness: float) -> list[list[float]]:
         inner = np.arange(1, count, dtype=np.float64) * ((length + thickness) / count) - thickness / 2.0
         lines.append([0.0, *request.rounded(inner).tolist(), float(length)])
     return lines
-
-
-def _area(walls: list[WallObstacle]) -> float:
-    return float(shapely.union_all([wall.polygon for wall in walls]).area)
 
 
 def inner_walls(shape: Cell) -> BoolArray:
@@ -139,11 +136,7 @@ def tree_passages(shape: Cell, rng: np.random.Generator) -> BoolArray:
 
 
 def _open(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Take away a wall, one at a dead end if there is any and chance has it.
-
-    If possible it is one that joins others, or joins them to the boundary: then there is a way round what
-    it held. To take the end of a wall makes none.
-    """
+    """Take away a wall, if possible one held at both ends, which makes a way round; often at a dead end."""
     meeting = walls.sum(axis=2)
     meeting[:, 1:] += walls[:, :-1, 0]
     meeting[1:] += walls[:-1, :, 1]

@@ -101,8 +101,7 @@ class FloorPlan:
 def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return walls and furniture; None if there is no room for so much of it.
 
-    Furniture stands against walls, or at least `gap` away from them; from doors and other furniture
-    it keeps that in any case.
+    Furniture stands against walls, or keeps the gap from them, as from doors and other furniture.
     """
     least, most, of_small = _WALLS
     small = min(max((_SMALL - request.unit / request.gap) / (_SMALL - _SMALLEST), 0.0), 1.0)
