@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robocov.compiled import kernel
 from robocov.controllers.cells import cells_seen
 from robocov.errors import ParameterError, shown
 from robocov.observation.scans import MOST_RAYS
 
 if TYPE_CHECKING:
-    from robocov.arrays import Array
+    from robocov.arrays import Array, IntArray
     from robocov.observation import Observations
     from robocov.observation.region import Region
     from robocov.observation.scans import Scans
@@ -83,7 +85,7 @@ class ObservationLayout:
                 f"observation.centroid: {shown(self.centroid)}, but true or false was wanted"
             )
 
-    @property
+    @cached_property
     def blocks(self) -> dict[str, slice]:
         """Where in a row each block is, in their order; only those that it has."""
         counts = {
@@ -147,7 +149,11 @@ class ObservationLayout:
         obstacle[sensed, :2] = ((seen.obstacle_points - seen.positions) / reach)[sensed]
         obstacle[:, 2] = sensed
         if self.neighbours:
-            rows[:, places["neighbour"]] = _nearest(seen, self.neighbours, unit)
+            robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
+            nearest = np.zeros((n, self.neighbours, 3))
+            farthest = np.full((n, self.neighbours), np.inf)
+            _place_nearest(robot, offset, distance, unit, farthest, nearest)
+            rows[:, places["neighbour"]] = nearest.reshape(n, -1)
         if self.rays:
             scans = seen.scans if scans is None else scans
             if scans is None or scans.rays != self.rays:
@@ -168,17 +174,22 @@ def sensing_unit(team: Team, region: Region) -> Array:
     return np.asarray(np.clip(team.sensing_range, 1e-9, region.diameter))
 
 
-def _nearest(seen: Observations, count: int, unit: float) -> Array:
-    """Return the blocks of the nearest neighbours, (n, 3 count)."""
-    n = len(seen.positions)
-    robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
-    # stable: what is equally far stays in the order of the numbers
-    order = np.lexsort((distance, robot))
-    begin = np.searchsorted(robot, np.arange(n))
-    rank = np.arange(len(robot)) - begin[robot]
-    told = rank < count
-    blocks = np.zeros((n, count, 3))
-    # from the robot to its neighbour
-    blocks[robot[told], rank[told], :2] = -offset[order[told]] / unit
-    blocks[robot[told], rank[told], 2] = 1.0
-    return blocks.reshape(n, 3 * count)
+@kernel
+def _place_nearest(
+    robot: IntArray, offset: Array, distance: Array, unit: float, best: Array, blocks: Array
+) -> None:
+    """Put the nearest neighbours of robots into `blocks`, (n, count, 3), their distances into `best`."""
+    for k in range(len(robot)):
+        i, place = robot[k], best.shape[1]
+        # what is equally far stays in the order of the numbers
+        while place > 0 and distance[k] < best[i, place - 1]:
+            place -= 1
+        for later in range(best.shape[1] - 1, place, -1):
+            best[i, later] = best[i, later - 1]
+            for c in range(3):
+                blocks[i, later, c] = blocks[i, later - 1, c]
+        if place < best.shape[1]:
+            best[i, place], blocks[i, place, 2] = distance[k], 1.0
+            for c in range(2):
+                # from the robot to its neighbour
+                blocks[i, place, c] = -offset[k, c] / unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -76,13 +77,13 @@ class Region:
         """The region as a shapely polygon."""
         return Polygon(self.vertices)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y in metres."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
-    @property
+    @cached_property
     def diameter(self) -> float:
         """Diagonal of the bounding box in metres: a length that no distance inside exceeds."""
         low_x, low_y, high_x, high_y = self.bounds
