@@ -257,7 +257,7 @@ class Simulation:
         return Scans(distances, hit)
 
     def _decided(self, seen: Observations) -> Decision:
-        count, name = len(self.team), self.controller.name
+        count, name = len(seen.positions), self.controller.name
         if self._built_in:
             return checked_decision(self._law.decide(seen, self.memory), count, name, seen.time)
         # a user's controller may change what it is given, and use again what it gave

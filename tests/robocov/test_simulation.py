@@ -256,6 +256,7 @@ def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
     simulation = Simulation(empty, Counting(np.zeros((1, 2))), [[2.0, 2.0]])
     for _ in range(3):
         simulation.step()
+    assert (simulation.snapshot.decision.memory, simulation.memory) == ([4], [3])
     twin = simulation.copy()
     for _ in range(5):
         simulation.step()

@@ -428,6 +428,7 @@ class TestMoments:
         assert record.at(1.0).time == 1.0
         assert record.at(1.008).time == 1.0
         assert record.at(1.012).time == pytest.approx(1.02)
+        assert record.thinned(0.0).at(1.0).time == 0.0, "of two as near the earlier"
         np.testing.assert_array_equal(record.at(2.0).positions, record.positions[-1])
         for time in (-0.1, 2.1, np.nan):
             with pytest.raises(ParameterError, match="but a number from 0 to 2 s was wanted"):

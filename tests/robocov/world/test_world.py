@@ -163,6 +163,9 @@ def test_a_copy_goes_on_identically_even_in_contact(cluttered: Environment, seed
         assert (original.positions == twin.positions).all()
         assert (original.velocities == twin.velocities).all()
         assert (original.positions == undisturbed.positions).all()
+    # also in threads
+    assert twin._engine is not original._engine
+    assert twin._contacts is None or twin._contacts is not original._contacts
 
 
 def test_the_copy_test_is_about_contacts(cluttered: Environment) -> None:
