@@ -228,13 +228,15 @@ def _unhidden(walls: Walls, px: float, py: float, dx: float, dy: float) -> bool:
     low_x, high_x, low_y, high_y = px + min(dx, 0.0), px + max(dx, 0.0), py + min(dy, 0.0), py + max(dy, 0.0)
     node = 1
     while node:
-        half_x, half_y = 0.5 * (boxes[node, 2] - boxes[node, 0]), 0.5 * (boxes[node, 3] - boxes[node, 1])
-        side = dx * (boxes[node, 1] + half_y - py) - dy * (boxes[node, 0] + half_x - px)
         if (
             boxes[node, 0] > high_x or boxes[node, 2] < low_x
             or boxes[node, 1] > high_y or boxes[node, 3] < low_y
-            or abs(side) * (1.0 - _PAD) > (abs(dx) * half_y + abs(dy) * half_x) * (1.0 + _PAD) + 2.0**55
         ):  # fmt: skip
+            node = skipped(node)
+            continue
+        half_x, half_y = 0.5 * (boxes[node, 2] - boxes[node, 0]), 0.5 * (boxes[node, 3] - boxes[node, 1])
+        side = dx * (boxes[node, 1] + half_y - py) - dy * (boxes[node, 0] + half_x - px)
+        if abs(side) * (1.0 - _PAD) > (abs(dx) * half_y + abs(dy) * half_x) * (1.0 + _PAD) + 2.0**55:
             node = skipped(node)
             continue
         if node < leaves:
