@@ -12,7 +12,6 @@ import re
 from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -249,7 +248,7 @@ def _after_space(text: str, at: int) -> int:
 
 def _placed(mistake: Mistake, text: str, offset: int) -> Mistake:
     line, column = line_and_column(text, offset)
-    return replace(mistake, line=line, column=column)
+    return mistake._replace(line=line, column=column)
 
 
 def _require_size(content: str | bytes, where: str) -> None:
