@@ -10,9 +10,15 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information
-from robocov.controllers.driving import approach, avoid, drive, offsets_from_neighbours
+from robocov.controllers.driving import (
+    approach,
+    avoid,
+    drive,
+    last_returns,
+    offsets_from_neighbours,
+    with_nearest,
+)
 from robocov.controllers.gains import WithGains, gain, response_time_gain
-from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning

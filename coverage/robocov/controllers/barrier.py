@@ -9,9 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, in_rows, nearest_allowed
+from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
 from robocov.controllers.gains import WithGains, gain, response_time_gain
-from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning

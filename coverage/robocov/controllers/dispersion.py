@@ -8,9 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers.driving import avoid, drive, summed
+from robocov.controllers.driving import avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import WithGains, gain
-from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning

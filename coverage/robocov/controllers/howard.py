@@ -8,9 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers.driving import summed
+from robocov.controllers.driving import last_returns, summed
 from robocov.controllers.gains import WithGains, gain
-from robocov.controllers.returns import last_returns
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning

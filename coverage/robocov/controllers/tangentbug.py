@@ -12,9 +12,8 @@ import numpy as np
 from robocov.arrays import Array, ComplexArray, frozen
 from robocov.compiled import kernel
 from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, avoid, drive
+from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
 from robocov.controllers.gains import WithGains, gain, response_time_gain
-from robocov.controllers.returns import last_returns, with_nearest
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robocov.controllers import Howard
-from robocov.controllers.returns import last_returns, with_nearest
+from robocov.controllers.driving import last_returns, with_nearest
 from robocov.environment import Environment
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
