@@ -127,13 +127,11 @@ class ContactSolver:
 def obstacle_space(
     pieces: tuple[Array, ...], movers: tuple[Mover, ...], failed_robots: Array | None
 ) -> pymunk.Space:
-    """Return a space with all that robots may run into but each other."""
+    """Return a space with all that robots may run into but each other; shapes have no friction by default."""
     space = pymunk.Space()
     walls: list[pymunk.Shape] = [pymunk.Poly(space.static_body, ring.tolist()) for ring in pieces]
     for x, y, radius in [] if failed_robots is None else failed_robots.tolist():
         walls.append(pymunk.Circle(space.static_body, radius, (x, y)))
-    for wall in walls:
-        wall.friction = wall.elasticity = 0.0
     space.add(*walls)
     for mover in movers:
         for shape in added_mover(space, mover).shapes:
@@ -144,10 +142,7 @@ def obstacle_space(
 def added_mover(space: pymunk.Space, mover: Mover) -> pymunk.Body:
     """Add an obstacle that moves to a space, where it is at time zero; its position is its shift."""
     body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-    shapes = [pymunk.Poly(body, ring.tolist()) for ring in mover.pieces]
-    for shape in shapes:
-        shape.friction = shape.elasticity = 0.0
-    space.add(body, *shapes)
+    space.add(body, *[pymunk.Poly(body, ring.tolist()) for ring in mover.pieces])
     return body
 
 
@@ -155,6 +150,5 @@ def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
     """Return a frictionless disc that does not turn."""
     body = pymunk.Body(mass, math.inf)
     disc = pymunk.Circle(body, radius)
-    disc.friction = disc.elasticity = 0.0
     disc.filter = _NO_WALL
     return body, disc
