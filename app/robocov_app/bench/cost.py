@@ -1,9 +1,7 @@
-"""The exact coverage cost on bundled maps against a k-d tree's distances, and against fast marching.
+"""The exact coverage cost against fast marching of second order, by scikit-fmm.
 
-The tree (scipy's `cKDTree`) finds the nearest robot of the same sites as the crow flies, through walls: the
-least that any coverage cost takes.
-Fast marching of second order, by scikit-fmm, travels over the same lattice from the cells that hold a robot;
-it is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
+Fast marching travels over the same lattice with the same free sites, from the cells that hold a robot.
+It is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
 """
 
 from __future__ import annotations
@@ -14,11 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
-from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 
 if TYPE_CHECKING:
@@ -44,49 +40,13 @@ BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
 
 YARDSTICK = "scikit-fmm, order 2"
 
-TREE = "k-d tree of the robots"
-
-BEFORE = {
-    ("rooms", 64, 6): 4.5, ("rooms", 128, 6): 2.8, ("rooms", 256, 6): 1.7,
-    ("rooms", 64, 50): 4.9, ("rooms", 128, 50): 2.4, ("rooms", 256, 50): 1.0,
-    ("museum", 64, 6): 7.4, ("museum", 128, 6): 3.8, ("museum", 256, 6): 1.9,
-    ("museum", 64, 50): 6.9, ("museum", 128, 50): 4.2, ("museum", 256, 50): 1.1,
-    ("campus", 64, 6): 19.5, ("campus", 128, 6): 14.6, ("campus", 256, 6): 4.9,
-    ("campus", 64, 50): 20.6, ("campus", 128, 50): 10.3, ("campus", 256, 50): 3.2,
-    ("campus", 64, 1000): 136.8,
-}  # fmt: skip
-"""Multiples of the time of the tree, by map, lattice and robots; see `Row.before`."""
-
-FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
-"""How many times less is wanted, by lattice; twice that on campus, ten times for 1000 robots."""
-
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 
 def cases(*, quick: bool = False) -> list[Case]:
     """Return a case for each lattice and number of vertices."""
     sizes = ((128, 200), (256, 200)) if quick else [(n, k) for k in VERTICES for n in LATTICES]
-    maps = sorted({(name, lattice) for name, lattice, _ in BEFORE if not quick or lattice == 64})
-    return [
-        *(partial(_on_map, name, lattice, quick) for name, lattice in maps),
-        *(partial(_rows, lattice, vertices, quick) for lattice, vertices in sizes),
-    ]
-
-
-def _on_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
-    cost = CoverageCost(load_map(name), lattice)
-    for robots in [n for known, size, n in BEFORE if (known, size) == (name, lattice)]:
-        places = _Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {
-            "exact": partial(_evaluated, cost, places),
-            "tree": lambda: cKDTree(places.now).query(cost.points),  # noqa: B023 - called at once
-        }
-        taken = InTurn(calls, before=places.move).rounds(7, 0.3 if quick else 1.0)
-        before = BEFORE[name, lattice, robots]
-        faster = 10.0 if robots == 1000 else FASTER[lattice] * (2.0 if name == "campus" else 1.0)
-        size: Parameters = {"map": name, "lattice": lattice, "robots": robots}
-        tree = TREE, taken["tree"], before / faster
-        yield Row("maps", "evaluated", size, taken["exact"], *tree, before=before)
+    return [partial(_rows, lattice, vertices, quick) for lattice, vertices in sizes]
 
 
 def has_yardstick() -> bool:
@@ -122,8 +82,8 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     for robots in (6, 50) if quick else ROBOTS:
         if robots > len(cost.points):
             continue
-        places = _Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {"exact": partial(_evaluated, cost, places)}
+        places = Places(cost, robots)
+        calls: dict[str, Callable[[], object]] = {"exact": partial(evaluated, cost, places)}
         if has_yardstick():
             calls["marching"] = partial(_marched, cost, places)
         taken = InTurn(calls, before=places.move).rounds(7, 0.3 if quick else 1.0)
@@ -134,7 +94,7 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
         )
 
 
-class _Places:
+class Places:
     """Robots that move a little with every round."""
 
     def __init__(self, cost: CoverageCost, robots: int) -> None:
@@ -154,12 +114,12 @@ class _Places:
         self.now = np.where(free[:, None], places, self._start)
 
 
-def _evaluated(cost: CoverageCost, places: _Places) -> float:
+def evaluated(cost: CoverageCost, places: Places) -> float:
     """Return the mean distance, exactly."""
     return cost(places.now).mean_distance
 
 
-def _marched(cost: CoverageCost, places: _Places) -> float:
+def _marched(cost: CoverageCost, places: Places) -> float:
     """Return the mean distance, by fast marching."""
     import skfmm
 

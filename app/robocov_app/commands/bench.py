@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from robocov_app.bench.measure import Row
 
-PARTS = ("step", "cost", "learning", "sweep", "render", "window", "start")
+PARTS = ("step", "maps", "cost", "learning", "sweep", "render", "window", "start")
 
 TITLES = {
     "step": "A step of RAPF on campus",
@@ -48,11 +48,11 @@ class Arguments:
 
     part: Annotated[
         tyro.conf.Positional[
-            Literal["step", "cost", "learning", "sweep", "render", "window", "start", "all"]
+            Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
         ],
         tyro.conf.arg(metavar="PART"),
     ] = "all"
-    """What to measure: step, cost, learning (needs 'robocov[rl]'), sweep, render, window, start or all."""
+    """What to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
     json: bool = False

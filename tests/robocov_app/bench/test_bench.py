@@ -12,7 +12,7 @@ import pytest
 from called import complaint
 from matplotlib.figure import Figure
 
-from robocov_app.bench import cost, learning, plot, render, start, step, sweep, window
+from robocov_app.bench import cost, learning, maps, plot, render, start, step, sweep, window
 from robocov_app.bench.measure import InTurn, Row
 from robocov_app.cli import main
 from robocov_app.commands import bench
@@ -90,7 +90,7 @@ def small(monkeypatch):
     """Make every part a matter of a second or two."""
     monkeypatch.setattr(step, "GOALS", {6: (None, 16.0)})
     monkeypatch.setattr(step, "TOGETHER", 2)
-    monkeypatch.setattr(cost, "BEFORE", {("rooms", 64, 6): 4.5})
+    monkeypatch.setattr(maps, "BEFORE", {("rooms", 64, 6): 4.5})
     monkeypatch.setattr(learning, "TOGETHER", 2)
     monkeypatch.setattr(sweep, "MAPS", ("square",))
     monkeypatch.setattr(sweep, "DURATION", 1.0)
@@ -110,7 +110,7 @@ def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     target = tmp_path / "ratios.png"
     assert main(["bench", "all", "--quick", "--json", "--plot", str(target)]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {row["part"] for row in found["rows"]} == {*bench.PARTS, "maps"}
+    assert {row["part"] for row in found["rows"]} == {*bench.PARTS}
     assert set(found["machine"]) == {"python", "system", "processor", "cores", "packages"}
     for row in found["rows"]:
         assert list(row) == KEYS
@@ -142,14 +142,14 @@ def test_the_cost_is_measured_beside_its_yardstick(monkeypatch):
 def test_fast_marching_measures_the_same_distances():
     pytest.importorskip("skfmm", reason="the yardstick is an extra")
     evaluated = cost.CoverageCost(cost_map(20), 64)
-    places = cost._Places(evaluated, 6)
+    places = cost.Places(evaluated, 6)
     exact = evaluated(places.now).mean_distance
     assert cost._marched(evaluated, places) == pytest.approx(exact, rel=0.1)
 
 
 def test_robots_of_the_benchmark_move_a_little_and_stay_free():
     evaluated = cost.CoverageCost(cost_map(200), 64)
-    places = cost._Places(evaluated, 20)
+    places = cost.Places(evaluated, 20)
     former = places.now
     for _ in range(20):
         places.move()
