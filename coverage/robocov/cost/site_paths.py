@@ -334,13 +334,9 @@ def site_paths(
             _nearest_robot(tiles.sites[s, 0], tiles.sites[s, 1], robots, lists[2], some, paths, s)
             i = paths.ways[s, 0]
             index.sources[i, 2] = max(index.sources[i, 2], paths.distance[s])
-    # some walls beyond the own sites save second looks
-    beyond = 0.0
-    for i in range(n):
-        beyond += index.sources[i, 2] / n
     used = 0
     for i in range(n):
-        reach = index.sources[i, 2] * (1.0 + 1e-9) + beyond
+        reach = index.sources[i, 2] * (1.0 + 1e-9)
         used = enter_walls(walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
         if used < 0:
             return -1
