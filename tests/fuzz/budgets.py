@@ -5,8 +5,6 @@
 prints a table of CPU seconds, of MB beside what the process has before, and of what came of each file.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

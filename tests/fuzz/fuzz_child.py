@@ -3,8 +3,6 @@
 A line of JSON on its input says what to read; a line on its output says what came of it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Changes of inputs: bytes flipped, cut, repeated; numbers made extreme; words spliced in; files crossed."""
 
-from __future__ import annotations
-
 import gzip
 import re
 import zlib

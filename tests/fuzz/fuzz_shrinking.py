@@ -2,8 +2,6 @@
 failure-inducing input*, IEEE Transactions on Software Engineering 28, 2002).
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Inputs made by rule, not by change: documents of each format whose parts are anything, or nearly right."""
 
-from __future__ import annotations
-
 import copy
 import json
 from typing import Any

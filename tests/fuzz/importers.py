@@ -8,8 +8,6 @@ What may come of one is a valid map, or one line that says why not, within secon
 Everything else is a finding: it is made as small as can be, and saved with its traceback.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """No file costs more than is promised, by a generous factor: machines are busy, and not all are as fast."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A short part of the fuzzing of `importers.py`, and that it finds what it is there for."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

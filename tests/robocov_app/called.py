@@ -1,7 +1,5 @@
 """Calling the command in tests, in this process or in one of its own."""
 
-from __future__ import annotations
-
 import json
 import sys
 

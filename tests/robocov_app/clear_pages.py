@@ -1,7 +1,5 @@
 """Whether the words of a plot can all be read."""
 
-from __future__ import annotations
-
 
 def boxes(figure):
     """Return the extents of all that is written on the page outside the arenas, and of the arenas."""

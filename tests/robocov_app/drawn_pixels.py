@@ -1,7 +1,5 @@
 """Frames of single layers, and colours at their pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

@@ -1,7 +1,5 @@
 """Maps and made-up runs for the tests of all that draws."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle

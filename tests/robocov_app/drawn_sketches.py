@@ -1,7 +1,5 @@
 """Sketches drawn by hypothesis, sound ones and broken ones, and all that the editor can do to them."""
 
-from __future__ import annotations
-
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle

@@ -1,7 +1,5 @@
 """A real browser without a display, and hands for it."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import time

@@ -1,7 +1,5 @@
 """What the inspector says of moments made by hand and of runs."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

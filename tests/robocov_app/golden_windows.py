@@ -1,7 +1,5 @@
 """Pictures to compare the window with: ``python tests/robocov_app/golden_windows.py`` draws them anew."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

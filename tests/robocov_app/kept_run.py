@@ -1,7 +1,5 @@
 """Saving a session and repeating what was saved, for the tests of kept runs."""
 
-from __future__ import annotations
-
 import io
 import json
 import time

@@ -1,7 +1,5 @@
 """Small grids and the files that hold them, drawn for the tests."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Results for the tests of reports: made up in memory, and really run on the disk."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 from pathlib import Path
 

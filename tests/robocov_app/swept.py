@@ -1,7 +1,5 @@
 """Small studies and what comes of them, for the tests of sweeps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Plots from Python: axes in, axes out; and what notebooks show of maps and runs."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A gain that is a word, through all that knows gains: commands, studies, tables, reports, the window."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

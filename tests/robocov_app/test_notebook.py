@@ -1,7 +1,5 @@
 """The notebook in tests/notebooks runs from the top, and shows what it should."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import io

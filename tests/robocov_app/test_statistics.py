@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,6 +86,12 @@ def test_one_cluster_has_no_interval() -> None:
         assert np.isnan(found.high)
     assert str(bootstrap([1.5])) == "1.5"
     assert str(Interval(1.0, 0.5, 2.0)) == "1 (0.5 to 2)"
+
+
+@pytest.mark.filterwarnings("ignore:The BCa confidence interval")
+def test_resamples_without_a_value_do_not_count() -> None:
+    found = bootstrap_by(lambda rows: float(rows[0]) if rows[0] else float("nan"), ["a", "b", "c"])
+    assert (found.low, found.high) == (1.0, 2.0)
 
 
 def test_spread() -> None:

@@ -1,7 +1,5 @@
 """Files that are watched, with a clock of the test's own: what happens while it sleeps is written down."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path

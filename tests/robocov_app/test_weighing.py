@@ -1,7 +1,5 @@
 """What commands say where places do not count all the same."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

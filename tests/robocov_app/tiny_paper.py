@@ -1,7 +1,5 @@
 """A study of the paper that is as small as it can be: everything is run, nothing is learnt."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A hall and sessions in it, for the tests of the interactive window's model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small vector files, written for tests and read by their importers."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Finding words in a frame, as a reader would: their ink, and nothing where they have none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pygame
 

@@ -1,7 +1,5 @@
 """Windows on a display that nobody sees, and hands for them: Xvfb and xdotool."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

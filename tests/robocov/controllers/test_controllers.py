@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from robocov.controllers import (
     informed,
     make_controller,
 )
-from robocov.controllers.gains import Option, choice, gain
+from robocov.controllers.gains import Gain, Option, choice, gain
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations
@@ -283,6 +284,8 @@ def test_gains_are_validated_by_name_and_range() -> None:
         Rapf(k_att=float("nan"))
     with pytest.raises(ParameterError, match=r"rapf.k_rep: True"):
         Rapf(k_rep=True)
+    with pytest.raises(ParameterError, match=r"mine.k: inf, but a number from 0 to inf was wanted"):
+        Gain("k", 1.0, "", 0.0, math.inf, "").validated(math.inf, "mine")
 
 
 @given(

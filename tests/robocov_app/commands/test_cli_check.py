@@ -1,7 +1,5 @@
 """`robocov check`: every mistake with its line, and maps that are checked at each save."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

@@ -1,7 +1,5 @@
 """The maps of distances, as the command line gives them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

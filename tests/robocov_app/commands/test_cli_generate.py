@@ -1,7 +1,5 @@
 """`robocov generate`: files, folders, the maps of the paper's study, and what is refused."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The command `robocov export`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Folders of results come from anybody: to read them runs no code of theirs."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Questions, lists and files to choose from: what keys and letters do to them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from robocov_app.editor.asking import ROWS, Answer, FileQuestion, ListQuestion, Picker, Question

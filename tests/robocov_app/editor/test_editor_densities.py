@@ -1,7 +1,5 @@
 """The density in the editor: kept through load, edit and save; hot spots drawn, moved and weighed."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every action, typed command and field of the editor does to the map."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Documents opened, saved and left, with all the questions; and how the editor is opened."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

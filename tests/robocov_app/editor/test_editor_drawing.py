@@ -1,7 +1,5 @@
 """Drawing: what the tools put down, by clicks, drags and typed numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

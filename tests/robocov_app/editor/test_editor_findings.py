@@ -1,7 +1,5 @@
 """What was found out about a map, and what is being done, seen in the window."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

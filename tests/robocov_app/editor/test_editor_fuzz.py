@@ -1,7 +1,5 @@
 """Thousands of random keys, clicks, drags and letters: the editor must bear them all."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path

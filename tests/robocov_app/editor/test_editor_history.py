@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from drawn_sketches import changes, drafts, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """The import dialogue: its options, what they change, a click into the map, and how it ends."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The document that is open: saved, changed behind its back, kept aside."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Obstacles that move, in the editor: their paths drawn, changed, kept, and shown moving."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

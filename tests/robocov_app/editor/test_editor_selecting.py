@@ -1,7 +1,5 @@
 """Selecting, moving, turning, scaling, copying, and editing vertices with the mouse."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The page under the editor: what is drawn in patches is what is drawn as a whole, pixel by pixel."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

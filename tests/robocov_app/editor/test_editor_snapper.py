@@ -1,7 +1,5 @@
 """What is snapped to: at once on small maps, a little later on large ones."""
 
-from __future__ import annotations
-
 import time
 
 from driven_editor import sheet

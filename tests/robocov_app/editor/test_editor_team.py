@@ -1,7 +1,5 @@
 """How a team would stand at a start, beside the window."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What tools share: directions, lengths and places in words."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Trying a map in the demo, in the same window, and back with nothing lost."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

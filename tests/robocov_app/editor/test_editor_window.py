@@ -1,7 +1,5 @@
 """The editor's window: panel, keyboard, mouse, menus, palette, help, sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The real editor under X11: a floor plan from nothing to a running demo, and nothing lost by kill -9."""
 
-from __future__ import annotations
-
 import json
 import signal
 import time

@@ -1,7 +1,5 @@
 """Which cells a map covers, against a point-by-point test, and what a grid cannot be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How a format to write is chosen; and out and in again changes less than a row of cells."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import fields, replace
 from pathlib import Path

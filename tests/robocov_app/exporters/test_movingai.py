@@ -1,7 +1,5 @@
 """MovingAI grids that are written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

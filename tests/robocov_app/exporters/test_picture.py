@@ -1,7 +1,5 @@
 """Pictures that are written know their scale and their place."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

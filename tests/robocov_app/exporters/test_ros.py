@@ -1,7 +1,5 @@
 """ROS maps that are written: pixels, YAML, and that they come back as they were."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

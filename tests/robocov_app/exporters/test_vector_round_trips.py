@@ -1,7 +1,5 @@
 """Maps out and in again in vector formats: what is free comes back to the rounding, property-tested."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -6,8 +6,6 @@ prints a JSON object: for each file its CPU seconds and what was said, and by ho
 memory grew.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import sys

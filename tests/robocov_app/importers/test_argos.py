@@ -1,7 +1,5 @@
 """Arenas of ARGoS: boxes and cylinders where they stand, and what is distributed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

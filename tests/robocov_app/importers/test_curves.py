@@ -1,7 +1,5 @@
 """Curves against themselves, drawn much finer."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """DXF drawings, made by ezdxf: entities, blocks, layers, units, and what is refused."""
 
-from __future__ import annotations
-
 import io
 import logging
 import math

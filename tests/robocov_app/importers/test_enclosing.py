@@ -1,7 +1,5 @@
 """Which shape is the boundary, and what is free: the same rules for every drawing."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

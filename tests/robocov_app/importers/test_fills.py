@@ -1,7 +1,5 @@
 """What rings enclose, against winding numbers counted from angles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """GeoJSON, against shapely's own reader; degrees and metres; names; what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """From the globe to metres, against geodesics."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Files made to do harm: each is refused in one line, within a second and 200 MB, in a process of its own."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

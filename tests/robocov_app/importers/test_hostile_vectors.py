@@ -1,7 +1,5 @@
 """Files that were made to take for ever, or all memory: refused at once, in one line."""
 
-from __future__ import annotations
-
 import base64
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """HouseExpo plans, on small ones of our own: what is kept, what is repaired, what is refused."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pictures of every kind give the same brightness; what is broken or too large is refused."""
 
-from __future__ import annotations
-
 import io
 import struct
 from pathlib import Path

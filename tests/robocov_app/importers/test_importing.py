@@ -1,7 +1,5 @@
 """How a format is known, what its options are, and that every format keeps to the common way."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import fields
 from pathlib import Path

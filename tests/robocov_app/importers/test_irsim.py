@@ -1,7 +1,5 @@
 """Worlds of IR-SIM: shapes at their states, groups, pictures of cells that are no squares."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files that are none, and files that are too large, are refused before they are read."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

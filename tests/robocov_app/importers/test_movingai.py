@@ -1,7 +1,5 @@
 """Grids of Moving AI: letters, line ends, and what is refused with its line and column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

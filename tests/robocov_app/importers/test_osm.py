@@ -1,7 +1,5 @@
 """OpenStreetMap: buildings, relations of several ways, barriers, bounds, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

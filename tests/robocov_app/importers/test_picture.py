@@ -1,7 +1,5 @@
 """Pictures of plans: dark and light, transparent, and the place that they say of themselves."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

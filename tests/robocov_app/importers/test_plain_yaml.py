@@ -1,7 +1,5 @@
 """A mapping of plain values; whatever else YAML can do is refused."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """The picture of an import: two arenas at one scale, what differs is marked, all words can be read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

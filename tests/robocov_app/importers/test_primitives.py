@@ -1,7 +1,5 @@
 """Circles and walls of drawings: they stay where nothing speaks against it, and what is free stays free."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Lists of rings, nested and flat."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """ROS maps: what a pixel means in each mode, where the map lies, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

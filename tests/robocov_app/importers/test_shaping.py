@@ -1,7 +1,5 @@
 """From foreign free space to a map: what stays, what goes, what is said, and that it can be saved."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fewer vertices, and what must stay true: walls near where they were, obstacles as large, gaps open."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

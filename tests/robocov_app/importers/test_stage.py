@@ -1,7 +1,5 @@
 """Worlds of Stage: macros, includes, poses, blocks and bitmaps, each as the manual has it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """SVG drawings: what is drawn where, what is an area and what a wall, sizes, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

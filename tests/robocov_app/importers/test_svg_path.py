@@ -1,7 +1,5 @@
 """Path data and transforms, against the equations that the standard gives for them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

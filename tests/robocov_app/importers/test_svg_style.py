@@ -1,7 +1,5 @@
 """Which style an element has: attributes, style sheets, what is inherited."""
 
-from __future__ import annotations
-
 import pytest
 
 from robocov.errors import MapError

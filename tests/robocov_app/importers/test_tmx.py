@@ -1,7 +1,5 @@
 """Maps of Tiled: which tiles and objects are solid, how they are packed, turned and scaled."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import math

@@ -1,7 +1,5 @@
 """The outline of cells against the union of their squares, and against scipy's labels."""
 
-from __future__ import annotations
-
 from unittest import mock
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files of kinds that are not read: each is named, and so is the way out."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

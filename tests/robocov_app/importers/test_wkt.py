@@ -1,7 +1,5 @@
 """Well-known text, against shapely's own reader; what other programs add to it; what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

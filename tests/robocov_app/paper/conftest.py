@@ -1,7 +1,5 @@
 """What the tests of the paper share."""
 
-from __future__ import annotations
-
 import pytest
 
 from robocov_app.statistics import bootstrap, bootstrap_by

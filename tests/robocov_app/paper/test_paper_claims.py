@@ -1,7 +1,5 @@
 """Each claim on made-up outcomes whose truth is known: it holds, partly, not at all, or cannot be told."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

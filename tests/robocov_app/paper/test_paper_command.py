@@ -1,7 +1,5 @@
 """`robocov paper`: the command with a tiny study; the quick one is run by `tests/bench/quick_paper.py`."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The grids of the rivals' gains: what is tried where, which set is taken, and how that is told."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A whole study, as small as it can be: done, gone on with, stopped, read, drawn and written."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Plots of what a result depends on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The path of a sensor's best place, by its height."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

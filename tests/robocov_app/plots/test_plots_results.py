@@ -1,7 +1,5 @@
 """Plots of many runs together."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from clear_pages import all_clear

@@ -1,7 +1,5 @@
 """Rows of boxes and points."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

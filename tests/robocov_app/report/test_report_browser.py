@@ -1,7 +1,5 @@
 """The report in a real browser: the replay, the keyboard, the large pictures, dark, print, telephones."""
 
-from __future__ import annotations
-
 import base64
 import os
 import time

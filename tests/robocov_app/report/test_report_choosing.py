@@ -1,7 +1,5 @@
 """Which runs a page shows."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 from reported_results import entry, result_of
@@ -58,6 +56,19 @@ def test_what_stands_side_by_side_has_the_same_starts() -> None:
     assert [each.controller for each in shown] == ["rapf", "rpf", "lloyd"]
     assert len({each.case for each in shown}) == 1
     assert choice.words.startswith(f"{len(choice.entries)} of 120 runs: on each map")
+    for controller in ("rapf", "rpf", "lloyd"):
+        shown, every = (
+            [each.final for each in entries if each.controller == controller]
+            for entries in (choice.entries, made(paired_runs(2, 20)).fine)
+        )
+        assert (min(shown), max(shown)) == (min(every), max(every))
+
+
+def test_the_case_in_the_middle_is_one_that_most_have() -> None:
+    runs = [entry("rapf", seed, 1.0 + seed) for seed in range(5)]
+    result = result_of([*runs, entry("rpf", 0, 3.0), entry("rpf", 4, 2.0)])
+    assert len({result.fine[k].seed for k in chosen(result).panes}) == 1
+    assert len(chosen(result).panes) == 2
 
 
 def test_of_very_many_maps_the_extremes_of_all_are_shown() -> None:

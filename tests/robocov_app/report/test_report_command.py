@@ -1,7 +1,5 @@
 """`robocov report`: from folders to a file."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

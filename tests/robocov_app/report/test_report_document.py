@@ -1,7 +1,5 @@
 """The page as a whole: its parts, its size, and that nothing can go out of it or break it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

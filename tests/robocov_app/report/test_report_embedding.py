@@ -1,7 +1,5 @@
 """Runs as small JSON: what the browser gets is what was recorded, to within what nobody sees."""
 
-from __future__ import annotations
-
 import base64
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Results from the disk in one form."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What is compared with what."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

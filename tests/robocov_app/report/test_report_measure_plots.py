@@ -1,7 +1,5 @@
 """The metrics of single runs as small plots of the report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the inspector's page draws beside its words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pygame
 import pytest

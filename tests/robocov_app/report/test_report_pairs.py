@@ -1,7 +1,5 @@
 """Controllers compared pair by pair."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reported_results import entry, result_of

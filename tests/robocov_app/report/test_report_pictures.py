@@ -1,7 +1,5 @@
 """Small pictures of maps and runs."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """The replay as HTML, without a browser: what is in it, and what is not."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """matplotlib's figures as parts of a page."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

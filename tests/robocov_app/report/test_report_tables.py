@@ -1,7 +1,5 @@
 """The tables of a report, and what it says in words."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

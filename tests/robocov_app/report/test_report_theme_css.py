@@ -1,7 +1,5 @@
 """The project's colours as CSS variables: the same names in light and dark, and readable in both."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

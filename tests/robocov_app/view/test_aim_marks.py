@@ -1,7 +1,5 @@
 """Crosses where robots head: plus signs for centroids, times signs for goals of another kind."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

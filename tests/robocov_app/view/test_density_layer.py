@@ -1,7 +1,5 @@
 """The shading of the density in frames and on pages."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One legend for several pictures."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """The density as colours and in words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from density_cases import GAUSSIANS, POLYGONS

@@ -1,7 +1,5 @@
 """Pictures are kept as long as there is room."""
 
-from __future__ import annotations
-
 import pygame
 import pytest
 from hypothesis import given
