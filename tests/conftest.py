@@ -11,12 +11,16 @@ from hypothesis import HealthCheck, settings
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.environment.starts import DiscStart, UniformStart
+from robocov_app import progress
 
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""
 os.environ["ROBOCOV_DRAFTS"] = ""
 # but for what is compiled: every process of a test would take its time over that
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
+
+# which kernels are compiled already depends on the tests before: of that commands tell nothing here
+progress._tell = lambda kernel: None
 
 # what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

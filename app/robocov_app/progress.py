@@ -57,9 +57,13 @@ def tell_of_compiling(*groups: str) -> None:
     """Tell when kernels are compiled for the first time; see `robocov.compiled.compile_ahead`."""
     from robocov import compiled
 
-    def tell(_: str) -> None:
-        compiled.on_compile.remove(tell)
-        print("compiling the simulation, once", file=sys.stderr)
-
-    compiled.on_compile.append(tell)
+    if _tell not in compiled.on_compile:
+        compiled.on_compile.append(_tell)
     compiled.compile_ahead(*groups)
+
+
+def _tell(_: str) -> None:
+    from robocov import compiled
+
+    compiled.on_compile.remove(_tell)
+    print("compiling the simulation, once", file=sys.stderr)

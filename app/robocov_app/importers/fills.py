@@ -180,6 +180,8 @@ def _has_three(ring: Array) -> bool:
 def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
     """Return the area of a polygon that is not valid: of the outer ring, without those of the holes."""
     areas = [shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False) for ring in rings]
+    # of rings that run along themselves the parts may share an edge
+    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
     outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
     lost["without an area"] += len(areas) - 1 - len(holes)
     shapely.prepare(outer)

@@ -68,6 +68,12 @@ def test_a_bow_tie_is_both_of_its_halves() -> None:
     assert area.area == 8.0
 
 
+def test_halves_that_share_an_edge_are_one() -> None:
+    ring = np.array([[1, 0], [2, 2], [2, 0], [1, 0], [2, 2], [0, 0]], dtype=float)
+    area, _, _ = enclosed([ring])
+    assert area.is_valid and len(area.geoms) == 1
+
+
 def test_what_has_no_area_is_empty() -> None:
     line = np.array([[0, 0], [4, 0], [0, 0]], dtype=float)
     for rule in ("holes", "evenodd", "nonzero"):
