@@ -96,10 +96,10 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
             assert ages[k] == pytest.approx((step - when) * DT)
 
 
-@pytest.mark.parametrize(("delay", "steps"), [(1.1, 11), (0.7, 7), (0.71, 8)])
-def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, steps: int) -> None:
-    """Also where 1.1 / 0.1 is more than 11, and 3 x 0.1 more than 0.3."""
-    radio = Radio(Conditions(delay=delay, forget_after=0.3), np.ones(2), DT)
+@pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
+def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, dt: float, steps: int) -> None:
+    """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
+    radio = Radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
     inbox, working, heard = Inbox.empty(2), np.ones(2, dtype=bool), []
     for step in range(16):
         places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message

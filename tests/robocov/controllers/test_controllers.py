@@ -270,6 +270,7 @@ def test_gains_are_validated_by_name_and_range() -> None:
     assert make_controller("rapf", {"k_rep": 1, "attraction_limit": None}) == Rapf(
         k_rep=1.0, attraction_limit=None
     )
+    assert isinstance(make_controller("rapf", {"k_rep": 1}).k_rep, float)
     with pytest.raises(
         ParameterError, match=r"rapf.k_rep: -1, but a number from 0 to 1e\+06 N m³ was wanted"
     ):

@@ -88,7 +88,7 @@ def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttere
 
 
 def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Environment) -> None:
-    team = replace(Team.homogeneous(3), max_speed=np.array([0.3, 0.6, 1.2]))
+    team = replace(Team.homogeneous(3), max_speed=np.array([0.3, 0.6, 1.5]))
     starts, failing = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]], Conditions(failures=((1, 0.1),))
     made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
     assert made.by_time and not replace(made, team=Team.homogeneous(3)).by_time

@@ -77,6 +77,10 @@ def test_samples_fill_a_range_evenly_on_its_scale(method: Method) -> None:
     assert np.histogram(reach, bins=4, range=(1, 3))[0] == pytest.approx(16, abs=2)
 
 
+def test_rounding_leads_out_of_no_range() -> None:
+    assert Range(1 / 3, 2 / 3).values(np.array([0.0, 0.5, 1.0])) == [1 / 3, 0.5, 2 / 3]
+
+
 @pytest.mark.parametrize(("method", "grows"), [("sobol", True), ("halton", True), ("latin-hypercube", False)])
 def test_more_samples_keep_the_first_ones(method: Method, grows: bool) -> None:
     wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
