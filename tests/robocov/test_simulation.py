@@ -257,6 +257,8 @@ def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
     for _ in range(3):
         simulation.step()
     assert (simulation.snapshot.decision.memory, simulation.memory) == ([4], [3])
+    assert simulation.changed(velocities=np.zeros((1, 2))).memory == [3]
+    assert simulation.changed(controller=Counting(np.zeros((1, 2)))).memory == [0]
     twin = simulation.copy()
     for _ in range(5):
         simulation.step()
