@@ -231,8 +231,8 @@ def _cut(ring: Array, old: int, count: int, dx: float, dy: float, level: float, 
             worst, excess = k, beyond
     if worst < 0:
         return -1
-    # the vertices beyond the line follow each other; the polygon is convex
-    last = worst
+    # the vertices beyond the line follow each other but for rounding; the polygon is convex
+    first = last = worst
     for _ in range(count):
         after = last + 1 if last + 1 < count else 0
         if ring[old, after, 3] <= 0.0:
@@ -240,8 +240,10 @@ def _cut(ring: Array, old: int, count: int, dx: float, dy: float, level: float, 
         last = after
     else:
         return 0
+    while ring[old, first - 1 if first else count - 1, 3] > 0.0:
+        first = first - 1 if first else count - 1
     k, kept, size = after, after, 0
-    while ring[old, k, 3] <= 0.0:
+    while k != first:
         for c in range(3):
             ring[new, size, c] = ring[old, k, c]
         kept, size = k, size + 1

@@ -212,11 +212,14 @@ def test_slow_robots_need_no_second_triangulation() -> None:
 @pytest.mark.parametrize("name", REGIONS)
 def test_a_team_on_a_circle_needs_no_clipping(name: str) -> None:
     """Rounding decides every one of its edges, and a circle is how many a team starts."""
-    for n in (16, 100, 400):
-        points = circle(REGIONS[name], n, np.random.default_rng(n))
-        cells = partition(points, REGIONS[name])
-        assert cells.triangulation is not None
-        assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+    for n in (16, 102, 400):
+        for seed in range(9):
+            points = circle(REGIONS[name], n, np.random.default_rng(seed))
+            cells = partition(points, REGIONS[name])
+            assert cells.triangulation is not None
+            assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+            # where the others cut a cell, all their bisectors meet in one of its corners
+            assert cells.mass == pytest.approx(clipped(points, REGIONS[name]).mass, rel=1e-9)
 
 
 def test_without_triangulation_there_is_nothing_to_hand_on() -> None:
