@@ -8,6 +8,7 @@ from budgets import CASES, measured
 FACTOR = 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is measured as Linux tells it")
 @pytest.mark.parametrize("name", [name for name in CASES if not name.startswith(("7,900", "noise", "rooms"))])
 def test_a_file_costs_no_more_than_is_promised(name: str) -> None:

@@ -133,6 +133,7 @@ def test_findings_are_read_again(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert importers.main(["--again", str(places[0])]) == 0
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert importers.main(["map", "--minutes", "0.01", "--seed", "5", "--out", str(tmp_path / "found")]) == 0
     assert capsys.readouterr().out.startswith("map ")

@@ -224,7 +224,7 @@ class TestFading:
         full = max(abs(a - b) for a, b in zip(theme.trail(0), theme.background, strict=True))
         for count in range(1, 71):
             frame = frame_of(painter, trail[:count])
-            if count % 6 not in (0, 4):
+            if count % 12 not in (0, 4):
                 continue  # drawn is every frame; to look at all of them takes a while
             rows = np.arange(count - 2, max(count - 50, 0), -1)
             seen = self.strengths(frame, painter, trail, rows, theme)
