@@ -66,7 +66,9 @@ def avoid(
     # of two robots each brakes for its half of the way
     slow, half = braking * team.max_acceleration, 0.5 * braking * team.max_acceleration
     # whom a robot at full speed need not brake for is far
-    reach = float((apart + np.maximum(team.max_speed / rate, team.max_speed**2 / (2.0 * half))).max())
+    reach = float(
+        (apart + np.maximum(team.max_speed / max(rate, 1e-9), team.max_speed**2 / (2.0 * half))).max()
+    )
     others, walls = offsets_from_neighbours(seen, reach), seen.positions[:, None] - points
     robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
     keep = np.where(robots, apart[:, None], clearance[:, None])

@@ -22,29 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class OwnView:
-    """All that one robot knows.
+    """All that one robot knows: what it senses and hears, and the convex outer boundary."""
 
-    Attributes
-    ----------
-    number : int
-        The robot's own, from 0.
-    position, velocity : (2,) m, m/s
-    neighbours : (k, 2) m
-        Positions of the robots that it hears, as the last message of each has it.
-    obstacle_point : (2,) m or None
-        The closest obstacle or boundary point in sensing range.
-    region : Region
-        The known convex outer boundary.
-    time : float, s
-    """
-
-    number: int
-    position: Array
-    velocity: Array
-    neighbours: Array
-    obstacle_point: Array | None
+    number: int  # its own, from 0
+    position: Array  # (2,) m
+    velocity: Array  # (2,) m/s
+    neighbours: Array  # (k, 2) m, of the robots that it hears, as the last message of each has it
+    obstacle_point: Array | None  # (2,) m, the closest obstacle or boundary point in sensing range
     region: Region
-    time: float
+    time: float  # s
     _cells: VoronoiPartition
 
     @property

@@ -46,27 +46,15 @@ _BUILT, _TABLED = 0.3, 0.5  # parts of the progress at which the cost is built, 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """The best positions that were found for a team on one map.
+    """The best positions that were found for a team on one map, and the coverage cost (22) there."""
 
-    Attributes
-    ----------
-    positions : (n, 2) m
-        From left to right. Each is in the free space, clear of walls and of the others.
-    mean_distance, value, uncovered_area : float, m, m³, m²
-        The coverage cost (22) there, as `CoverageResult` has it.
-    costs, undescended : (r,) m
-        Mean distance that each restart ended with, and that before the descent of the exact cost.
-    restart : int
-        The one that gave the positions, the first of equals.
-    """
-
-    positions: Array
-    mean_distance: float
-    value: float
-    uncovered_area: float
-    costs: Array
-    undescended: Array
-    restart: int
+    positions: Array  # (n, 2) m, from left to right, in the free space, clear of walls and of the others
+    mean_distance: float  # m, as `CoverageResult` has it
+    value: float  # m³
+    uncovered_area: float  # m², of the components of the free space without a robot
+    costs: Array  # (r,) m, the mean distance that each restart ended with, in their order,
+    undescended: Array  # (r,) m, and that before the descent of the exact cost
+    restart: int  # the one that gave the positions, the first of equals
 
     def agreement(self, within: float = 0.005) -> float:
         """Return the share of the restarts whose mean distance is at most that part above the best."""
