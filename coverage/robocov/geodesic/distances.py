@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from robocov.environment import Environment
 
-BINS, CORNER_BINS = 64, 256
+BINS, CORNER_BINS = 128, 256
 """Angular bins of a source; a corner looks at many targets."""
 
 _BLOCK = 64
