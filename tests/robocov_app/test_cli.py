@@ -201,41 +201,16 @@ def test_wrong_positions_are_refused(
     assert part in complaint(capsys, "cost", "square", "--positions", str(file))
 
 
+# fmt: off
 _WORD = st.one_of(
     st.sampled_from(
-        [
-            "rooms",
-            "square",
-            "--",
-            "-",
-            "--robots",
-            "--set",
-            "--seed",
-            "--dt",
-            "--size",
-            "--out",
-            "--json",
-            "--lattice",
-            "--start",
-            "k_rep=1",
-            "k_rep=",
-            "=1",
-            "rapf",
-            "nan",
-            "1e400",
-            "-1",
-            "0",
-            "3",
-            "null",
-            "--theme",
-            "light",
-            "--controller",
-            "x.py:Y",
-            "--max-speed",
-        ]
+        ["rooms", "square", "--", "-", "--robots", "--set", "--seed", "--dt", "--size", "--out", "--json",
+            "--lattice", "--start", "k_rep=1", "k_rep=", "=1", "rapf", "nan", "1e400", "-1", "0", "3",
+            "null", "--theme", "light", "--controller", "x.py:Y", "--max-speed"]
     ),
     st.text(max_size=6).filter(lambda text: "\x00" not in text and max(text, default=" ") < "\ud800"),
 )
+# fmt: on
 
 
 @settings(max_examples=120)
