@@ -55,6 +55,10 @@ class Paired:
     pairs: int
 
 
+_AT_ONCE = 1_000_000
+"""Values that are looked at together."""
+
+
 def bootstrap(
     values: ArrayLike,
     statistic: Statistic = "median",
@@ -75,8 +79,8 @@ def bootstrap(
         raise ParameterError(
             f"clusters: {len(labels)} labels of {len(sample)} values, but one for each was wanted"
         )
-    of: Callable[[Array], Any] = np.median if statistic == "median" else np.mean
-    return bootstrap_by(lambda rows: float(of(sample[rows])), labels, resamples=resamples)
+    of: Callable[..., Any] = np.median if statistic == "median" else np.mean
+    return _interval(lambda rows: of(sample[rows], axis=1), labels, resamples)
 
 
 def bootstrap_by(
@@ -89,25 +93,30 @@ def bootstrap_by(
     ParameterError
         When there is no row.
     """
+    return _interval(lambda drawn: [statistic(rows) for rows in drawn], clusters, resamples)
+
+
+def _interval(
+    statistic: Callable[[IntArray], ArrayLike], clusters: Sequence[object], resamples: int
+) -> Interval:
+    """Return a statistic of (r, m) row numbers, one for each row, with its percentiles over resamples."""
     if not len(clusters):
         raise ParameterError("clusters: none, but at least one was wanted")
     rows: dict[object, list[int]] = {}
     for row, label in enumerate(clusters):
         rows.setdefault(label, []).append(row)
     members = [np.array(own) for own in rows.values()]
-    estimate = float(statistic(np.arange(len(clusters))))
+    estimate = float(np.asarray(statistic(np.arange(len(clusters))[None]))[0])
     if len(members) < 2:
         return Interval(estimate, float("nan"), float("nan"))
-    from scipy.stats import bootstrap as drawn_by
-
-    found = drawn_by(
-        (np.arange(len(members)),),
-        lambda drawn: statistic(np.concatenate([members[number] for number in drawn])),
-        n_resamples=resamples,
-        vectorized=False,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).bootstrap_distribution
+    drawn = np.random.default_rng(0).integers(0, len(members), (resamples, len(members)))
+    if len({len(own) for own in members}) == 1:
+        together = np.array(members)
+        parts = np.array_split(drawn, 1 + len(clusters) * resamples // _AT_ONCE)
+        several = [statistic(together[part].reshape(len(part), -1)) for part in parts]
+    else:
+        several = [statistic(np.concatenate([members[k] for k in each])[None]) for each in drawn]
+    found = np.concatenate([np.asarray(each) for each in several])
     # a resample may have no value of the statistic: its percentiles are those of the others
     known = found[np.isfinite(found)]
     tail = (1.0 - LEVEL) / 2.0
