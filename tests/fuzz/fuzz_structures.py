@@ -236,25 +236,15 @@ _GROUP = st.one_of(
     st.tuples(st.sampled_from([10, 11, 20, 21, 40, 41, 42, 50, 51, 70, 90]), _NUMBER),
     st.tuples(st.sampled_from([2, 6, 8]), st.sampled_from(["0", "boundary", "walls", "CHAIR", "*U1", ""])),
 )
+# fmt: off
 _ENTITY = st.tuples(
     st.sampled_from(
-        [
-            "LINE",
-            "LWPOLYLINE",
-            "CIRCLE",
-            "ARC",
-            "ELLIPSE",
-            "SPLINE",
-            "INSERT",
-            "POLYLINE",
-            "VERTEX",
-            "SEQEND",
-            "HATCH",
-            "POINT",
-        ]
+        ["LINE", "LWPOLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE", "INSERT", "POLYLINE", "VERTEX",
+            "SEQEND", "HATCH", "POINT"]
     ),
     st.lists(_GROUP, max_size=10),
 ).map(lambda pair: [(0, pair[0]), *pair[1]])
+# fmt: on
 
 
 def _dxf(parts: tuple[list[Any], list[Any]]) -> str:
@@ -292,18 +282,10 @@ def _toml(value: Any) -> str:
     return json.dumps(value) if value is not None else '""'
 
 
-_KEYS = [
-    "maps",
-    "controllers",
-    "robots",
-    "starts",
-    "seeds",
-    "duration",
-    "dt",
-    "lattice",
-    "team.radius",
-    "gains.rapf.k_rep",
-]
+# fmt: off
+_KEYS = ["maps", "controllers", "robots", "starts", "seeds", "duration", "dt", "lattice", "team.radius",
+    "gains.rapf.k_rep"]
+# fmt: on
 _STUDY = st.dictionaries(st.sampled_from(_KEYS), _SETTING, max_size=5).map(
     lambda settings: (
         "".join(f"{key} = {_toml(value)}\n" for key, value in settings.items())

@@ -37,6 +37,7 @@ MOST = {
 ACTIONS = all_actions({layer.name: layer.title for layer in standard_layers()})
 NAMED = [key for action in ACTIONS for key in action.keys if MOST.get(action.name) != 0]
 MAPS = ("square", "trap", "rooms", "l-shape", "pentagon")
+# fmt: off
 WORDS = (
     *(
         "k_rep 0.5",
@@ -50,21 +51,10 @@ WORDS = (
     *("robots 1", "robots 4", "robots 0", "seed 9", "start corner", "start uniform", "speed 16", "speed max"),
     *("speed 0.1", "controller lloyd", "controller rpf", "controller rapf", "time 0", "time 3", "robot 2"),
     *(f"map {name}" for name in MAPS),
-    *(
-        "none",
-        "pane",
-        "layer",
-        "zoom",
-        "Voronoi",
-        "𝔸 é ñ 中 🤖",
-        "\t",
-        "%s {x} <b> &",
-        "..",
-        "-",
-        "1e309",
-        "٣",
-    ),
+    *("none", "pane", "layer", "zoom", "Voronoi", "𝔸 é ñ 中 🤖", "\t", "%s {x} <b> &", "..", "-", "1e309",
+        "٣"),
 )
+# fmt: on
 SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))
 BUTTONS = (1, 1, 1, 1, 2, 3, 4, 8)
 
