@@ -37,9 +37,9 @@ def test_each_run_is_what_it_is_alone(name: str, hearing: float) -> None:
 def test_runs_of_any_kind_are_simulated() -> None:
     """Teams of several sizes, and one under conditions."""
     museum = rc.load_map("museum")
-    starts = [museum.start().sample(n, seed=n) for n in (3, 5, 3, 17)]
+    starts = [museum.start().sample(n, seed=n) for n in (3, 5, 3, 17, 15)]
     loss = rc.Conditions(seed=3, loss=0.5)
-    conditions = [None, None, loss, rc.Conditions()]
+    conditions = [None, None, loss, rc.Conditions(), None]
     many = rc.simulate_many(museum, rc.Rapf(), starts, 0.5, conditions=conditions)
     alone = [
         rc.Simulation(museum, rc.Rapf(), places, conditions=each).run(0.5)
