@@ -159,6 +159,10 @@ class Canvas:
 
     def stamps(self, many: Sequence[Sprite], centers: Array) -> None:
         """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other."""
+        self.surface.fblits(self.placed(many, centers), pygame.BLEND_PREMULTIPLIED)
+
+    def placed(self, many: Sequence[Sprite], centers: Array) -> list[tuple[pygame.Surface, tuple[int, int]]]:
+        """Return the pictures of sprites that are to be put at (n, 2) px, and their corners."""
         near = np.flatnonzero(
             ((centers > -500) & (centers < np.add(self.surface.get_size(), 500))).all(axis=1)
         )
@@ -170,7 +174,7 @@ class Canvas:
             picture = many[k](tuple(shift))
             half = picture.get_width() // 2
             pictures.append((picture, (x - half, y - half)))
-        self.surface.fblits(pictures, pygame.BLEND_PREMULTIPLIED)
+        return pictures
 
     def _far_off(self, pixel: Pixel) -> bool:
         """Whether what is small and drawn at `pixel` cannot be seen."""

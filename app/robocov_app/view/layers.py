@@ -254,18 +254,18 @@ class Starts(Layer):
     title = "Starts"
 
     def __init__(self) -> None:
-        self._kept: tuple[Array, object, Array, float] | None = None
+        self._kept: tuple[Array, object, list[tuple[pygame.Surface, tuple[int, int]]]] | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         if scene.starts is None:
             return
-        view = canvas.camera, canvas.scale
+        view = canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size()
         if self._kept is None or self._kept[0] is not scene.starts or self._kept[1] != view:
             centers = canvas.camera.to_pixels(scene.starts)
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
-            self._kept = scene.starts, view, centers, radius
-        centers, radius = self._kept[2:]
-        canvas.stamps([self._ring(canvas, radius)] * len(centers), centers)
+            rings = canvas.placed([self._ring(canvas, radius)] * len(centers), centers)
+            self._kept = scene.starts, view, rings
+        canvas.surface.fblits(self._kept[2], pygame.BLEND_PREMULTIPLIED)
 
     @staticmethod
     def _ring(canvas: Canvas, radius: float) -> Sprite:
