@@ -24,11 +24,11 @@ _FUNCTIONS = (
     *("cpSpaceEachCachedArbiter", "pmSpaceArbiterIteratorFuncBatched"),
 )
 
-if [(name, field.offset) for name, field in ffi.typeof("pmFloatArray").fields] != [
-    *(("num", 0), ("max", 4), ("arr", 8))
-]:
-    # else memory would be overwritten
-    raise ImportError("this version of pymunk lays out its arrays in another way: pymunk 7.1 to 7.3 is known")
+_LAYOUT = [("num", 0), ("max", 4), ("arr", 8)]
+"""Of a pmFloatArray; with another one memory would be overwritten."""
+
+if [(name, member.offset) for name, member in ffi.typeof("pmFloatArray").fields] != _LAYOUT:
+    raise ImportError("this pymunk lays out its arrays in another way; 7.1 to 7.3 are known")
 
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
