@@ -41,8 +41,8 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
         {"fps": 0},
         {"film_speed": 0.0},
         {"dt": 0.0},
-        {"duration": 1e6},
-        {"robots": 10_000, "duration": 100.0},
+        {"duration": 1e7},
+        {"robots": 10_000, "duration": 100.0, "record_hz": 60.0},
     ],
 )
 def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:

@@ -88,7 +88,8 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
         raise fault_of(f"{where}: {file} cannot be run", error) from error
     kind, wrong = vars(module).get(class_name), ""
     if kind is None:
-        kinds = [key for key, each in vars(module).items() if isinstance(each, type)]
+        classes = {key: each for key, each in vars(module).items() if isinstance(each, type)}
+        kinds = [key for key, each in classes.items() if each.__module__ == module_name]
         raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
     if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
         wrong = "has neither a method decide(seen, memory) nor force(own)"

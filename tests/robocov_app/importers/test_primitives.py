@@ -63,7 +63,8 @@ def test_free_space_stays(
     assert report.obstacles == len(environment.obstacles)
     others = [*blocks, *(one.polygon for one in (*circles, *walls))]
     for circle in circles:
-        alone = sum(shapely.dwithin(circle.polygon, other, 1e-3) for other in others) == 1
+        # what is nearer than that may be drawn over the circle
+        alone = sum(shapely.dwithin(circle.polygon, other, 1e-3 + tolerance) for other in others) == 1
         if alone and parts[0].buffer(1e-9).covers(circle.polygon.exterior) and circle.radius > 2 * tolerance:
             near = [o for o in environment.obstacles if isinstance(o, CircleObstacle)]
             assert any(abs(o.radius - circle.radius) < 1e-3 for o in near)
