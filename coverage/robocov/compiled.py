@@ -280,14 +280,14 @@ def _cache_folder() -> Path | None:
 def compile_ahead(*groups: str) -> None:
     """Say which `GROUPS` of kernels are going to be called, those first that are called last.
 
-    As soon as a kernel is not in the cache, other processes compile these, as many as there are other cores.
+    As soon as a kernel is not in the cache, other processes compile these, at most one a core.
     """
     _ahead[:] = groups
 
 
 def _start_helpers() -> None:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    helpers = min(len(_ahead), cores - 1)
+    helpers = min(len(_ahead), cores) if cores > 1 else 0
     path = os.pathsep.join(filter(None, sys.path))
     for k in range(helpers):
         # -P: what lies in the working folder is not meant
