@@ -43,7 +43,7 @@ class Row:
     note : str
         The time in other words: ``95 x real time``.
     before : float or None
-        The ratio in the last version without compiled kernels (commit 8838167), measured the same way.
+        About the ratio in the last version without compiled kernels (commit 8838167).
     """
 
     part: str

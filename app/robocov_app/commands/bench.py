@@ -150,7 +150,7 @@ def print_tables(rows: Sequence[Row]) -> None:
         out.print()
     facts = machine()
     packages = ", ".join(f"{name} {number}" for name, number in facts["packages"].items())
-    out.print("before: the ratio when nothing was compiled, at commit 8838167")
+    out.print("before: about the ratio when nothing was compiled (commit 8838167)")
     out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
 
 
@@ -161,7 +161,7 @@ def goals(row: Row) -> str:
     >>> goals(Row("step", "one step", {}, 3.0, "yardstick", 1.0, goal=2.5))
     '2.5 missed'
     """
-    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:g}"]
+    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
     if row.goal_seconds is not None:
         wanted.append(duration(row.goal_seconds))
     return ", ".join(wanted) + (" missed" if row.met is False else "")
