@@ -6,6 +6,7 @@ import io
 import struct
 import zipfile
 import zlib
+from collections import Counter
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -45,6 +46,11 @@ def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dic
             if total > min(most_bytes, max(_MODEST, _MOST_SQUEEZED * size)):
                 found = f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB"
                 raise ValueError(f"{found} are too many")
+            name, times = (
+                Counter(entry.filename for entry in entries).most_common(1)[0] if entries else ("", 0)
+            )
+            if times > 1:
+                raise ValueError(f"{name!r} is in it {times} times")
             arrays = {}
             for entry in entries:
                 with archive.open(entry) as stream:
