@@ -31,7 +31,7 @@ _KERNELS = {
     **dict.fromkeys(("run", "compare", "sweep", "demo", "report", "paper", "bench"), ("step", "cost")),
     **dict.fromkeys(("replay", "cost", "optimum"), ("cost",)),
 }
-"""What commands compile, see `robocov.compiled`."""
+"""Groups of kernels that commands compile, see `robocov.compiled`."""
 
 _LONGEST = 1000
 """Characters of an error that are told."""

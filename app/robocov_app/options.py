@@ -122,7 +122,7 @@ class RunOptions:
 
     @property
     def record_words(self) -> str:
-        """What the command's last line says of a record that is thinned."""
+        """Note on a thinned record, for the command's last line."""
         every = self.record_every
         return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 

@@ -33,7 +33,7 @@ BEFORE = {
 """Multiples of the time of the tree, by map, lattice and robots; see `Row.before`."""
 
 FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
-"""How many times less is wanted, by lattice; twice that on campus, ten times for 1000 robots."""
+"""Wanted speed-ups by lattice; twice that on campus, ten times for 1000 robots."""
 
 
 def cases(*, quick: bool = False) -> list[Case]:

@@ -52,7 +52,7 @@ class Arguments:
         ],
         tyro.conf.arg(metavar="PART"),
     ] = "all"
-    """What to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
+    """Part to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
     json: bool = False

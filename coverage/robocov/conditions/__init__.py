@@ -37,7 +37,7 @@ LIMITS: dict[str, tuple[float, float, str, str]] = {
     "sensing_noise": (0.0, 1e3, "m", "sensing_noise_m"),
     "failure_rate": (0.0, 1e3, "1/s", "failure_rate_per_s"),
 }
-"""What each condition that is a number may be."""
+"""Ranges of the conditions that are numbers."""
 QUANTITIES = tuple(LIMITS)
 """The conditions that are numbers."""
 UNITS = {name: unit for name, (_, _, unit, _) in LIMITS.items()}

@@ -24,13 +24,13 @@ NEVER = -1
 
 
 class Broadcast(NamedTuple):
-    """What all robots sent at one step, on its way."""
+    """Messages of all robots from one step, on their way."""
 
     arrives: int
     """Step, as `sent`."""
     sent: int
     places: Array
-    """What each robot told of itself, (n, 2) m."""
+    """Reported positions, (n, 2) m."""
     reaches: BoolArray
     """Whether the message of the robot of the column gets to that of the row, (n, n)."""
 

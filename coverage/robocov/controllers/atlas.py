@@ -73,7 +73,7 @@ class RestTracker:
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
-    """What one robot remembers. Immutable."""
+    """Memory of one robot. Immutable."""
 
     known: DiscoveredMap
     due: float  # when it plans next, s
@@ -99,7 +99,7 @@ class PlannerState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtlasMemory:
-    """What the robots remember."""
+    """Memory of the robots."""
 
     team: Team  # a robot knows its own limits
     states: tuple[PlannerState, ...]  # one for each robot

@@ -24,7 +24,7 @@ _TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """Where robots heard those to be that were near."""
+    """Reported positions of the robots that were near."""
 
     time: float  # s
     pair: IntArray  # (m,), robot * n + neighbour, ascending
@@ -33,7 +33,7 @@ class Heard:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarrierMemory:
-    """What the robots remember: the bodies and limits of all, whom they heard, what the last scan met."""
+    """Memory of the robots: bodies and limits of all, neighbours heard, hits of the last scan."""
 
     team: Team
     heard: Heard | None = None

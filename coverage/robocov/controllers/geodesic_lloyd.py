@@ -27,7 +27,7 @@ _SIMPLER = 0.005  # metres by which the walls of the room may be simplified: eve
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeodesicMemory:
-    """What the robots remember of the last planning."""
+    """Memory of the last planning."""
 
     team: Team
     goals: Array | None = None  # (n, 2) m

@@ -31,7 +31,7 @@ _TOUCHING = 0.95  # a point that is already nearer than the clearance is kept of
 
 
 class Mode(Enum):
-    """What a robot is doing."""
+    """Mode of a robot."""
 
     GOAL = "motion to the goal"
     BOUNDARY = "boundary following"
@@ -42,7 +42,7 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bug:
-    """What one robot remembers of its way; places are (2,) m."""
+    """Memory of one robot's way; places are (2,) m."""
 
     mode: Mode
     turn: int  # round which way it looks for the end of what blocks it: 1 counter-clockwise, -1 clockwise
@@ -74,7 +74,7 @@ class Bug:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TangentBugMemory:
-    """What the robots remember."""
+    """Memory of the robots."""
 
     team: Team  # a robot knows its own body and limits
     bugs: tuple[Bug, ...] = ()
@@ -205,7 +205,7 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one robot sees in one scan: all places and distances are from it, in m."""
+    """One robot's scan: all places and distances are from it, in m."""
 
     law: TangentBug
     position: Array  # (2,), its own

@@ -1,4 +1,4 @@
-"""What every density φ is: values at places, moments of cells; and its integrals over other polygons."""
+"""Densities φ: values at places, moments of cells, integrals over other polygons."""
 
 from __future__ import annotations
 

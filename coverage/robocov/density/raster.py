@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 _NODE = 0.5 * 0.6**0.5
-"""How far the outer nodes of Gauss's rule with three points are from the middle one."""
+"""Distance of the outer nodes of Gauss's rule with three points from the middle one."""
 
 FINEST = 1024
 """Most rows, and most columns, of a raster."""

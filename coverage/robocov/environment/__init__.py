@@ -168,7 +168,7 @@ class Environment(Drawable):
 
     @cached_property
     def blocked(self) -> MultiPolygon:
-        """What is not free of the region: obstacles, and the region outside a non-convex boundary."""
+        """The part of the region that is not free: obstacles, and the outside of a non-convex boundary."""
         region = shapely.set_precision(self.region.polygon, GRID)
         return _polygons(shapely.difference(region, self.free, grid_size=GRID))
 

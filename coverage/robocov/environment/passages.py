@@ -99,7 +99,7 @@ def gaps_narrower(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
 
 
 class _Search:
-    """Where passages are looked for: among the e edges of a free space, which lies to the left of each."""
+    """The e edges of a free space among which passages are looked for; it lies to the left of each."""
 
     def __init__(self, free: MultiPolygon) -> None:
         self.free = free = _without_cracks(free)

@@ -68,7 +68,7 @@ def without_streets(cell: Cell, wider: float) -> Cell:
 
 
 class Trim(NamedTuple):
-    """What is cut off a corner of a block: parts of the edges beside it, with the corner or as a yard."""
+    """Cut of a block's corner: parts of the edges beside it, with the corner or as a yard."""
 
     corner: int
     before: float

@@ -25,7 +25,7 @@ SIDES = 1.0, 1000.0  # m
 
 @dataclass(frozen=True)
 class Request:
-    """What a map is to be like, see `robocov.generator.generated_map`."""
+    """Request for a map, see `robocov.generator.generated_map`."""
 
     obstacles: int
     area: float

@@ -1,4 +1,4 @@
-"""Who sees whom among walls: for each source, the walls that face it in angular bins.
+"""Visibility among walls: for each source, the walls that face it in angular bins.
 
 A wall a → b (free space on its left) hides a target q from a source p iff p is not behind it, q is behind
 it, and the segment meets it, ends included. Touching a vertex of an obstacle from outside may therefore hide;

@@ -55,7 +55,7 @@ class Grid:
 
 
 class Walls(NamedTuple):
-    """What kernels know of the boundary of a free space, in grid steps.
+    """The boundary of a free space for kernels, in grid steps.
 
     A vertex where walls touch (a pinch) has several sectors: wedges of free space, each between an
     outgoing wall and the next incoming wall counter-clockwise. A *corner* is a sector wider than a

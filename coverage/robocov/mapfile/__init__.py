@@ -43,7 +43,7 @@ _DIGITS = 9
 """Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
 
 _NOISE = 16
-"""What a few sums and a rotation miss a decimal by at most, in units of the last place (of 1 m at least)."""
+"""Largest rounding error of a few sums and a rotation, in units of the last place (of 1 m at least)."""
 
 
 def load_map(source: str | Path) -> Environment:

@@ -1,4 +1,4 @@
-"""What is said of a whole run in numbers: cost, rest, contacts, clearance, ways."""
+"""Metrics of a whole run: cost, rest, contacts, clearance, paths."""
 
 from __future__ import annotations
 

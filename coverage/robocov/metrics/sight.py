@@ -73,7 +73,7 @@ def _meeting(walls: Array, angles: Array) -> Array:
 
 
 class Covered(NamedTuple):
-    """How much of the free space a team covers, m²."""
+    """Area of the free space that a team covers, m²."""
 
     sensed: float
     """Within the sensing range of a robot and in its line of sight."""

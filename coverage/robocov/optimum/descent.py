@@ -32,7 +32,7 @@ _STEPS = 300  # most steps; some tens are usual
 
 
 class Room:
-    """Where the centres of robots of some radius (m) may be.
+    """Free configuration space of robots of some radius (m).
 
     They keep from walls (`clearance`), and from each other (`spacing`, m), the distance that starts leave as
     well: their radius (their diameter), and `robocov.environment.starts.GAP` of it. There is a part for each

@@ -140,7 +140,7 @@ def _rank(result: CoverageResult) -> tuple[float, float]:
 
 
 class _Search:
-    """What the restarts have in common: the cost, the room for the robots, places and the table of distances.
+    """Shared by all restarts: the cost, the room for the robots, places and the table of distances.
 
     This, (m, c) m, holds the sums of the geodesic distances from the sites of each target, by their weights.
     """

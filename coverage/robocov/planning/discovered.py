@@ -74,7 +74,7 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class DiscoveredMap:
-    """What a robot knows of the obstacles: `UNKNOWN`, `FREE`, `PRESUMED` or `WALL` for each cell of a raster.
+    """Occupancy grid of a robot: `UNKNOWN`, `FREE`, `PRESUMED` or `WALL` for each cell.
 
     The state is (rows, columns), the lowest row first. Immutable: whatever adds to it gives another map.
     """

@@ -41,7 +41,7 @@ _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it i
 
 @dataclass(frozen=True, eq=False)
 class CoverageDemand:
-    """What is to be covered in a window of a discovered map; if `sure`, only what is known to be free."""
+    """Demand in a window of a discovered map; if `sure`, only of cells known to be free."""
 
     known: DiscoveredMap
     window: Window

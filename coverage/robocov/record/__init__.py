@@ -43,7 +43,7 @@ _COLUMNS = {
     "goals": ("goal_x_m", "goal_y_m"),
     "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
 }
-"""What the columns of data frames are called."""
+"""Names of the columns of data frames."""
 
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 

@@ -50,7 +50,7 @@ LIMITS: dict[str, tuple[float, float, bool]] = {
     "sensing_range": (0.0, 1e5, True),
     "communication_range": (0.0, 1e5, True),
 }
-"""What each parameter may be."""
+"""Ranges of the parameters."""
 UNITS = {
     "radius": "m",
     "mass": "kg",

@@ -18,7 +18,7 @@ _NEAREST = 6
 """Robots by which a cell is cut in order of their distance; then it is so small that few others count."""
 
 _TOLERANCE = 1e-12
-"""How far masses may miss the region's area, relative to it."""
+"""Tolerance of the sum of masses, relative to the region's area."""
 
 
 @kernel

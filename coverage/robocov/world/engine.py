@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robocov.arrays import IntArray
 
 SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER, FORCES, STATES, CONTACTS = range(10)
-"""What is where in `Engine.addresses`."""
+"""Columns of `Engine.addresses`."""
 
 _FUNCTIONS = (
     *("cpSpaceStep", "cpSpaceEachBody"),
