@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from robocov.environment.obstacle_path import ObstaclePath
     from robocov.environment.starts import DiscStart, PointsStart, UniformStart
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
-    from robocov.files.array_cache import ArrayCache
+    from robocov.files.array_files import ArrayCache
     from robocov.generator import GENERATORS, generated_map
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
     from robocov.mapfile.check import check_map
@@ -81,7 +81,7 @@ _NAMES = {
     "environment.obstacle_path": "ObstaclePath",
     "environment.starts": "DiscStart PointsStart UniformStart",
     "errors": "InputError MapError OutputError ParameterError RobocovError StartError",
-    "files.array_cache": "ArrayCache",
+    "files.array_files": "ArrayCache",
     "generator": "GENERATORS generated_map",
     "mapfile": "bundled_maps load_map map_schema save_map",
     "mapfile.check": "check_map",

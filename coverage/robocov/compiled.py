@@ -26,7 +26,7 @@ import numpy as np
 import platformdirs
 
 from robocov.errors import OutputError
-from robocov.files.array_cache import ArrayCache
+from robocov.files.array_files import ArrayCache
 from robocov.files.lock import locked
 
 if TYPE_CHECKING:

@@ -1,8 +1,7 @@
-"""How the library reaches pictures without knowing how to draw: backends that installed packages offer.
+"""Drawing backends of installed packages: how the library reaches pictures without knowing how to draw.
 
-A backend is an object, most simply a module, with the functions of `DrawingBackend`, and has a name in
-the entry-point group ``robocov.drawing``; in the same way pandas finds who plots for it. The application
-offers ``matplotlib``.
+A backend is an object, most simply a module, with the functions of `DrawingBackend` and a name in the
+entry-point group ``robocov.drawing``, as pandas has it. The application offers ``matplotlib``.
 """
 
 from __future__ import annotations
@@ -14,19 +13,16 @@ from typing import Any, ClassVar, Protocol
 from robocov.errors import ParameterError, RobocovError, unknown_name
 
 GROUP = "robocov.drawing"
-"""The entry-point group."""
-
 DEFAULT = "matplotlib"
 """The backend that draws where none is named; where it is not there, the first by name."""
 
 
 class DrawingBackend(Protocol):
-    """Who draws.
+    """Who draws; what axes and options are is the backend's affair.
 
-    ``plot_...(thing, axes=None, **options)`` draws an `Environment`, a `Record`, a `CostHistory` or a
-    `CoverageResult` on the axes, and returns them; where they are None, on a page of its own, and returns
-    that page's. What axes and options are is the backend's affair. Notebooks show what ``..._html(thing)``
-    returns, a str, and where there is no HTML ``..._png(thing)``, bytes.
+    ``plot_...(thing, axes=None, **options)`` draws on the axes and returns them; where they are None, on a
+    page of its own, and returns that page's. Notebooks show what ``..._html(thing)`` returns, a str, and
+    where there is no HTML ``..._png(thing)``, bytes.
     """
 
     plot_environment: Callable[..., Any]
@@ -46,14 +42,14 @@ class Drawable:
     """In the names of the backend's functions."""
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot it.
+        """Plot it on axes, or on a page with a title, a scale bar or a legend; return the axes.
 
         Parameters
         ----------
         axes : matplotlib Axes or None
-            Where to draw. None makes a page with what belongs to it, as a title, a scale bar or a legend.
+            None makes the page, which is the ``figure`` of the axes that are returned.
         backend : str or None
-            Who draws; see `robocov.drawing`. matplotlib by default, and with its axes and options:
+            See `robocov.drawing`; matplotlib by default, with these options:
         theme : {"light", "dark"}
         size : (width, height), px
             Of the page.
@@ -67,15 +63,7 @@ class Drawable:
         radius : float or (n,), m
             Of the robots of a coverage result.
 
-        Returns
-        -------
-        matplotlib Axes
-            The given ones, or those on the page, which is their ``figure``; notebooks show the page.
-
-        Raises
-        ------
-        ParameterError
-            On axes or options that cannot be used.
+        Raises ParameterError on axes or options that cannot be used.
         """
         return getattr(drawing_backend(backend), f"plot_{self._drawn_as}")(self, axes, **options)
 
@@ -86,39 +74,29 @@ class Drawable:
         return self._displayed("png")
 
     def _displayed(self, form: str) -> Any:
-        """Return what a notebook shows; None, for the text, where nobody draws it."""
         try:
             draw = getattr(drawing_backend(), f"{self._drawn_as}_{form}", None)
         except RobocovError:
-            return None
+            return None  # notebooks show the text instead
         return None if draw is None else draw(self)
 
 
 def drawing_backend(name: str | None = None) -> DrawingBackend:
-    """Return the backend called `name`, by default ``matplotlib``.
+    """Return the backend called `name`.
 
-    Raises
-    ------
-    ParameterError
-        When there is none of that name; the message gives the nearest.
-    RobocovError
-        When there is none at all, or it cannot be loaded.
+    Raises ParameterError for an unknown name, RobocovError when there is none at all or it cannot be loaded.
     """
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     if not entries:
-        raise RobocovError(
-            f"no drawing backend is installed (entry-point group {GROUP!r}): pip install robocov"
-        )
-    if name is None:
-        name = DEFAULT if DEFAULT in entries else min(entries)
+        what = f"no drawing backend is installed (entry-point group {GROUP!r})"
+        raise RobocovError(f"{what}: pip install robocov")
+    name = (DEFAULT if DEFAULT in entries else min(entries)) if name is None else name
     if name not in entries:
         raise ParameterError(unknown_name("drawing backend", name, entries))
     entry = entries[name]
     try:
         backend: DrawingBackend = entry.load()
     except Exception as error:
-        raise RobocovError(
-            f"drawing backend {name!r} of entry point {entry.value!r} cannot be loaded: "
-            f"{type(error).__name__}: {error}"
-        ) from error
+        what = f"drawing backend {name!r} of entry point {entry.value!r} cannot be loaded"
+        raise RobocovError(f"{what}: {type(error).__name__}: {error}") from error
     return backend

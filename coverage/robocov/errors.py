@@ -23,8 +23,7 @@ JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
 
 MOST_LISTED = 20
-"""Mistakes of one document that are told of; the rest is counted. To find the line of each takes about as
-long as reading the file again."""
+"""Mistakes of one document that are told of: to find the line of each takes as long as reading the file."""
 
 _LONGEST_NAME = 60
 """Characters of a known name, or of a key, that are told."""
@@ -39,18 +38,10 @@ class InputError(RobocovError):
 
 
 class Mistake(NamedTuple):
-    """Something wrong in a JSON document.
+    """Something wrong in a JSON document, at a value, at one that is missing, or at the path's last key.
 
-    Attributes
-    ----------
-    path : tuple of str and int
-        To the value that is wrong, or that is missing; empty for the whole document.
-    text : str
-        The place as people read it, the value found there and what was wanted.
-    at_key : bool
-        The key at the end of the path is wrong, not its value.
-    line, column : int or None
-        Where that begins in the file, counted from 1, characters as columns; None where there is no file.
+    `text` tells the place, the value found there and what was wanted; `line` and `column`, in characters from
+    1, are None where there is no file.
     """
 
     path: JsonPath
@@ -61,30 +52,18 @@ class Mistake(NamedTuple):
 
     @classmethod
     def at(cls, path: JsonPath, what: str, *, at_key: bool = False) -> Mistake:
-        """Return the mistake whose text is the place of `path` and `what` is wrong there."""
+        """Return the mistake that `what` is wrong at `path`."""
         return cls(path, f"{place(path)}: {what}" if path else what, at_key)
 
     def told(self, where: str) -> str:
-        """Return the line for the mistake in a document that messages call `where`.
-
-        Where the line is known, it begins as compilers' messages do: ``mine.json:14:9: ...``. Terminals and
-        editors make that a link.
-        """
+        """Return its message; terminals make a link of ``mine.json:14:9: ...``, as of compilers'."""
         return f"{where}{'' if self.line is None else f':{self.line}:{self.column}'}: {self.text}"
 
 
 class MapError(InputError):
     """A map cannot be used; the message names the file, the place in it, the value and what was wanted.
 
-    Attributes
-    ----------
-    mistakes : tuple of Mistake
-        What is wrong in it, where that is more than a word about the file as a whole; the message tells
-        of the first.
-    unlisted : int
-        How many there are beside these.
-    where : str
-        What the message calls the file.
+    `mistakes` are at places in the file, which messages call `where`; there are `unlisted` ones beside these.
     """
 
     mistakes: tuple[Mistake, ...] = ()
@@ -102,12 +81,12 @@ class MapError(InputError):
 
     @property
     def line(self) -> int | None:
-        """Line of the first mistake, counted from 1; None where there is no text."""
+        """Line of the first mistake."""
         return self.mistakes[0].line if self.mistakes else None
 
     @property
     def column(self) -> int | None:
-        """Column of the first mistake, counted from 1; None where there is no text."""
+        """Column of the first mistake."""
         return self.mistakes[0].column if self.mistakes else None
 
 
@@ -124,20 +103,12 @@ class OutputError(RobocovError):
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """Return `value` as it is quoted in messages: its repr on one line, cut to `limit` characters.
-
-    >>> shown("x" * 100, limit=12)
-    "'xxxxxxxx..."
-    """
+    """Return `value` as it is quoted in messages: its repr on one line, cut to `limit` characters."""
     return _cut(" ".join(repr(value).split()), limit)
 
 
 def shown_json(value: object, limit: int = 60) -> str:
-    """Return `value` as it is quoted in messages: as JSON, cut to `limit` characters.
-
-    >>> shown_json([True, None, "x"])
-    '[true, null, "x"]'
-    """
+    """Return `value` as it is quoted in messages about JSON."""
     return _cut(json.dumps(value, default=repr), limit)
 
 
@@ -180,13 +151,7 @@ def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
 def checked(
     name: str, value: Any, least: float, most: float, unit: str = "", *, whole: bool = False
 ) -> float:
-    """Return a number in its range.
-
-    Raises
-    ------
-    ParameterError
-        When it is none, or out of it.
-    """
+    """Return a number in its range; raise ParameterError when it is none, or out of it."""
     if not is_number(value, Integral if whole else Real) or not least <= value <= most:
         wanted = f"a {'whole ' if whole else ''}number from {least:g} to {most:g} {unit}".rstrip()
         raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
@@ -204,11 +169,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def counted(count: int, thing: str) -> str:
-    """Return how many things there are, in words.
-
-    >>> counted(1, "robot"), counted(6, "robot")
-    ('1 robot', '6 robots')
-    """
+    """Return how many things there are, in words: 1 robot, 6 robots."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 

@@ -9,7 +9,7 @@ from robocov.errors import RobocovError
 
 
 def extra(module: str, name: str) -> Any:
-    """Return a module that the extra called `name` of this package brings; an error where it is missing."""
+    """Return a module that the extra ``robocov[name]`` brings; raise RobocovError where it is missing."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:

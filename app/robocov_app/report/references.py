@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov import __version__
 from robocov.errors import ParameterError
-from robocov.files.array_cache import ArrayCache
+from robocov.files.array_files import ArrayCache
 from robocov.mapfile import to_json
 from robocov.optimum import optimum
 

@@ -27,12 +27,10 @@ _LONGEST_SUFFIX = 16
 def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
     """Give a path beside `target` to write to; rename it to `target` when all went well, else remove it.
 
-    The path has the suffix of `target`, so that writers which go by it work. Unless `durable` is
-    switched off, as for one of many frames, the file is on the disk before it gets its name. Through a
-    link, the file that it points to is replaced, not the link; its permissions stay.
+    The path has the suffix of `target`, for writers that go by it. A `durable` file is on the disk before it
+    gets its name. Through a link, the file that it points to is replaced, not the link; its permissions stay.
 
-    Raises `OutputError` when the file cannot be written (no permission, no space, no such folder), or
-    `target` is something else than a file; the message names `target`.
+    Raises `OutputError` when the file cannot be written, or `target` is something else than a file.
     """
     real = writable(target)
     suffix = target.suffix if len(target.suffix) < _LONGEST_SUFFIX else ""
@@ -55,8 +53,7 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
 def writable(target: Path) -> Path:
     """Return the file that is replaced where `target` is written: `target`, or what it is a link to.
 
-    Raises `OutputError` when it is there and is no regular file, or a link that leads nowhere, or cannot be
-    looked at.
+    Raises `OutputError` when that is no regular file, a link that leads nowhere, or cannot be looked at.
     """
     try:
         real = target.resolve(strict=True) if target.is_symlink() else target

@@ -44,10 +44,7 @@ def wanted(words: str) -> WrapValidator:
 
 
 def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind:
-    """Return the content of a JSON file that robocov wrote, of that ``format`` and ``version``.
-
-    Raises `MapError`: one line: the file, the JSON path, the value and what was wanted.
-    """
+    """Return the content of a JSON file that robocov wrote, of that ``format`` and ``version``."""
     where = str(path)
     document = parse(read_bytes(path), where)
     check_header(document, where, form, version)
@@ -58,10 +55,7 @@ def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind
 
 
 def check_header(document: object, where: str, form: str, version: int) -> None:
-    """Refuse what is not of a format, or is of another version, before its content is looked at.
-
-    Raises `MapError`.
-    """
+    """Raise `MapError` on what is not of a format, or of another version, before its content is looked at."""
     if not isinstance(document, dict):
         kind = f"a JSON object with a {form.removeprefix('robocov-')}"
         raise MapError.of(where, [Mistake((), f"{shown_json(document)}, but {kind} was wanted")])

@@ -13,9 +13,7 @@ from robocov.errors import OutputError, reason
 
 @contextmanager
 def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterator[None]:
-    """Keep other processes from the same folder; the lock ends with this process, however that ends.
-
-    The file `name` in it is locked, and removed afterwards where `remove` is given.
+    """Lock the file `name` in a folder until this process ends, however that ends; then `remove` it.
 
     Raises `OutputError` when another process has it, or the folder cannot be written to.
     """
@@ -28,9 +26,8 @@ def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterat
             raise OutputError(f"{folder}: cannot be written to: {reason(error)}") from error
         try:
             if not _taken(descriptor):
-                raise OutputError(
-                    f"{folder}: another process is at work in this folder; wait until it has ended"
-                )
+                what = "another process is at work in this folder; wait until it has ended"
+                raise OutputError(f"{folder}: {what}")
             if not _is_at(descriptor, path):
                 continue
             try:

@@ -41,23 +41,16 @@ _FILES: dict[Kind, tuple[str, ...]] = {
 }
 """Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
 
-_NAMES = {"metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
+_NAMES = {_MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
 
 _FRAME = re.compile(r"\d{6}\.png")
 
-_HALF = re.compile(r"\.(comparison|cost|metrics|record|replay|report|run|trajectories)\.\d+\.part\.\w+")
-"""Files that earlier versions left half-written when they were killed."""
-
 _BEGINNINGS = {
     **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
-    "record.npz": re.compile(rb"PK.{28}time\.npy", re.DOTALL),
-    "cost.csv": re.compile(rb"time_s,mean_distance_m,cost_m3,"),
     "metrics.csv": re.compile(rb"time_s,sensed_area_m2,"),
     REPORT: re.compile(rb'<meta name="generator" content="robocov'),
 }
-"""By what files of ours are known, in their first `_HEAD_BYTES`."""
-
-_HEAD_BYTES = 4096
+"""By what files of ours are known, in their first 4096 bytes."""
 
 
 class ResultFolder:
@@ -113,15 +106,8 @@ def results(
 ) -> Iterator[ResultFolder]:
     """Give a folder for a result, which is committed at the end; where the work fails, it is not.
 
-    Parameters
-    ----------
-    folder : Path
-        Made where it is missing; if nothing comes into it, it goes again.
-    kind : {"run", "comparison", "replay"}
-    overwrite : bool
-        Replace the result that is there.
-    parts : names
-        Of the folders of a comparison's runs.
+    A missing folder is made; if nothing comes into it, it goes again. `overwrite` replaces the result that is
+    there; `parts` names the folders of a comparison's runs.
 
     Raises `InputError` when the folder is not empty and `overwrite` is not given, or what is in it is no
     result, and `OutputError` when it cannot be made or written to, another process is at work in it, or a
@@ -196,19 +182,15 @@ def _listing(path: Path) -> tuple[set[str], set[str]] | None:
             raise ValueError(f"{shown(content['format'])}, version {shown(content['version'])}")
         files, removed = set(content["files"]), set(content.get("removed", ()))
         for name in files | removed:
-            if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in name.split("/")):
+            *_, own = steps = name.split("/")
+            if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in steps):
                 raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
-            if not _has_our_name(name):  # or whoever sends a folder might have any file replaced or removed
+            # or whoever sends a folder might have any file replaced or removed
+            if own not in _NAMES and not _FRAME.fullmatch(own):
                 raise ValueError(f"{shown(name)}, but a file of a result was wanted")
         return files, removed
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
-
-
-def _has_our_name(name: str) -> bool:
-    """Return whether a file in a folder could be one of a result, by its name alone."""
-    own = name.rpartition("/")[2]
-    return own in _NAMES or own == _MANIFEST or bool(_FRAME.fullmatch(own) or _HALF.fullmatch(own))
 
 
 def _carry_out(folder: Path) -> None:
@@ -288,18 +270,17 @@ def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
 def _owned(folder: Path) -> set[str] | None:
     """Return the files of the result in a folder, None where there is none.
 
-    Without a manifest that can be read, as in results of earlier versions, those that have the names of ours.
+    Without a manifest that can be read, as in a copy without hidden files, those that have the names of ours.
     """
     with suppress(InputError):  # one that is damaged still says whose folder it is
         manifest = _listing(folder / _MANIFEST)
         if manifest is not None:
             return manifest[0]
-    kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json")), None)
-    if kind is None and not os.path.lexists(folder / _MANIFEST) and not _is_remainder(folder):
+    kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json", f"{kind}.json")), None)
+    if kind is None and not os.path.lexists(folder / _MANIFEST):
         return None
     names = {name for name in _FILES[kind or "run"] if _is_file(folder / name)}
-    names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name)}
-    names |= {path.name for path in folder.iterdir() if _HALF.fullmatch(path.name) and _is_file(path)}
+    names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name, name)}
     for part in _parts(folder) if kind == "comparison" else ():
         inner = (*(_owned(part) or ()), _MANIFEST)
         names |= {f"{part.name}/{name}" for name in inner if _is_file(part / name)}
@@ -307,7 +288,6 @@ def _owned(folder: Path) -> set[str] | None:
 
 
 def _frames(folder: Path) -> set[str]:
-    """Return the pictures of a film in a folder."""
     frames = folder / "frames"
     if frames.is_symlink() or not frames.is_dir():
         return set()
@@ -324,21 +304,13 @@ def _parts(folder: Path) -> list[Path]:
     return [part for part in parts if part.is_dir() and not part.is_symlink()]
 
 
-def _is_remainder(folder: Path) -> bool:
-    """Return whether a folder holds what an earlier version leaves when it is killed: files of ours alone."""
-    names = {path.name for path in folder.iterdir()} - {_LOCK, _STAGING}
-    half = {name for name in names if _HALF.fullmatch(name)}
-    known = half or any(_is_ours(folder / name) for name in _BEGINNINGS)
-    return bool(known) and names - half <= {"frames", *_NAMES}
-
-
-def _is_ours(path: Path, name: str = "") -> bool:
-    """Return whether a file begins like ours of that name (by default its own)."""
+def _is_ours(path: Path, name: str) -> bool:
+    """Return whether a file begins like ours of that name."""
     try:
         if not path.is_file():
             return False
         with path.open("rb") as file:
-            return _BEGINNINGS[name or path.name].search(file.read(_HEAD_BYTES)) is not None
+            return _BEGINNINGS[name].search(file.read(4096)) is not None
     except OSError:
         return False
 

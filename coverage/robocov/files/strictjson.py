@@ -18,7 +18,6 @@ from typing import Any
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown
 
 MAX_BYTES = 50_000_000
-"""Largest file that is read, in bytes."""
 
 MAX_DEPTH = 32
 """Deepest nesting of lists and objects; a map's own needs 6."""
@@ -70,17 +69,10 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse(text: str | bytes, where: str) -> Any:
-    """Return the value that the JSON `text` stands for.
+    """Return the value that the JSON `text` stands for, which messages call `where`.
 
-    Parameters
-    ----------
-    text : str or bytes
-        Bytes are read as UTF-8, with or without a byte order mark.
-    where : str
-        What messages call the text: a file's name.
-
-    Raises `MapError` when the text is not UTF-8 or not JSON, or has a number that is not finite, a key twice
-    in one object, or lists nested deeper than `MAX_DEPTH`; with line and column.
+    Raises `MapError` with line and column when the text is not UTF-8 (a byte order mark may be) or not JSON,
+    or has a number that is not finite, a key twice in one object, or lists nested deeper than `MAX_DEPTH`.
     """
     where = one_line(where)
     _require_size(text, where)
@@ -103,24 +95,13 @@ def parse(text: str | bytes, where: str) -> Any:
 
 
 def located(error: MapError, text: str | bytes, where: str) -> MapError:
-    """Return the error of a document with the lines and columns of its mistakes in the document's text.
-
-    Parameters
-    ----------
-    error : MapError
-        Comes back as it is when it tells of no place.
-    text : str or bytes
-        What `parse` has read.
-    where : str
-        What messages call the text.
-    """
+    """Return the error of a document with lines and columns in the text that was parsed."""
     if not error.mistakes:
         return error
     try:
         text = _decoded(text, where)
         found = [
-            _placed(mistake, text, offset_of(text, mistake.path, at_key=mistake.at_key))
-            for mistake in error.mistakes
+            _placed(each, text, offset_of(text, each.path, at_key=each.at_key)) for each in error.mistakes
         ]
     except RecursionError:  # beside the place, something is nested as deep as parsing goes
         return error
@@ -128,10 +109,7 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
 
 
 def require_json(value: object, where: str) -> None:
-    """Check that `value` is made of what JSON has: finite numbers, text, lists and objects.
-
-    Raises `MapError` on anything else; the message names the JSON path.
-    """
+    """Raise `MapError` unless `value` is made of what JSON has: finite numbers, text, lists and objects."""
     mistake = _first_mistake(value, ())
     if mistake is not None:
         raise MapError.of(where, [mistake])
@@ -175,16 +153,8 @@ def _wrong(item: object) -> str | None:
 def offset_of(text: str, path: Sequence[str | int], *, at_key: bool = False) -> int:
     """Return where the value at `path` begins in valid JSON; of what is missing, where its holder does.
 
-    Parameters
-    ----------
-    text : str
-    path : sequence of str and int
-    at_key : bool
-        Return where the last key of the path begins instead. Of a key that is given more than once
-        the last one counts, as in parsing.
+    With `at_key`, where the last key begins. Of a key that is given twice the last counts, as in parsing.
 
-    Examples
-    --------
     >>> offset_of('{"a": [1, 2]}', ("a", 1))
     10
     """
@@ -220,11 +190,7 @@ def _members(text: str, at: int) -> Iterator[tuple[str | int, int, int]]:
 
 
 def line_and_column(text: str, offset: int) -> tuple[int, int]:
-    r"""Return the line and the column of an offset, counted from 1; a column is a character.
-
-    >>> line_and_column("one\r\ntwo", 6)
-    (2, 2)
-    """
+    """Return the line and the column of an offset, counted from 1; a column is a character."""
     line, begin = 1, 0
     for end in _BREAK.finditer(text, 0, offset):
         line, begin = line + 1, end.end()

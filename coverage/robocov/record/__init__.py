@@ -21,7 +21,7 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, shown
 from robocov.extras import extra
-from robocov.files.array_file import read_arrays
+from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
 from robocov.files.result_folder import settle
 from robocov.observation import Decision, Observations, Snapshot

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from robocov.files.array_cache import ArrayCache
+from robocov.files.array_files import ArrayCache
 
 arrays = st.dictionaries(
     st.text("abcdefgh_", min_size=1, max_size=8),

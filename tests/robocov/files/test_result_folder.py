@@ -287,7 +287,7 @@ def test_a_run_of_a_comparison_is_extended_there_and_not_replaced_alone(tmp_path
     assert content(tmp_path) == NEW
 
 
-# broken results, and those of earlier versions
+# broken results, and those without a manifest
 
 
 @pytest.mark.parametrize("broken", ["run.json", ".robocov.json"])
@@ -299,23 +299,7 @@ def test_a_broken_result_of_ours_can_be_replaced(tmp_path: Path, broken: str) ->
     assert content(tmp_path) == NEW | {"notes.txt": "mine"}
 
 
-@pytest.mark.parametrize(
-    ("file", "text"),
-    [("cost.csv", "time_s,mean_distance_m,cost_m3,"), ("metrics.csv", METRICS), (".record.7.part.npz", "")],
-)
-def test_what_an_earlier_version_left_when_it_was_killed_can_be_replaced(
-    tmp_path: Path, file: str, text: str
-) -> None:
-    write(tmp_path, {file: text, "trajectories.png": "", "frames/000001.png": ""})
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match="no result of robocov"):
-        saved(tmp_path, NEW)
-    (tmp_path / "mine.txt").unlink()
-    saved(tmp_path, NEW)
-    assert content(tmp_path) == NEW
-
-
-def test_a_comparison_of_an_earlier_version_is_replaced_with_its_runs_and_nothing_else(
+def test_a_comparison_without_a_manifest_is_replaced_with_its_runs_and_nothing_else(
     tmp_path: Path,
 ) -> None:
     folder, elsewhere = tmp_path / "comparison", tmp_path / "elsewhere"

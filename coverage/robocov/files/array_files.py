@@ -1,8 +1,4 @@
-"""Arrays that are costly to compute, kept in files between runs.
-
-A cache must never be in the way: an entry that is damaged, foreign or unreadable counts as missing, and
-one that cannot be written is not written.
-"""
+"""Arrays in .npz files: read after a look at their sizes, and kept in a cache between runs."""
 
 from __future__ import annotations
 
@@ -11,42 +7,95 @@ import io
 import os
 import struct
 import time
+import zipfile
+import zlib
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
-from robocov.files.array_file import read_arrays
 from robocov.files.atomic import written
 
-_SUFFIX = ".robocov"
+MOST_BYTES = 2_000_000_000
+"""Bytes that the arrays of one file may take: about the largest run that can be asked for."""
 
-_FORMAT = b"robocov arrays 1\n"
+_MOST_SQUEEZED = 100
+"""Bytes of arrays that one byte of a file may stand for, where they are more than `_MODEST`."""
+_MODEST = 256_000_000
+
+_LARGEST_READ = 1 << 20
+"""Bytes that are read in one go: the directory of a file of arrays is short."""
+
+_BROKEN = (
+    *(ValueError, EOFError, OSError, MemoryError, NotImplementedError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""Errors that zipfile, zlib and numpy raise on a damaged file."""
+
+_SUFFIX, _FORMAT = ".robocov", b"robocov arrays 1\n"
 
 _DIGEST = 16
-"""Bytes of the check sum that stands before the data."""
+"""Bytes of the check sum that stands before the data of a cached file."""
 
 _STALE = 24 * 3600.0
 """Seconds after which a half-written file has no writer any more."""
 
 
+def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dict[str, NDArray[Any]]:
+    """Return the arrays in an .npz file, which messages call `where`.
+
+    Whatever is wrong with it is an `InputError` of one line: also where it holds objects, or more than is
+    good for the machine.
+    """
+    try:
+        size = file.seek(0, io.SEEK_END)
+        with zipfile.ZipFile(_Sparing(file)) as archive:
+            entries = archive.infolist()
+            # a stream ends where its entry says, whatever there may be in it
+            total = sum(entry.file_size for entry in entries)
+            if total > min(most_bytes, max(_MODEST, _MOST_SQUEEZED * size)):
+                found = f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB"
+                raise ValueError(f"{found} are too many")
+            for name, times in Counter(entry.filename for entry in entries).most_common(1):
+                if times > 1:
+                    raise ValueError(f"{name!r} is in it {times} times")
+            arrays = {}
+            for entry in entries:
+                with archive.open(entry) as stream:
+                    array = np.lib.format.read_array(stream, allow_pickle=False)
+                arrays[entry.filename.removesuffix(".npy")] = array
+            return arrays
+    except _BROKEN as error:
+        raise InputError(f"{where}: cannot be read: {error or type(error).__name__}") from error
+
+
+class _Sparing:
+    """A file of which nothing large is read in one go, as a directory of millions of entries would be."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def read(self, size: int = -1) -> bytes:
+        if size > _LARGEST_READ:
+            raise zipfile.BadZipFile("its directory is too large")
+        return self._file.read(size)
+
+
 class ArrayCache:
     """A folder of arrays, each entry a file named by what the arrays were computed from.
 
-    Any number of processes may use one folder at the same time. When the files grow beyond the
-    limit, those that were not used for the longest time are removed.
-
-    Parameters
-    ----------
-    folder : Path
-        Made when something is saved.
-    limit : int, bytes
-        Of all files together.
+    A cache is never in the way: an entry that is damaged, foreign or unreadable counts as missing, and one
+    that cannot be written is not written. Any number of processes may use one folder at the same time. When
+    its files grow beyond `limit` bytes, those that were not used for the longest time are removed.
     """
 
     def __init__(self, folder: Path, limit: int = 1 << 30) -> None:
@@ -111,9 +160,8 @@ class ArrayCache:
             return
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with written(self._path(key), durable=False) as path, path.open("wb") as file:
-                file.write(_FORMAT + _digest(payload))
-                file.write(payload)
+            with written(self._path(key), durable=False) as path:
+                path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
         except (OSError, OutputError):
             return
         self._tidy()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from robocov.errors import InputError
-from robocov.files.array_file import read_arrays
+from robocov.files.array_files import read_arrays
 
 MANY = 1_600_000_000
 """Bytes that an array claims to have."""
@@ -126,7 +126,7 @@ def test_a_file_that_would_take_gigabytes_is_refused_at_once(tmp_path: Path, hos
     script = (
         "import resource, sys\n"
         "from robocov.errors import InputError\n"
-        "from robocov.files.array_file import read_arrays\n"
+        "from robocov.files.array_files import read_arrays\n"
         "usage = lambda: resource.getrusage(resource.RUSAGE_SELF)\n"
         "before = usage()\n"
         "try:\n"
