@@ -61,8 +61,7 @@ if TYPE_CHECKING:
     from robocov.record import Record
     from robocov.robots import Team, read_team
     from robocov.sensor import RangeSensor
-    from robocov.simulating import simulate_many
-    from robocov.simulation import Simulation
+    from robocov.simulation import Simulation, simulate_many
     from robocov.voronoi import VoronoiPartition, partition
     from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
@@ -95,8 +94,7 @@ _NAMES = {
     "record": "Record",
     "robots": "Team read_team",
     "sensor": "RangeSensor",
-    "simulating": "simulate_many",
-    "simulation": "Simulation",
+    "simulation": "Simulation simulate_many",
     "voronoi": "VoronoiPartition partition",
     "voronoi.weighted_cells": "WeightedCells weighted_partition",
     "world": "World",

@@ -16,7 +16,7 @@ import pymunk
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.compiled import call_c, kernel
 from robocov.observation.scans import headings
-from robocov.world.contacts import added_mover
+from robocov.world import added_mover
 from robocov.world.engine import addresses_of, function
 from robocov.world.solid import Mover
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov.world.changing_world import only
 from robocov_app.plots.arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
 from robocov_app.plots.curves import DISTANCE, TIME, WEIGHED, draw_curves, end_label
 from robocov_app.plots.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
@@ -81,7 +80,7 @@ class Moment:
         environment = record.environment.at(float(record.time[-1]))
         if counted is None:
             return cls(environment, record.team, field, record.label, facts)
-        team, numbers = only(record.team, counted), tuple((counted + 1).tolist())
+        team, numbers = record.team[counted], tuple((counted + 1).tolist())
         return cls(environment, team, field, record.label, facts, numbers)
 
 

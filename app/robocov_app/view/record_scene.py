@@ -9,7 +9,6 @@ import numpy as np
 
 from robocov.observation import Snapshot
 from robocov.observation.neighbours import Neighbours
-from robocov.world.changing_world import only
 from robocov_app.view.scene import Scene
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | N
         }
         if not len(rows):
             return Scene(environment, team, label=record.label, cost=cost, **more)
-        snapshot, team = snapshot_of(snapshot, rows), only(team, rows)
+        snapshot, team = snapshot_of(snapshot, rows), team[rows]
         began = np.argmax(record.present, axis=0)
         starts = record.positions[began, np.arange(len(began))][rows]
         # before it joins, a robot has no trail

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.arrays import Array, frozen
+from robocov.arrays import Array, IntArray, frozen
 from robocov.errors import (
     InputError,
     ParameterError,
@@ -156,7 +156,7 @@ class Team:
         """Whether some robots are faster than others, so that the nearest may not be there first."""
         return bool((self.max_speed != self.max_speed[0]).any())
 
-    def __getitem__(self, robots: slice) -> Team:
+    def __getitem__(self, robots: slice | IntArray) -> Team:
         """Return some of the robots as a team."""
         return Team(*(getattr(self, field.name)[robots] for field in fields(self)))
 

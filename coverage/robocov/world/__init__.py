@@ -1,8 +1,446 @@
-"""The physical world: robots and moving obstacles as pymunk bodies among solid pieces."""
+"""The physical world: robots as pymunk bodies among static polygons and obstacles that move.
+
+Each step the controller's forces, the viscous term of (28) and the kinematic limits are combined into the net
+force that pymunk integrates; contacts are pymunk's.
+
+A step depends on positions and velocities alone. pymunk keeps more than that between steps (cached
+contact impulses, a pending push out of an overlap, the shape of its search tree), all of which
+matters only in contact. So a step is first made as if nothing touched; those whom pymunk reports in
+contact, and whoever they are moved against, are moved again from the same state by `ContactSolver`, in
+substeps fine enough that no robot sinks into anything by more than `MAX_PENETRATION`. That is what makes
+a copy of a running world go on identically, bit for bit, and what keeps a contact a matter of those in it.
+
+Obstacles that move go their way whatever is in it. What they meet they push, and what pushes is stronger
+than any robot. Walls are stronger still: where a robot has no room left between a moving obstacle and a wall,
+it stays in front of the wall, and the obstacle goes over it; it is pushed out again, where that is nearest,
+once there is room. No robot gets into a wall or through one that way.
+"""
 
 from __future__ import annotations
 
-from robocov.world.bodies import LONGEST_SUBSTEP, World
-from robocov.world.contacts import MAX_PENETRATION
+import math
+from functools import cached_property
+from typing import TypeAlias
 
-__all__ = ["LONGEST_SUBSTEP", "MAX_PENETRATION", "World"]
+import numpy as np
+import pymunk
+from pymunk._chipmunk_cffi import lib
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import inner_kernel, kernel
+from robocov.errors import ParameterError
+from robocov.observation.neighbours import close_pairs
+from robocov.robots import Team
+from robocov.world.engine import STATES, Engine, observed_step, substeps
+from robocov.world.solid import Mover
+
+LONGEST_SUBSTEP = 0.02
+"""Longest substep in seconds."""
+
+MAX_MASS_RATIO = 1000.0
+"""Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
+
+MAX_PENETRATION = 1e-3
+"""Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
+
+_MOST_SUBSTEPS = 64
+_SLOP = 1e-4  # metres that a robot may lean into a wall
+_WALLS = pymunk.ShapeFilter(mask=0b1)
+_NO_WALL = pymunk.ShapeFilter(categories=pymunk.ShapeFilter.ALL_CATEGORIES() & ~0b1)
+_NONE = np.zeros((0, 2))
+
+Obstacles: TypeAlias = tuple[tuple[Array, ...], tuple[Mover, ...], Array | None]
+"""Solid pieces, obstacles that move, robots that have failed: as `World` takes them."""
+
+
+class World:
+    """Bodies of a team among solid pieces.
+
+    Parameters
+    ----------
+    pieces : convex polygons, (k, 2) m each
+        What `solid.solid_pieces` returns.
+    team : Team
+    positions : (n, 2) m
+    velocities : (n, 2) m/s, at rest by default
+    movers : tuple of Mover
+        Obstacles that move, as kinematic bodies.
+    failed_robots : (w, 3) m or None
+        x, y and radius of robots that have failed, and stand in the way.
+    runs : int
+        In so many worlds at once, each with its part of the robots, which never meet those of the others.
+
+    Raises ParameterError when a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
+    """
+
+    positions: Array
+    """Centres of the robots, (n, 2) m; read-only."""
+    velocities: Array
+    """(n, 2) m/s; read-only."""
+
+    def __init__(
+        self,
+        pieces: tuple[Array, ...],
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        movers: tuple[Mover, ...] = (),
+        failed_robots: Array | None = None,
+        runs: int = 1,
+    ) -> None:
+        light, heavy = float(team.mass.min()), float(team.mass.max())
+        if heavy > MAX_MASS_RATIO * light:
+            most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
+            raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
+        self.team, self._runs, self._each = team, runs, len(team) // runs
+        self._obstacles, self._movers, self.failed_robots = (
+            (pieces, movers, failed_robots),
+            movers,
+            failed_robots,
+        )
+        self.working: BoolArray = np.ones(len(team), dtype=bool)  # who does not is in no `World`
+        state = np.zeros((2, len(team), 2))
+        state[0], state[1] = positions, 0.0 if velocities is None else velocities
+        self._set_state(state)
+        self._fast = self._anybody_fast()
+        self._moving = motion(movers, 0.0, 1.0)
+        self._contacts: ContactSolver | None = None
+        self._fastest, self._mover_speed = float(team.max_speed.max()), fastest(movers)
+        self._thinnest = float(team.radius.min())
+        self._answered = math.nan
+
+    def place(self, run: int, positions: Array) -> None:
+        """Put the robots of a run to other places, (n / runs, 2) m, at rest."""
+        rows = self._rows(run)
+        state = np.array([self.positions, self.velocities])
+        state[0, rows], state[1, rows] = positions, 0.0
+        self._set_state(state)
+        self._write_state(self._engine, run)
+
+    def copy(self) -> World:
+        """Return an independent world in the same state, which goes on identically."""
+        twin = object.__new__(World)
+        # the engine, made anew when it is needed, is all that is changed in place
+        twin.__dict__.update({name: value for name, value in vars(self).items() if name != "_engine"})
+        twin._contacts = None
+        return twin
+
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
+        """Move on by `dt` seconds under the controllers' forces, (n, 2) N, viscosity and limits.
+
+        External forces, (n, 2) N, as by a hand, know no limits; a robot that they have made faster than it
+        can be by itself brakes as hard as it can.
+        """
+        speed = self._fastest
+        if external_forces is not None:
+            external_forces = np.array(external_forces, dtype=float)
+        if external_forces is not None or self._fast:
+            speed = max(speed, float((self._speeds() + self._gain(external_forces, dt)).max()))
+        # a robot must not cross a thin wall within a substep
+        crossing = (speed + self._mover_speed) * dt / self._thinnest
+        parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(crossing))
+        for part in range(parts):
+            if self._movers:
+                self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
+                self._write_state(self._engine, 0)
+            self._substep(forces, dt / parts, external_forces)
+
+    def _speeds(self) -> Array:
+        return np.asarray(np.hypot(self.velocities[:, 0], self.velocities[:, 1]))
+
+    def _gain(self, external_forces: Array | None, dt: float) -> Array | float:
+        """Return how much faster external forces may make each robot, m/s."""
+        return 0.0 if external_forces is None else np.hypot(*external_forces.T) / self.team.mass * dt
+
+    def _anybody_fast(self) -> bool:
+        """Whether a robot is faster than it can be by itself."""
+        return bool((self._speeds() > self.team.max_speed).any())
+
+    @cached_property
+    def _engine(self) -> Engine:
+        """The spaces that tell who touches: nothing is pushed out of an overlap, nothing is remembered."""
+        spaces = []
+        self._row: dict[int, int] = {}
+        columns = self.positions.tolist(), self.team.mass.tolist(), self.team.radius.tolist()
+        for row, (place, mass, radius) in enumerate(zip(*columns, strict=True)):
+            if row % self._each == 0:
+                space = obstacle_space(self._obstacles)
+                space.iterations = space.collision_persistence = 1
+                space.collision_bias = 1.0
+                spaces.append(space)
+            body, disc = robot_body(mass, radius)
+            # before it enters the space, which keeps a pair for any two discs that enter in one place
+            body.position = tuple(place)
+            space.add(body, disc)
+            self._row[body.id] = row
+        engine = Engine(spaces, len(self._movers), self._each)
+        for run in range(self._runs):
+            self._write_state(engine, run)
+        return engine
+
+    def _rows(self, run: int) -> slice:
+        return slice(run * self._each, (run + 1) * self._each)
+
+    def _write_state(self, engine: Engine, run: int) -> None:
+        begin, state, rows = len(self._movers), engine.states[run], self._rows(run)
+        state[:begin] = self._moving
+        state[begin:-1, :2], state[begin:-1, 2:] = self.positions[rows], self.velocities[rows]
+        engine.write(STATES, run)
+
+    def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
+        engine, external = self._engine, _NONE
+        if self._answered != dt:
+            self._answered, self._response = dt, response(self.team, dt)
+        answer, limit = self._response, self.team.max_speed
+        if self._fast:
+            # who is faster than it can be by itself brakes
+            limit = np.maximum(limit, self._speeds() - self.team.max_acceleration * dt)
+            answer = np.column_stack([answer[:, :4], limit])
+        if external_forces is not None:
+            external = external_forces
+            limit = np.maximum(limit, self._speeds() + self._gain(external, dt))
+        state = np.empty((2, len(forces), 2))
+        engine.robots[:] = forces.reshape(self._runs, -1, 2)
+        engine.forget_contacts()
+        _free_substep(
+            engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
+        )
+        touching: dict[int, list[int]] = {}
+        for row in self._touching():
+            touching.setdefault(row // self._each, []).append(row)
+        for run, rows in touching.items():
+            self._resolve_contacts(run, np.array(rows), state, dt, limit)
+        self._set_state(state)
+        for run in touching:
+            self._write_state(engine, run)
+        if external_forces is not None or self._fast:
+            self._fast = self._anybody_fast()
+
+    def _touching(self) -> list[int]:
+        """Return the robots that touched something in the last free substep."""
+        return sorted({self._row[body] for body in self._engine.touching() if body in self._row})
+
+    def _set_state(self, state: Array) -> None:
+        # whoever gets it, a controller or a record, must not change it
+        state.setflags(write=False)
+        self.positions, self.velocities = state[0], state[1]
+
+    def _resolve_contacts(self, run: int, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
+        """Move robots of a run again that touch something, and with them whoever they are moved against.
+
+        `free`, (2, n, 2) m and m/s, is how all moved as if nobody touched anything, and is corrected.
+        """
+        solver = self._contacts or ContactSolver(self.team, self._obstacles)
+        self._contacts = None  # it is of no use once it was interrupted
+        all_rows, net = self._rows(run), self._engine.robots[run]
+        radius, begin = self.team.radius[all_rows], all_rows.start
+        resolved = np.zeros(self._each, dtype=bool)
+        while True:
+            place, velocity = solver.moved(
+                rows, self.positions[rows], self.velocities[rows], net[rows - begin], self._moving, dt
+            )
+            free[0, rows], resolved[rows - begin] = place, True
+            first, second, distance = close_pairs(free[0, all_rows], 2.0 * float(radius.max()))
+            reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
+            if not reached.any():
+                break
+            resolved[second[reached]] = True
+            rows = begin + np.flatnonzero(resolved)
+        # impulses of a contact may exceed what a robot can do by itself
+        speed = np.sqrt(np.maximum((velocity**2).sum(axis=1), limit[rows] ** 2))
+        free[1, rows] = velocity * (limit[rows] / speed)[:, None]
+        self._contacts = solver
+
+
+class ContactSolver:
+    """Moves those robots on that touch something, in a space that holds them, the obstacles and nobody else.
+
+    It keeps nothing from one call to the next: what pymunk remembers of contacts goes with the discs.
+    """
+
+    def __init__(self, team: Team, obstacles: Obstacles) -> None:
+        _, movers, _ = obstacles
+        self._team, self._movers, self._mover_speed = team, movers, fastest(movers)
+        self._space = obstacle_space(obstacles)
+        # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
+        self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
+        self._space.collision_slop = _SLOP
+        # the part of an overlap that is left after a second: none after a substep; only what a moving
+        # obstacle has run over is deep, and comes out of it gradually
+        self._space.collision_bias = 1e-9 if movers else 0.0
+        self._engine = Engine([self._space], len(movers), len(team))
+        self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
+        self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}
+
+    def moved(
+        self, rows: IntArray, positions: Array, velocities: Array, forces: Array, motion: Array, dt: float
+    ) -> tuple[Array, Array]:
+        """Return positions and velocities, (k, 2) each, of the robots of ascending rows after `dt` seconds.
+
+        Those before are given; `forces` (k, 2) N are net and constant, `motion` (m, 4) m and m/s is that of
+        the obstacles that move.
+        """
+        for row in rows.tolist():
+            if row not in self._robots:
+                self._robots[row] = robot_body(float(self._team.mass[row]), float(self._team.radius[row]))
+        robots = [self._robots[row] for row in rows.tolist()]
+        reached = velocities + forces * (dt / self._team.mass[rows, None])
+        square = max((velocities**2).sum(axis=1).max(), (reached**2).sum(axis=1).max())
+        parts = math.ceil((math.sqrt(square) + self._mover_speed) * dt / self._travel)
+        parts = min(_MOST_SUBSTEPS, max(1, parts))
+
+        engine, space = self._engine, self._space._space
+        states, net = engine.states[0], engine.forces[0]
+        mine = slice(len(motion), len(motion) + len(rows))
+        # in C, as Python's `Space.add` and `remove` cost more than all else
+        for body, _ in robots:
+            lib.cpSpaceAddBody(space, body._body)
+        states[: mine.start], states[mine, :2], states[mine, 2:], states[mine.stop] = (
+            motion,
+            positions,
+            velocities,
+            0.0,
+        )
+        engine.write(STATES)
+        for _, disc in robots:
+            lib.cpSpaceAddShape(space, disc._shape)
+        net[:], net[mine] = 0.0, forces
+        self._substeps(robots, parts, dt / parts)
+        for _, disc in robots:
+            lib.cpSpaceRemoveShape(space, disc._shape)
+        engine.read()
+        velocities = states[mine, 2:].copy()
+        # what is left is the push out of an overlap that pymunk has decided but not yet applied
+        states[: mine.stop, 2:] = net[:] = 0.0
+        engine.write(STATES)
+        self._substeps(robots, 1, dt / parts)
+        engine.read()
+        for body, _ in robots:
+            lib.cpSpaceRemoveBody(space, body._body)
+        return states[mine, :2], velocities
+
+    def _substeps(self, robots: list[tuple[pymunk.Body, pymunk.Circle]], count: int, dt: float) -> None:
+        if not self._movers:
+            substeps(self._engine.addresses, self._engine.filled, 0, count, dt)
+            return
+        for _ in range(count):
+            before = [body.position for body, _ in robots]
+            substeps(self._engine.addresses, self._engine.filled, 0, 1, dt)
+            for (body, disc), place in zip(robots, before, strict=True):
+                self._keep_before_walls(body, disc.radius, place)
+
+    def _keep_before_walls(self, body: pymunk.Body, radius: float, before: pymunk.Vec2d) -> None:
+        """Leave a robot that was pushed into a wall, from some place, in front of the wall."""
+        if self._space.segment_query_first(before, body.position, 0.0, _WALLS) is not None:
+            body.position = before
+        for _ in range(3):  # out of one wall may be into another, in a corner
+            wall = self._space.point_query_nearest(body.position, radius, _WALLS)
+            if wall is None or wall.distance >= radius - _SLOP or wall.distance <= 0.0:
+                return
+            away = body.position - wall.point
+            body.position = wall.point + away * (radius / math.hypot(*away))
+
+
+def obstacle_space(obstacles: Obstacles) -> pymunk.Space:
+    """Return a space with all that robots may run into but each other; shapes have no friction by default."""
+    (pieces, movers, failed_robots), space = obstacles, pymunk.Space()
+    walls: list[pymunk.Shape] = [pymunk.Poly(space.static_body, ring.tolist()) for ring in pieces]
+    for x, y, radius in [] if failed_robots is None else failed_robots.tolist():
+        walls.append(pymunk.Circle(space.static_body, radius, (x, y)))
+    space.add(*walls)
+    for mover in movers:
+        for shape in added_mover(space, mover).shapes:
+            shape.filter = _NO_WALL
+    return space
+
+
+def added_mover(space: pymunk.Space, mover: Mover) -> pymunk.Body:
+    """Add an obstacle that moves to a space, where it is at time zero; its position is its shift."""
+    body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    space.add(body, *[pymunk.Poly(body, ring.tolist()) for ring in mover.pieces])
+    return body
+
+
+def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
+    """Return a frictionless disc that does not turn."""
+    body = pymunk.Body(mass, math.inf)
+    disc = pymunk.Circle(body, radius)
+    disc.filter = _NO_WALL
+    return body, disc
+
+
+def fastest(movers: tuple[Mover, ...]) -> float:
+    """Return the largest speed of obstacles that move, m/s."""
+    return max((mover.path.speed for mover in movers), default=0.0)
+
+
+def motion(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
+    """Return where moving obstacles are at a time, and how fast for `dt` seconds, (m, 4) m and m/s."""
+    state = np.empty((len(movers), 4))
+    for row, mover in enumerate(movers):
+        here = mover.path.shift(time)
+        state[row] = *here, *((mover.path.shift(time + dt) - here) / dt)
+    return state
+
+
+def response(team: Team, dt: float) -> Array:
+    """Return how robots answer to forces for `dt` seconds, (n, 5): see `_free_substep`.
+
+    The columns: part of the velocity that viscosity takes (28), velocity by force in m/s/N, force by change
+    of velocity in N/(m/s), most change of velocity and most speed in m/s.
+    """
+    rate = team.viscosity / team.mass
+    decay = -np.expm1(-rate * dt)
+    drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / team.mass
+    return np.column_stack([decay, drive, team.mass / dt, team.max_acceleration * dt, team.max_speed])
+
+
+@inner_kernel
+def _scale(x: float, y: float, limit: float) -> float:
+    """Return by what to multiply a vector so that it is no longer than `limit`."""
+    square = x * x + y * y
+    return limit / math.sqrt(square) if square > limit * limit else 1.0
+
+
+@kernel
+def _free_substep(
+    addresses: IntArray,
+    filled: IntArray,
+    forces: Array,
+    states: Array,
+    answer: Array,
+    external: Array,
+    moved: Array,
+    dt: float,
+) -> None:
+    """Move all bodies by one substep as if nothing touched; make net forces of the controllers'.
+
+    The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
+    dt; then acceleration and speed are limited, in this order. Limiting the speed cannot break the limit of
+    the acceleration: the old velocity lies within the limit, and projecting onto a disc does not move a point
+    away from a point of the disc.
+    """
+    each = len(answer) // len(addresses)
+    begin = states.shape[1] - 1 - each
+    for i in range(len(answer)):
+        run, row = i // each, begin + i % each
+        vx, vy = states[run, row, 2], states[run, row, 3]
+        decay, drive = answer[i, 0], answer[i, 1]
+        dx, dy = drive * forces[run, row, 0] - decay * vx, drive * forces[run, row, 1] - decay * vy
+        scale = _scale(dx, dy, answer[i, 3])
+        ux, uy = vx + dx * scale, vy + dy * scale
+        scale = _scale(ux, uy, answer[i, 4])
+        forces[run, row, 0] = (ux * scale - vx) * answer[i, 2]
+        forces[run, row, 1] = (uy * scale - vy) * answer[i, 2]
+        if len(external):
+            forces[run, row, 0] += external[i, 0]
+            forces[run, row, 1] += external[i, 1]
+    for run in range(len(addresses)):
+        observed_step(addresses, filled, run, dt)
+    for i in range(len(answer)):
+        for k in range(2):
+            moved[0, i, k] = states[i // each, begin + i % each, k]
+            moved[1, i, k] = states[i // each, begin + i % each, 2 + k]

@@ -6,50 +6,43 @@ for the others. A robot that failed is an obstacle from then on; one that has no
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray
+from robocov.conditions import Conditions
+from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.robots import Team
-from robocov.world.bodies import World
+from robocov.world import World
 from robocov.world.relocation import nearest_free
-
-if TYPE_CHECKING:
-    from robocov.conditions import Conditions
-    from robocov.environment import Environment
-    from robocov.world.solid import Mover
+from robocov.world.solid import movers, solid_pieces
 
 
 class ChangingWorld:
-    """As `World`, with a row for every robot that ever is.
+    """As `World`, with a row for every robot that ever is; its arrays are read-only.
 
     Attributes
     ----------
     positions : (n, 2) m
-        Of a robot that has not joined yet: where it would start, or is to join; read-only.
+        Of a robot that has not joined yet: where it would start, or is to join.
     velocities : (n, 2) m/s
-        Zero of those that do not work; read-only.
+        Zero of those that do not work.
     working : (n,) bool
-        Which robots are there and have not failed; read-only.
+        Which robots are there and have not failed.
     """
 
     def __init__(
         self,
         conditions: Conditions,
         environment: Environment,
-        pieces: tuple[Array, ...],
-        movers: tuple[Mover, ...],
         team: Team,
         positions: Array,
         velocities: Array | None = None,
         *,
         time: float = 0.0,
     ) -> None:
-        self._conditions, self._environment = conditions, environment
-        self._pieces, self._movers, self.team = pieces, movers, team
+        self._conditions, self._environment, self.team = conditions, environment, team
+        self._pieces, self._movers = solid_pieces(environment), movers(environment)
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.working = conditions.working(time, len(team))
@@ -78,28 +71,23 @@ class ChangingWorld:
 
         Raises StartError when there is no room for a robot that joins.
         """
-        rows = self._rows
+        rows, there, time_after = self._rows, self.working | self._failed, time + dt
         self.positions, self.velocities = self.positions.copy(), np.zeros_like(self.velocities)
         if self._world is not None:
             external = None if external_forces is None else external_forces[rows]
             self._world.step(forces[rows], dt, external, time=time)
             self.positions[rows], self.velocities[rows] = self._world.positions, self._world.velocities
-        working = self._conditions.working(time + dt, len(self.team))
-        failed = self._conditions.failed(time + dt, len(self.team))
+        working = self._conditions.working(time_after, len(self.team))
+        failed = self._conditions.failed(time_after, len(self.team))
         if (working != self.working).any() or (failed != self._failed).any():
-            self._change(working, failed, time + dt)
+            self._failed = failed & there
+            for robot in np.flatnonzero(working & ~there).tolist():
+                self.positions[robot] = self._place(robot, there, time_after)
+                there[robot] = True
+            self.working = working
+            self.velocities[~working] = 0.0
+            self._begin()
         self._protect()
-
-    def _change(self, working: BoolArray, failed: BoolArray, time: float) -> None:
-        """Let robots fail and join."""
-        there = self.working | self._failed
-        self._failed = failed & there
-        for robot in np.flatnonzero(working & ~there).tolist():
-            self.positions[robot] = self._place(robot, there, time)
-            there[robot] = True
-        self.working = working
-        self.velocities[~working] = 0.0
-        self._begin()
 
     def _place(self, robot: int, there: BoolArray, time: float) -> tuple[float, float]:
         """Return where a robot joins, as near as it fits beside those that are there."""
@@ -120,20 +108,9 @@ class ChangingWorld:
         # a team of none is no team
         self._world: World | None = None
         if len(rows):
-            self._world = World(
-                self._pieces,
-                only(self.team, rows),
-                self.positions[rows],
-                self.velocities[rows],
-                movers=self._movers,
-                failed_robots=self.failed_robots,
-            )
+            state = self.team[rows], self.positions[rows], self.velocities[rows]
+            self._world = World(self._pieces, *state, movers=self._movers, failed_robots=self.failed_robots)
 
     def _protect(self) -> None:
         for array in (self.positions, self.velocities, self.working):
             array.setflags(write=False)
-
-
-def only(team: Team, rows: IntArray) -> Team:
-    """Return the team of some robots of a team."""
-    return Team(*(getattr(team, each.name)[rows] for each in fields(Team)))

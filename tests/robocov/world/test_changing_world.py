@@ -13,7 +13,7 @@ from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world import World
-from robocov.world.changing_world import ChangingWorld, only
+from robocov.world.changing_world import ChangingWorld
 from robocov.world.solid import solid_pieces
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
@@ -22,7 +22,7 @@ STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5]])
 
 def world(conditions: Conditions, positions: np.ndarray = STARTS, **team: float) -> ChangingWorld:
     made = Team.homogeneous(len(positions), **team)
-    return ChangingWorld(conditions, HALL, solid_pieces(HALL), (), made, positions)
+    return ChangingWorld(conditions, HALL, made, positions)
 
 
 def test_as_long_as_all_work_it_is_a_world() -> None:
@@ -171,20 +171,13 @@ def test_starts_that_are_not_taken_yet_may_overlap() -> None:
         Simulation(HALL, Rapf(), places, conditions=Conditions(joins=((4, 1.0),)))
 
 
-def test_a_part_of_a_team() -> None:
-    team = Team.homogeneous(5, max_speed=0.7)
-    part = only(team, np.array([0, 3]))
-    assert len(part) == 2
-    assert part.max_speed.tolist() == [0.7, 0.7]
-
-
 def test_a_failure_beside_a_wall_changes_nothing_for_others() -> None:
     """The world is made anew when a robot fails; one that leans on a wall elsewhere goes on as it did."""
     walled = Environment("walled", HALL.boundary, (WallObstacle(((5, 0), (5, 8)), 0.1),))
     places = np.array([[4.0, 4.0], [8.0, 4.0]])
     forces = np.array([[3.0, 1.0], [0.0, 0.0]])
     made = [
-        ChangingWorld(each, walled, solid_pieces(walled), (), Team.homogeneous(2), places)
+        ChangingWorld(each, walled, Team.homogeneous(2), places)
         for each in (Conditions(failures=((2, 3.0),)), Conditions(failures=((2, 1e3),)))
     ]
     for step in range(120):
