@@ -59,7 +59,7 @@ _RESULTS = 3
 @cache
 def made_with() -> dict[str, str]:
     """Return the versions that results of this process depend on."""
-    found = versions()
+    found = dict(versions())
     del found["python"]
     return found | {"robocov": f"{found['robocov']} (results {_RESULTS})"}
 

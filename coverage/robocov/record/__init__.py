@@ -24,6 +24,7 @@ from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
 from robocov.files.result_folder import settle
+from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.robots import Team
@@ -57,27 +58,18 @@ class Record(Drawable):
 
     Attributes
     ----------
-    environment : Environment
-    team : Team
-    controller : str
-        Its name, as `make_controller` takes it.
-    label : str
-        The same as shown to people.
-    gains : dict of name to value
-    start : str or None
-    seed : int or None
+    controller, label : str
+        Its name, as `make_controller` takes it, and as shown to people.
+    start, seed : str or None, int or None
         Where the starts came from.
     dt : float, s
         The control period, and between moments of a record that was not thinned.
     time : (T,) s
-    positions : (T, n, 2) m
-    velocities : (T, n, 2) m/s
+    positions, velocities : (T, n, 2) m, m/s
     forces : (T, n, 2) N
         The controller's force at that state, before any limit, viscosity apart.
-    goals : (T, n, 2) m
-        nan where none.
-    obstacle_points : (T, n, 2) m
-        The nearest obstacle point that each robot sensed, nan where none.
+    goals, obstacle_points : (T, n, 2) m
+        nan where none; the nearest obstacle point that each robot sensed.
     session : dict
         Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`.
     conditions : Conditions or None
@@ -133,10 +125,7 @@ class Record(Drawable):
         return self.gains.get("cells") == "time" and self.team.mixed_speeds
 
     def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
-        """Return the cells of the robots that worked at moment number `k`, everybody heard.
-
-        The region is divided by travel time where the law's gain ``cells`` says so, else by distance.
-        """
+        """Return the cells of the robots that worked at moment `k`, everybody heard; see `by_time`."""
         working = slice(None) if self.conditions is None else self.working[k]
         positions, environment = self.positions[k][working], self.environment
         if self.by_time:
@@ -145,12 +134,11 @@ class Record(Drawable):
         return partition(positions, environment.region, density=environment.density)
 
     def snapshot(self, k: int) -> Snapshot:
-        """Return the moment number `k` as far as it was recorded: without force terms and cells."""
-        positions = self.positions[k]
+        """Return moment `k` as far as it was recorded: without force terms and cells."""
         working = None if self.conditions is None else self.working[k]
-        neighbours = Neighbours.within(positions, self.team.communication_range)
+        neighbours = Neighbours.within(self.positions[k], self.team.communication_range)
         seen = Observations(
-            positions=positions,
+            positions=self.positions[k],
             velocities=self.velocities[k],
             neighbours=neighbours if working is None else neighbours.among(working),
             obstacle_points=self.obstacle_points[k],
@@ -166,14 +154,12 @@ class Record(Drawable):
     def at(self, time: float) -> Snapshot:
         """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
 
-        Raises ParameterError when the time is before the first moment or after the last by more than a
-        control period.
+        Raises ParameterError when that is outside of the run by more than a control period.
         """
         first, last = float(self.time[0]), float(self.time[-1])
         if not first - self.dt <= time <= last + self.dt:
-            raise ParameterError(
-                f"time: {shown(time)} s, but a number from {first:g} to {last:g} s was wanted"
-            )
+            wanted = f"a number from {first:g} to {last:g} s"
+            raise ParameterError(f"time: {shown(time)} s, but {wanted} was wanted")
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
     def until(self, time: float) -> Record:
@@ -182,19 +168,14 @@ class Record(Drawable):
         Raises ParameterError when that is before the first moment.
         """
         # half a microsecond forgives the rounding of sums of steps
-        if not time >= float(self.time[0]) - 5e-7:
-            raise ParameterError(
-                f"time: {shown(time)} s, but a number from {float(self.time[0]):g} s was wanted"
-            )
+        if not time >= self.time[0] - 5e-7:
+            raise ParameterError(f"time: {shown(time)} s, but a number from {self.time[0]:g} s was wanted")
         return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
 
     def thinned(self, rate: float) -> Record:
-        """Return the record at `rate` moments a second, Hz; 0 leaves the first moment and the last.
+        """Return the `nearest_moments` of the record at `rate`, Hz; 0 leaves the first and the last.
 
-        Those moments stay that are nearest to multiples of 1/rate seconds from the first, of two as near
-        the earlier; and so does the last. Where the record is sparser than that, it stays as it is.
-
-        Raises ParameterError when the rate is negative or not finite.
+        Where the record is sparser than that, it stays as it is. Raises ParameterError on a negative rate.
         """
         if not 0.0 <= rate < np.inf:
             raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
@@ -205,12 +186,10 @@ class Record(Drawable):
         return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
 
     def to_pandas(self) -> DataFrame:
-        """Return the run as a tidy data frame: one row for each moment and robot, by time, then robot.
+        """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
 
         The columns are time_s, robot (from 0; pictures number robots from 1), x_m, y_m, vx_m_s, vy_m_s, fx_N,
-        fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m: the arrays of the record.
-
-        Raises RobocovError when pandas is not installed: it comes with ``robocov[pandas]``.
+        fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m. It needs ``robocov[pandas]``.
         """
         pandas = extra("pandas", "pandas")
         moments, robots = self.positions.shape[:2]
@@ -226,12 +205,7 @@ class Record(Drawable):
     def to_json(
         self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> dict[str, Any]:
-        """Return the content of ``run.json``: all that is needed to repeat the run, and its summary.
-
-        `lattice` is the one on which the summary's cost was evaluated.
-        """
-        from robocov.mapfile import to_json
-
+        """Return the content of ``run.json``; the summary's cost was evaluated on `lattice`."""
         return {
             "format": "robocov-run",
             "version": 1,
@@ -246,7 +220,7 @@ class Record(Drawable):
             "lattice": lattice,
             **({"conditions": self.conditions.to_dict()} if self.conditions else {}),
             **({"session": dict(self.session)} if self.session else {}),
-            "versions": versions(),
+            "versions": dict(versions()),
             "summary": dict(summary or {}),
         }
 
@@ -274,10 +248,8 @@ class Record(Drawable):
     def load(cls, folder: Path | str) -> Record:
         """Return the record that `save` wrote to `folder`; the controller is not loaded, only named.
 
-        Raises InputError when the folder holds no run, or one that cannot be read: the file, the place in
-        it, the value and what was wanted.
+        Raises InputError when the folder holds no run, or one that cannot be read.
         """
-        from robocov.mapfile import from_json
         from robocov.record.run_document import read_run
 
         folder = Path(folder)
@@ -315,9 +287,8 @@ class Record(Drawable):
 class Recorder:
     """Collects snapshots into a `Record`; what was collected can be had at any time.
 
-    `name` is the controller's where it is not its own, as in ``mine.py:MyController``.
-
-    Raises ParameterError where a gain of the controller cannot be recorded.
+    `name` is the controller's where it is not its own, as in ``mine.py:MyController``. Raises ParameterError
+    where a gain of the controller cannot be recorded.
     """
 
     environment: Environment
@@ -336,10 +307,8 @@ class Recorder:
         for gain, value in self._gains.items():
             number = isinstance(value, int | float) and abs(value) <= sys.float_info.max
             if not (value is None or isinstance(value, str) or number):
-                raise ParameterError(
-                    f"controller {self.name!r}: {gain}: {shown(value)}, but a finite number was wanted, for "
-                    f"the record"
-                )
+                wanted = "a finite number was wanted, for the record"
+                raise ParameterError(f"controller {self.name!r}: {gain}: {shown(value)}, but {wanted}")
         self._moments: list[tuple[float | Array, ...]] = []
 
     def add(self, snapshot: Snapshot) -> None:
@@ -368,7 +337,9 @@ class Recorder:
 
 
 def nearest_moments(time: Array, rate: float) -> IntArray:
-    """Return which times of (T,) s are nearest to multiples of 1/rate seconds from the first, and the last.
+    """Return which times of (T,) s are nearest to multiples of 1/rate from the first, and the last.
+
+    Of two times as near it is the earlier.
 
     >>> nearest_moments(np.arange(8) * 0.1, rate=4.0).tolist()
     [0, 2, 5, 7]
@@ -394,29 +365,23 @@ def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
         array, moments = saved[name], saved["time"].shape
         wanted = moments if name == "time" else (*moments, robots, 2)
         if array.dtype != np.float64 or array.shape != wanted or len(moments) != 1 or moments == (0,):
-            shape_wanted = "(T,)" if name == "time" else wanted
-            found, needed = f"{array.shape} of {array.dtype}", f"{shape_wanted} of float64"
-            raise InputError(f"{path}: {name} has shape {found}, but {needed} was wanted")
-    arrays = {name: saved[name] for name in ARRAYS}
+            needed = f"{'(T,)' if name == 'time' else wanted} of float64"
+            found = f"{name} has shape {array.shape} of {array.dtype}"
+            raise InputError(f"{path}: {found}, but {needed} was wanted")
     for name, largest in _LARGEST.items():
-        values = arrays[name]
+        values = saved[name]
         good = np.abs(values) <= largest
         if not good.all():
-            raise InputError(
-                f"{path}: {name}: {values[~good][0]:g}, but finite numbers up to {largest:g} were wanted"
-            )
-    if (np.diff(arrays["time"]) <= 0.0).any():
+            found = f"{values[~good][0]:g}, but finite numbers up to {largest:g}"
+            raise InputError(f"{path}: {name}: {found} were wanted")
+    if (np.diff(saved["time"]) <= 0.0).any():
         raise InputError(f"{path}: time: ascending numbers were wanted")
-    return arrays
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that a result depends on."""
-    return dict(_versions())
+    return {name: saved[name] for name in ARRAYS}
 
 
 @cache
-def _versions() -> dict[str, str]:
+def versions() -> Mapping[str, str]:
+    """Return the versions that a result depends on; not to be changed."""
     found = {"python": platform.python_version()}
     for name in ("robocov", "numpy", "scipy", "shapely", "pymunk"):
         try:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field, ValidationInfo, WrapValidator, create_model
 from pydantic_core import PydanticCustomError
@@ -11,15 +12,10 @@ from robocov.conditions import LIMITS as CONDITION_LIMITS
 from robocov.files.documents import Document, read_document, wanted
 from robocov.robots import LIMITS, MOST_ROBOTS, json_key
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-FORMAT = "robocov-run"
-VERSION = 1
-
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
 Number: TypeAlias = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted("the number of a robot, from 1,")]
+Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
 Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
 
@@ -51,19 +47,15 @@ _robots = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted(f"a whole number fr
 _of_teams: dict[str, Any] = {
     json_key(name): (_for_each_robot(low, high, null=null), ...) for name, (low, high, null) in LIMITS.items()
 }
-TeamDocument: Any = create_model("TeamDocument", __base__=Document, robots=(_robots, ...), **_of_teams)
+_Team: Any = create_model("_Team", __base__=Document, robots=(_robots, ...), **_of_teams)
 
 
-class FailureDocument(Document):
-    """When a robot fails."""
-
+class _Failure(Document):
     robot: Number
     time_s: Time
 
 
-class JoinDocument(FailureDocument):
-    """When a robot joins, and where."""
-
+class _Join(_Failure):
     place_m: Point | None
 
 
@@ -71,18 +63,16 @@ _of_conditions: dict[str, Any] = {
     key: (Annotated[number, wanted(words)], ...)
     for name, (low, high, _, key) in CONDITION_LIMITS.items()
     for number, words in [_number(low, high, null=name == "message_rate")]
-} | {"failures": (list[FailureDocument], ...), "joins": (list[JoinDocument], ...), "seed": (Seed, ...)}
-ConditionsDocument: Any = create_model("ConditionsDocument", __base__=Document, **_of_conditions)
+} | {"failures": (list[_Failure], ...), "joins": (list[_Join], ...), "seed": (Seed, ...)}
+_Conditions: Any = create_model("_Conditions", __base__=Document, **_of_conditions)
 
 
-class ControllerDocument(Document):
-    """The controller: its name, which nobody loads, and its gains."""
-
+class _Controller(Document):
     name: Annotated[str, Field(min_length=1), wanted("a name")]
     gains: dict[str, Annotated[float | str | bool | None, wanted("a number, a word or null")]]
 
 
-class TouchDocument(Document):
+class _Touch(Document):
     """From when to when which robots were moved by hand."""
 
     from_s: Time
@@ -90,16 +80,14 @@ class TouchDocument(Document):
     robots: list[Number]
 
 
-class SessionDocument(Document):
-    """Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`."""
+class _Session(Document):
+    """See `robocov_app.demo.kept`."""
 
     began_at_s: Time = 0.0
     start_velocities_m_per_s: list[Point] = Field([])
     robots: list[Number] = Field([])
-    failed: dict[Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")], Point] = (
-        Field({})
-    )
-    touched: list[TouchDocument] = Field([])
+    failed: dict[Key, Point] = Field({})
+    touched: list[_Touch] = Field([])
     control_dt_s: Seconds = 1.0
     repeatable: bool = True
 
@@ -108,23 +96,20 @@ class RunDocument(Document):
     """A run: all that is needed to repeat it, and its summary."""
 
     map: dict[str, Any]
-    controller: ControllerDocument
-    team: TeamDocument
+    controller: _Controller
+    team: _Team
     start: Annotated[str | None, wanted("the name of a start, or null,")]
     starts_m: list[Point] = Field([])
     seed: Annotated[Seed | None, wanted("a whole number from 0, or null,")]
     dt_s: Seconds
     duration_s: Time = 0.0
     lattice: Annotated[int | None, Field(ge=2, le=2048), wanted("a whole number from 2 to 2048")] = None
-    conditions: ConditionsDocument | None = None
-    session: SessionDocument = SessionDocument()
+    conditions: _Conditions | None = None
+    session: _Session = _Session()
     versions: dict[str, str] = Field({})
     summary: dict[str, Any] = Field({})
 
 
 def read_run(path: Path) -> RunDocument:
-    """Return the content of a file ``run.json``.
-
-    Raises InputError with the file, the place in it, the value and what was wanted.
-    """
-    return read_document(path, RunDocument, FORMAT, VERSION)
+    """Return the content of a file ``run.json``; raise `MapError` with the place of what is wrong in it."""
+    return read_document(path, RunDocument, "robocov-run", 1)

@@ -15,9 +15,10 @@ Team files, TOML or JSON, list groups of robots that are alike:
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,14 +35,11 @@ from robocov.errors import (
 )
 from robocov.files.strictjson import parse, read_bytes
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
 DEFAULT_RADIUS = 0.1
 """Radius of a robot in metres where nothing else is said."""
 
 LIMITS: dict[str, tuple[float, float, bool]] = {
-    # name: smallest, largest, may be infinite
+    # smallest, largest, whether it may be infinite
     "radius": (1e-3, 1e3, False),
     "mass": (1e-6, 1e6, False),
     "max_speed": (1e-6, 1e3, False),
@@ -50,16 +48,7 @@ LIMITS: dict[str, tuple[float, float, bool]] = {
     "sensing_range": (0.0, 1e5, True),
     "communication_range": (0.0, 1e5, True),
 }
-"""Ranges of the parameters."""
-UNITS = {
-    "radius": "m",
-    "mass": "kg",
-    "max_speed": "m/s",
-    "max_acceleration": "m/s²",
-    "viscosity": "N s/m",
-    "sensing_range": "m",
-    "communication_range": "m",
-}
+UNITS = dict(zip(LIMITS, ("m", "kg", "m/s", "m/s²", "N s/m", "m", "m"), strict=True))
 _KEY_UNITS = {"m": "m", "kg": "kg", "m/s": "m_per_s", "m/s²": "m_per_s2", "N s/m": "n_s_per_m"}
 
 
@@ -74,12 +63,9 @@ class Team:
 
     Attributes
     ----------
-    radius : m
-        Robots are discs.
-    mass : kg
-        The paper's virtual mass, 1 there.
-    max_speed : m/s
-    max_acceleration : m/s²
+    radius, mass : m, kg
+        Robots are discs; their mass is the paper's virtual one, 1 there.
+    max_speed, max_acceleration : m/s, m/s²
         The kinematic limits, the same for every controller.
     viscosity : N s/m
         nu of equation (28), with the sign that takes energy out.
@@ -88,7 +74,7 @@ class Team:
     communication_range : m
         Two robots are neighbours when both are in range of each other. Infinite: everybody hears everybody.
 
-    Raises ParameterError on a value out of range; the message names the attribute and the value.
+    Raises ParameterError on a value out of range.
     """
 
     radius: Array
@@ -105,19 +91,13 @@ class Team:
             values = frozen(np.atleast_1d(np.asarray(getattr(self, field.name), dtype=float)))
             low, high, infinite = LIMITS[field.name]
             if values.shape != (size,):
-                raise ParameterError(
-                    f"team.{field.name}: {values.shape} values, but one for each of {size} robots was wanted"
-                )
-            good = (values >= low) & (values <= high)
-            if infinite:
-                good |= values == np.inf
+                what = f"{values.shape} values, but one for each of {size} robots was wanted"
+                raise ParameterError(f"team.{field.name}: {what}")
+            good = (values >= low) & (values <= high) | (infinite & (values == np.inf))
             if not good.all():
-                bad = float(values[~good][0])
-                also = " or null for no limit" if infinite else ""
-                raise ParameterError(
-                    f"team.{field.name}: {shown(bad)} {UNITS[field.name]}, "
-                    f"but a number from {low:g} to {high:g}{also} was wanted"
-                )
+                found = f"{shown(float(values[~good][0]))} {UNITS[field.name]}"
+                wanted = f"a number from {low:g} to {high:g}{' or null for no limit' if infinite else ''}"
+                raise ParameterError(f"team.{field.name}: {found}, but {wanted} was wanted")
             object.__setattr__(self, field.name, values)
 
     @classmethod
@@ -182,10 +162,7 @@ class Team:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Team:
-        """Return the team that `to_dict` wrote.
-
-        Raises ParameterError when a key is missing or a value is not a number.
-        """
+        """Return the team that `to_dict` wrote; raise ParameterError when a value is missing or no number."""
         try:
             n = int(plain["robots"])
             arrays = []
@@ -203,8 +180,6 @@ MOST_ROBOTS = 10_000
 NO_LIMIT = "null"
 """Stands for a range without limit where there is no null."""
 
-_RANGES = ("sensing_range", "communication_range")
-
 
 def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = None) -> Team:
     """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
@@ -214,12 +189,8 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
     Raises InputError with the file, the key, the value and what was wanted.
     """
     path = Path(path)
-    where = one_line(path)
-    content = read_bytes(path)
-    if path.suffix.lower() == ".json":
-        document = parse(content, where)
-    else:
-        document = _toml(content, where)
+    where, content = one_line(path), read_bytes(path)
+    document = parse(content, where) if path.suffix.lower() == ".json" else _toml(content, where)
     if not isinstance(document, dict):
         raise InputError(f"{where}: {shown(document)}, but an object with a list group was wanted")
     for key in document:
@@ -234,18 +205,14 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
 def team_of_groups(
     groups: object, path: tuple[str | int, ...], defaults: Mapping[str, float | None] | None = None
 ) -> Team:
-    """Return the team of groups as they stand in a file at a path of keys; see `read_team`.
-
-    Raises InputError, which begins with the place.
-    """
+    """Return the team of groups as they stand in a file at a path of keys, with which errors begin."""
     if not isinstance(groups, list) or not groups:
         found = "missing" if groups is None else shown(groups)
         raise InputError(f"{place(path)}: {found}, but at least one table [[{place(path)}]] was wanted")
     parts = [_group(group, (*path, k), dict(defaults or {})) for k, group in enumerate(groups)]
-    if sum(map(len, parts)) > MOST_ROBOTS:
-        raise InputError(
-            f"{place(path)}: {sum(map(len, parts))} robots, but at most {MOST_ROBOTS} were wanted"
-        )
+    robots = sum(map(len, parts))
+    if robots > MOST_ROBOTS:
+        raise InputError(f"{place(path)}: {robots} robots, but at most {MOST_ROBOTS} were wanted")
     return Team.joined(parts)
 
 
@@ -268,7 +235,7 @@ def _group(group: object, path: tuple[str | int, ...], values: dict[str, float |
 
 
 def _value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
-    if name in _RANGES and value in (None, NO_LIMIT):
+    if LIMITS[name][2] and value in (None, NO_LIMIT):
         return None
     if not is_number(value):
         raise InputError(f"{place(path)}: {shown(value)}, but a number was wanted")
