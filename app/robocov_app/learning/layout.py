@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.compiled import kernel
-from robocov.controllers.cells import cells_seen
+from robocov.controllers.base import cells_seen
 from robocov.errors import ParameterError, shown
 from robocov.observation.scans import MOST_RAYS
 

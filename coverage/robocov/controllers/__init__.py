@@ -16,17 +16,19 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
-from robocov.controllers.base import Controller, Information, information_of, informed
-from robocov.controllers.dispersion import Dispersion
+from robocov.controllers.base import (
+    Controller,
+    IndividualController,
+    Individually,
+    Information,
+    OwnView,
+    information_of,
+    informed,
+)  # fmt: skip
 from robocov.controllers.gains import gain_values, gains_of, with_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
-from robocov.controllers.howard import Howard
-from robocov.controllers.individual import IndividualController, Individually, OwnView
-from robocov.controllers.lloyd import Lloyd
-from robocov.controllers.poduri import Poduri
-from robocov.controllers.range_limited import RangeLimited
-from robocov.controllers.rapf import Rapf
-from robocov.controllers.rpf import Rpf
+from robocov.controllers.lloyd import Lloyd, RangeLimited
+from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import Source, class_in_file, fault_of
 from robocov.errors import ParameterError, unknown_name

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import Information
+from robocov.controllers.base import Law
 from robocov.controllers.driving import (
     approach,
     avoid,
@@ -18,7 +17,7 @@ from robocov.controllers.driving import (
     offsets_from_neighbours,
     with_nearest,
 )
-from robocov.controllers.gains import WithGains, gain, response_time_gain
+from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
@@ -114,7 +113,7 @@ class AtlasMemory:
 
 
 @dataclass(frozen=True)
-class Atlas(WithGains):
+class Atlas(Law):
     """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
 
     Twice a second every robot scans, and enters what it sees into its own grid (`DiscoveredMap`). It also
@@ -144,11 +143,10 @@ class Atlas(WithGains):
     only considers its nearest ones, as they are, and looks for its own place.
     """
 
-    name: ClassVar[str] = "atlas"
-    label: ClassVar[str] = "Atlas"
-    summary: ClassVar[str] = "plans the team's placement on the map that each robot discovers itself"
-    information: ClassVar[Information] = "own"
-    scanning: ClassVar[Scanning] = Scanning(rays=120, period=0.5)
+    name = "atlas"
+    label = "Atlas"
+    summary = "plans the team's placement on the map that each robot discovers itself"
+    scanning = Scanning(rays=120, period=0.5)
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
@@ -368,10 +366,10 @@ def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:
 class AtlasShared(Atlas):
     """`Atlas`, but robots that hear each other also tell each other their maps."""
 
-    name: ClassVar[str] = "atlas-shared"
-    label: ClassVar[str] = "Atlas, shared maps"
-    summary: ClassVar[str] = "as Atlas, with the maps merged among the robots that hear each other"
-    information: ClassVar[Information] = "shared map"
+    name = "atlas-shared"
+    label = "Atlas, shared maps"
+    summary = "as Atlas, with the maps merged among the robots that hear each other"
+    information = "shared map"
 
     def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         return [known.merged(maps[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(maps)]

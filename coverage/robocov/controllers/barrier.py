@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.cells import cells_seen, choice_of_cells
+from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
-from robocov.controllers.gains import WithGains, gain, response_time_gain
+from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.potential import separation
 from robocov.robots import Team
-from robocov.voronoi.delaunay import Mesh
 
 _ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe distance, is rounded
 _TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to be
@@ -32,17 +30,14 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BarrierMemory:
-    """Memory of the robots: bodies and limits of all, neighbours heard, hits of the last scan."""
+class BarrierMemory(Memory):
+    """Memory of the robots, with the neighbours heard."""
 
-    team: Team
     heard: Heard | None = None
-    returns: Array | None = None
-    triangulation: Mesh | None = None
 
 
 @dataclass(frozen=True)
-class Barrier(WithGains):
+class Barrier(Law):
     """Lloyd's algorithm, filtered by safety barrier certificates (Wang, Ames and Egerstedt 2017).
 
     Two robots that brake as hard as they can must come to rest at the safe distance D_s or before:
@@ -66,12 +61,10 @@ class Barrier(WithGains):
     the documentation of MathWorks' barrier certificate block has it.
     """
 
-    name: ClassVar[str] = "barrier"
-    label: ClassVar[str] = "LA, safe"
-    summary: ClassVar[str] = (
-        "Lloyd's algorithm with safety barrier certificates (Wang, Ames and Egerstedt 2017)"
-    )
-    scanning: ClassVar[Scanning] = Scanning(rays=72, period=0.1)
+    name = "barrier"
+    label = "LA, safe"
+    summary = "Lloyd's algorithm with safety barrier certificates (Wang, Ames and Egerstedt 2017)"
+    scanning = Scanning(rays=72, period=0.1)
 
     safe_gap: float = gain(0.05, "m", "least distance between surfaces: D_s less the radii", high=100.0)
     gamma: float = gain(20.0, "s/m²", "how fast h may fall, as gamma h³", low=1e-3)
@@ -81,7 +74,6 @@ class Barrier(WithGains):
     cells: str = choice_of_cells()
 
     def begin(self, region: Region, team: Team) -> BarrierMemory:
-        """Return what the robots know of themselves."""
         return BarrierMemory(team)
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
@@ -94,12 +86,9 @@ class Barrier(WithGains):
         forces = chosen * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
         limit = team.max_acceleration / np.maximum(np.hypot(*wanted.T), 1e-300)
         changed = (chosen - wanted * np.minimum(1.0, limit)[:, None]) * team.mass[:, None]
+        terms = {"attraction": forces - changed, "barrier": changed}
         return Decision(
-            forces=forces,
-            goals=cells.centroid,
-            terms={"attraction": forces - changed, "barrier": changed},
-            cells=cells,
-            memory=replace(memory, triangulation=cells.triangulation),
+            forces, cells.centroid, terms, cells, replace(memory, triangulation=cells.triangulation)
         )
 
     def certified(

@@ -1,16 +1,38 @@
-"""What a controller is."""
+"""What a controller is: a law for the whole team, or one that is asked for each robot in turn."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, cast, get_args, runtime_checkable
+from dataclasses import dataclass
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Literal,
+    Protocol,
+    TypeAlias,
+    cast,
+    get_args,
+    runtime_checkable,
+)
 
+import numpy as np
+
+from robocov.controllers.gains import choice, validate_gains
 from robocov.errors import ParameterError, shown
+from robocov.observation import Decision
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.weighted_cells import weighted_partition
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robocov.arrays import Array
     from robocov.environment import Environment
-    from robocov.observation import Decision, Observations
+    from robocov.observation import Observations
     from robocov.observation.region import Region
     from robocov.robots import Team
+    from robocov.voronoi.delaunay import Mesh
+    from robocov.voronoi.weighted_cells import WeightedCells
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
 """What a law goes by: what the robot itself senses and hears, maps that neighbours tell each other as
@@ -79,3 +101,129 @@ def informed(controller: Controller, environment: Environment) -> Controller:
             f"is {information!r}; 'whole map' was wanted"
         )
     return cast(Controller, tell(environment))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """Memory of the robots."""
+
+    team: Team  # a robot knows its own body and limits
+    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
+    triangulation: Mesh | None = None  # from which the next cells start
+
+
+class Law:
+    """Base class of the built-in controllers, which are dataclasses: their gains are checked."""
+
+    name: ClassVar[str]
+    label: ClassVar[str]
+    summary: ClassVar[str]
+    information: ClassVar[Information] = "own"
+
+    def __post_init__(self) -> None:
+        validate_gains(self)
+
+    def begin(self, region: Region, team: Team) -> Any:
+        """Return what the robots know of themselves."""
+        return Memory(team)
+
+
+def choice_of_cells() -> Any:
+    """Declare the gain that says by what the cells of a law are divided, as a dataclass field."""
+    meaning = (
+        "whose a place is: the nearest robot's, or the one's that is there first at its own largest speed"
+    )
+    return choice("distance", ("distance", "time"), meaning)
+
+
+def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPartition | WeightedCells:
+    """Return each robot's cell as it knows it, by "distance" or "time", starting from a triangulation.
+
+    By time the cells are multiplicatively weighted, with the speeds that robots tell each other; where all
+    are equally fast, or no speed is told, they are the same as by distance, bit for bit.
+    """
+    known = seen.region, seen.neighbours, warm, seen.reported_positions, seen.density
+    if measure == "time" and seen.max_speeds is not None:
+        return weighted_partition(seen.positions, seen.max_speeds, *known)
+    return partition(seen.positions, *known)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnView:
+    """All that one robot knows: what it senses and hears, and the convex outer boundary."""
+
+    number: int  # its own, from 0
+    position: Array  # (2,) m
+    velocity: Array  # (2,) m/s
+    neighbours: Array  # (k, 2) m, of the robots that it hears, as the last message of each has it
+    obstacle_point: Array | None  # (2,) m, the closest obstacle or boundary point in sensing range
+    region: Region
+    time: float  # s
+    _cells: VoronoiPartition
+
+    @property
+    def centroid(self) -> Array:
+        """Centroid of the robot's Voronoi cell, (2,) m."""
+        return np.asarray(self._cells.centroid[self.number])
+
+    @property
+    def cell(self) -> Array:
+        """The robot's Voronoi cell, (k, 2) m counter-clockwise."""
+        return self._cells.polygons[self.number]
+
+
+@runtime_checkable
+class IndividualController(Protocol):
+    """A law for one robot: one method from what it knows to the force that it wants."""
+
+    def force(self, own: OwnView) -> Sequence[float] | Array:
+        """Return the force in newtons, two numbers."""
+
+
+class Individually:
+    """Makes a controller for the team of a law for one robot: it is asked for every robot in turn.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Home:
+    ...     stiffness: float = 0.5
+    ...     def force(self, own):
+    ...         return self.stiffness * (own.centroid - own.position)
+    >>> Individually(Home()).name
+    'Home'
+    """
+
+    def __init__(self, law: IndividualController) -> None:
+        self.law = law
+        kind = type(law)
+        self.name = str(getattr(law, "name", kind.__name__))
+        self.label = str(getattr(law, "label", self.name))
+        self.summary = str(getattr(law, "summary", (kind.__doc__ or "").strip().split("\n")[0]))
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered yet; later, the triangulation from which the next cells start."""
+
+    def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
+        """Ask the law for each robot's force."""
+        cells = partition(
+            seen.positions, seen.region, seen.neighbours, memory, seen.reported_positions, seen.density
+        )
+        forces = np.empty_like(seen.positions)
+        for i in range(len(forces)):
+            point = seen.obstacle_points[i]
+            own = OwnView(
+                number=i,
+                position=seen.positions[i].copy(),
+                velocity=seen.velocities[i].copy(),
+                neighbours=seen.neighbour_positions(i),
+                obstacle_point=None if np.isnan(point[0]) else point.copy(),
+                region=seen.region,
+                time=seen.time,
+                _cells=cells,
+            )
+            force = np.asarray(self.law.force(own), dtype=float)
+            if force.shape != (2,):
+                told = f"gave {shown(force.tolist())}, but two numbers in newtons were wanted"
+                raise ParameterError(f"controller {self.name!r}: force(own) {told}")
+            forces[i] = force
+        return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=cells.triangulation)

@@ -137,13 +137,6 @@ def validate_gains(controller: Any) -> None:
         object.__setattr__(controller, name, known.validated(getattr(controller, name), where))
 
 
-class WithGains:
-    """Base class of controllers, dataclasses, whose gains are checked when they are made."""
-
-    def __post_init__(self) -> None:
-        validate_gains(self)
-
-
 def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     """Return an instance of the controller class `kind` with the given gains.
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
+from robocov.controllers.base import Law
 from robocov.controllers.driving import approach, drive
-from robocov.controllers.gains import WithGains, gain, response_time_gain
+from robocov.controllers.gains import gain, response_time_gain
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError
@@ -37,7 +37,7 @@ class GeodesicMemory:
 
 
 @dataclass(frozen=True)
-class GeodesicLloyd(WithGains):
+class GeodesicLloyd(Law):
     """Lloyd's algorithm with geodesic Voronoi cells of the known map.
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) descend the cost with the
@@ -56,12 +56,10 @@ class GeodesicLloyd(WithGains):
     what is generally known of the two papers, not from their text; the papers' cells are those of a grid.
     """
 
-    name: ClassVar[str] = "geodesic-lloyd"
-    label: ClassVar[str] = "Geodesic Lloyd"
-    summary: ClassVar[str] = (
-        "Lloyd's algorithm with geodesic cells, knowing the whole map (Pimenta 2008, Bhattacharya 2014)"
-    )
-    information: ClassVar[str] = "whole map"
+    name = "geodesic-lloyd"
+    label = "Geodesic Lloyd"
+    summary = "Lloyd's algorithm with geodesic cells, knowing the whole map (Pimenta 2008, Bhattacharya 2014)"
+    information = "whole map"
 
     exponent: float = gain(2.0, "1", "s: f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
     lattice: float = gain(48.0, "cells", "of the lattice along a side", low=4.0, high=512.0, whole=True)

@@ -1,39 +1,21 @@
-"""LA: Lloyd's algorithm under kinematic limits."""
+"""LA, Lloyd's algorithm under kinematic limits: on whole cells, or on their parts within a range."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robocov.controllers.cells import cells_seen, choice_of_cells
-from robocov.controllers.gains import WithGains, choice, gain
+from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
+from robocov.controllers.driving import approach, drive
+from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
-from robocov.observation.region import Region
-from robocov.robots import Team
-from robocov.voronoi.delaunay import Mesh
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LloydMemory:
-    """What the robots remember.
-
-    Attributes
-    ----------
-    team : Team
-        A robot knows its own mass, viscosity and largest speed.
-    triangulation : Mesh or None
-        From which the next cells start.
-    """
-
-    team: Team
-    triangulation: Mesh | None = None
+from robocov.voronoi.disc_cells import disc_limited, disc_polygons
 
 
 @dataclass(frozen=True)
-class Lloyd(WithGains):
+class Lloyd(Law):
     """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
 
     Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the
@@ -43,37 +25,66 @@ class Lloyd(WithGains):
     With `cells` by time, where robots are not equally fast, the goal may lie outside of the cell.
     """
 
-    name: ClassVar[str] = "lloyd"
-    label: ClassVar[str] = "LA"
-    summary: ClassVar[str] = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
+    name = "lloyd"
+    label = "LA"
+    summary = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
 
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
-    response_time: float = gain(
-        0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0
-    )
+    response_time: float = response_time_gain()
     cells: str = choice_of_cells()
     target: str = choice("centroid", TARGETS, MEANING)
     height: float = gain(1.0, "m", HEIGHT, low=1e-6)
 
-    def begin(self, region: Region, team: Team) -> LloydMemory:
-        """Return what the robots know of themselves."""
-        return LloydMemory(team)
-
-    def decide(self, seen: Observations, memory: LloydMemory) -> Decision:
-        """Return the forces that drive each robot to its centroid."""
-        team = memory.team
+    def decide(self, seen: Observations, memory: Memory) -> Decision:
         cells = cells_seen(seen, self.cells, memory.triangulation)
         goals = targets(cells, seen.density, self.target, self.height)
-        offset = goals - seen.positions
-        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-        speed_per_metre = np.minimum(self.k_prop, team.max_speed / np.maximum(distance, 1e-300))
-        wanted = offset * speed_per_metre[:, None]
-        drive = (wanted - seen.velocities) * (team.mass / self.response_time)[:, None]
-        forces = drive + seen.velocities * team.viscosity[:, None]
-        return Decision(
-            forces=forces,
-            goals=goals,
-            terms={"attraction": forces},
-            cells=cells,
-            memory=LloydMemory(team, cells.triangulation),
-        )
+        wanted = approach(goals - seen.positions, self.k_prop, memory.team.max_speed)
+        forces = drive(wanted, seen, memory.team, self.response_time)
+        memory = replace(memory, triangulation=cells.triangulation)
+        return Decision(forces, goals, {"attraction": forces}, cells, memory)
+
+
+@dataclass(frozen=True)
+class RangeLimited(Law):
+    """Lloyd's algorithm with limited-range interactions (Cortés, Martínez and Bullo 2005).
+
+    The cell of a robot is the part of its Voronoi cell within half the communication range r, so that
+    the robots it hears determine it: whoever is farther than r is farther than r/2 from all of it. Moving
+    to the centroid of that part descends the locational cost with f = min(|q - p|², (r/2)²), which is
+    what a team can descend that hears no farther: two times the part's mass times the way to its
+    centroid is the gradient, (12) with the limited cell (the paper's own section on limited-range
+    interactions). Where everybody's cell lies within r/2 it is Lloyd's algorithm, and it is driven as
+    that is.
+
+    The centroid is exact with density 1; another density is integrated over a polygon, whose chords
+    stand for the arcs (see `robocov.voronoi.disc_cells`).
+
+    Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text: cells,
+    cost and gradient. Decided here: that the motion is Lloyd's, straight to the centroid with the limits of
+    the robots, and that r may be less than the communication range, which in a simulation need not end.
+    """
+
+    name = "range-limited"
+    label = "LA, limited range"
+    summary = "Lloyd's algorithm on cells within half the interaction range (Cortés, Martínez and Bullo 2005)"
+
+    interaction_range: float | None = gain(
+        6.0, "m", "r, at most the communication range; null for that range itself", low=0.01, optional=True
+    )
+    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    response_time: float = response_time_gain()
+
+    def decide(self, seen: Observations, memory: Memory) -> Decision:
+        cells = cells_seen(seen, "distance", memory.triangulation)
+        reach = np.inf if self.interaction_range is None else self.interaction_range
+        radius = 0.5 * np.minimum(memory.team.communication_range, reach)
+        area, offset = disc_limited(cells.edges, radius)
+        if seen.density is not None and not seen.density.uniform:
+            limited = disc_polygons(cells.edges, radius)
+            uniform = seen.positions + offset
+            _, centroid = seen.density.mass_and_centroid(limited, seen.positions, area, uniform)
+            offset = centroid - seen.positions
+        wanted = approach(offset, self.k_prop, memory.team.max_speed)
+        forces = drive(wanted, seen, memory.team, self.response_time)
+        memory = replace(memory, triangulation=cells.triangulation)
+        return Decision(forces, seen.positions + offset, {"attraction": forces}, cells, memory)

@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, ComplexArray, frozen
 from robocov.compiled import kernel
-from robocov.controllers.cells import cells_seen, choice_of_cells
+from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
-from robocov.controllers.gains import WithGains, gain, response_time_gain
+from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings
 from robocov.robots import Team
-from robocov.voronoi.delaunay import Mesh
 
 _GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met
 _EAGERNESS = 4.0  # speed in 1/s with which the distance to what is close may fall to the clearance
@@ -73,18 +72,15 @@ class Bug:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TangentBugMemory:
-    """Memory of the robots."""
+class TangentBugMemory(Memory):
+    """Memory of the robots, with the ways that they are on."""
 
-    team: Team  # a robot knows its own body and limits
     bugs: tuple[Bug, ...] = ()
-    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
     met: tuple[ComplexArray, ...] = ()  # (w,) squares in which each has met something: column + i row
-    triangulation: Mesh | None = None
 
 
 @dataclass(frozen=True)
-class TangentBug(WithGains):
+class TangentBug(Law):
     """Voronoi coverage of non-convex environments (Breitenmoser et al., ICRA 2010).
 
     The goal of every robot is the centroid of its Voronoi cell of the convex region, as Lloyd's
@@ -109,12 +105,10 @@ class TangentBug(WithGains):
     others may be as large as the largest of the team is taken for granted.
     """
 
-    name: ClassVar[str] = "tangentbug"
-    label: ClassVar[str] = "LA + TangentBug"
-    summary: ClassVar[str] = (
-        "Lloyd's algorithm, with TangentBug to go round obstacles (Breitenmoser et al. 2010)"
-    )
-    scanning: ClassVar[Scanning] = Scanning(rays=120, period=0.1)
+    name = "tangentbug"
+    label = "LA + TangentBug"
+    summary = "Lloyd's algorithm, with TangentBug to go round obstacles (Breitenmoser et al. 2010)"
+    scanning = Scanning(rays=120, period=0.1)
 
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
@@ -130,11 +124,9 @@ class TangentBug(WithGains):
     cells: str = choice_of_cells()
 
     def begin(self, region: Region, team: Team) -> TangentBugMemory:
-        """Return what the robots know of themselves."""
         return TangentBugMemory(team)
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
-        """Return the forces that drive each robot along its way."""
         cells = cells_seen(seen, self.cells, memory.triangulation)
         bugs, met = memory.bugs, memory.met
         returns = last_returns(seen, memory.returns)
@@ -149,13 +141,8 @@ class TangentBug(WithGains):
         wanted = self._wanted(seen, memory.team, way, passing, points)
         forces = drive(wanted, seen, memory.team, self.response_time)
         kept = [own if bug.aim is None else bug.aim for bug, own in zip(bugs, cells.centroid, strict=True)]
-        return Decision(
-            forces=forces,
-            goals=np.array(kept),
-            terms={"attraction": forces},
-            cells=cells,
-            memory=TangentBugMemory(memory.team, bugs, returns, met, cells.triangulation),
-        )
+        memory = TangentBugMemory(memory.team, returns, cells.triangulation, bugs, met)
+        return Decision(forces, np.array(kept), {"attraction": forces}, cells, memory)
 
     def _wanted(self, seen: Observations, team: Team, way: Array, passing: Array, points: Array) -> Array:
         """Return the velocities towards the next way-points, slowed before what is close, (n, 2) m/s."""

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions
-from robocov.controllers import Rapf, Rpf, gain_values, make_controller
-from robocov.controllers.individual import Individually
+from robocov.controllers import Individually, Rapf, Rpf, gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.atomic import written

@@ -26,9 +26,8 @@ from voronoi_cases import (
 
 from robocov.arrays import Array
 from robocov.compiled import kernel
-from robocov.controllers import Individually, Lloyd, Rapf
+from robocov.controllers import Individually, Lloyd, OwnView, Rapf
 from robocov.controllers.base import Controller
-from robocov.controllers.individual import OwnView
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation.region import Region
 from robocov.robots import Team
