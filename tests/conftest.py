@@ -9,8 +9,14 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov_app import progress
 
 # no test finds, or leaves, anything in the cache of whoever runs it

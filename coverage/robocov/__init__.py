@@ -43,9 +43,16 @@ if TYPE_CHECKING:
         WeightedArea,
         WeightedPolygons,
     )
-    from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-    from robocov.environment.obstacle_path import ObstaclePath
-    from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+    from robocov.environment import (
+        CircleObstacle,
+        DiscStart,
+        Environment,
+        ObstaclePath,
+        PointsStart,
+        PolygonObstacle,
+        UniformStart,
+        WallObstacle,
+    )
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
     from robocov.files.array_files import ArrayCache
     from robocov.generator import GENERATORS, generated_map
@@ -76,9 +83,8 @@ _NAMES = {
     "cost": "CoverageCost CoverageResult",
     "cost.momentary_cost": "MomentaryCost",
     "density": "Density Gaussian Gaussians Raster Uniform WeightedArea WeightedPolygons",
-    "environment": "CircleObstacle Environment PolygonObstacle WallObstacle",
-    "environment.obstacle_path": "ObstaclePath",
-    "environment.starts": "DiscStart PointsStart UniformStart",
+    "environment": "CircleObstacle DiscStart Environment ObstaclePath PointsStart PolygonObstacle "
+    "UniformStart WallObstacle",
     "errors": "InputError MapError OutputError ParameterError RobocovError StartError",
     "files.array_files": "ArrayCache",
     "generator": "GENERATORS generated_map",

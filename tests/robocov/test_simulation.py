@@ -20,8 +20,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS as ALL
 from robocov.controllers import Controller, Lloyd, Rapf, Rpf, make_controller
 from robocov.cost import CoverageCost
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts

@@ -2,8 +2,14 @@
 
 import numpy as np
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record

@@ -2,8 +2,14 @@
 
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov_app.editor import arranging, booleans, clipboard, edits, simplifying, vertices
 from robocov_app.editor.background import Background

@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart
 from robocov_app.sweep.study import Study, StudyMap
 
 ROOM = Environment(

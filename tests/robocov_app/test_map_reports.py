@@ -2,8 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, Environment, WallObstacle
 from robocov.mapfile.check import check_map
 from robocov_app.map_reports import report_lines
 

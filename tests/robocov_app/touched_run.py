@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.demo.costs import DirectCosts
 from robocov_app.demo.desk import Desk
 from robocov_app.demo.lane import with_failed

@@ -13,8 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.demo.editing import SHORTEST, words_for
@@ -23,8 +29,7 @@ from robocov_app.editor.plane import ring_near, tenths
 from robocov_app.editor.selection import Change, Selection, called
 
 if TYPE_CHECKING:
-    from robocov.environment import Obstacle, Point, Ring
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
 
 _LONGEST_NAME = 100
 

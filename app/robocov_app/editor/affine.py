@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.environment import PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.plane import cos_sin, ring_near, tenths
 
@@ -17,8 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from robocov.arrays import Array
-    from robocov.environment import Obstacle, Point, Ring
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
 
 _ALIKE = 1e-12
 """Relative difference of what is the same but for rounding."""

@@ -15,8 +15,7 @@ import numpy as np
 import shapely
 from shapely import GeometryCollection, LineString, Polygon
 
-from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, Environment, PointsStart, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.files.documents import check_header
 from robocov.files.strictjson import located, parse, require_json
@@ -35,8 +34,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.density import Density
-    from robocov.environment import Obstacle, Point, Ring
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
 
 BOUNDARY: Final = -1
 """Stands for the boundary where obstacles have their keys."""

@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from robocov.environment import WallObstacle
-from robocov.environment.starts import PointsStart
+from robocov.environment import PointsStart, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor import edits
 from robocov_app.editor.coordinates import next_point_of, size_of

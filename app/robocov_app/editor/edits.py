@@ -13,8 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor import vertices
@@ -51,8 +50,7 @@ from robocov_app.editor.plane import tenths
 from robocov_app.editor.selection import Change, Selection, called, exchanged
 
 if TYPE_CHECKING:
-    from robocov.environment import Obstacle
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, StartSpec
     from robocov_app.editor.background import Background
 
 __all__ = [

@@ -10,16 +10,14 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPoint, Polygon
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array
-    from robocov.environment import Obstacle, Point, Ring, WallObstacle
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec, WallObstacle
 
 _FLAT = 1e-9
 """An outline whose area is below this part of its width or height squared is a line."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from robocov.environment import CircleObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor import edits, vertices
 from robocov_app.editor.coordinates import angle_of, length_of, point_of

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import DiscStart, PointsStart
 from robocov_app.demo.overlays import tag
 from robocov_app.editor.drawn_rings import outline_of
 from robocov_app.editor.tool import apart, length_words
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array
-    from robocov.environment import Point
-    from robocov.environment.obstacle_path import ObstaclePath
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import ObstaclePath, Point, StartSpec
     from robocov_app.editor.grips import Grip
     from robocov_app.editor.snapping import Guide
     from robocov_app.editor.tool import Preview

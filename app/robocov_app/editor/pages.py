@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.demo.actions import key_words
 from robocov_app.demo.pages import GAP, MARGIN, WIDE, columns
 from robocov_app.editor.actions import all_actions

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.environment.obstacle_path import ObstaclePath, Repeat
+from robocov.environment import ObstaclePath, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.plane import nearest_on, ring_near

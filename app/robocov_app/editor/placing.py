@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.adding import free_name

@@ -16,8 +16,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.environment.obstacle_path import in_the_way, swept_area
-from robocov.environment.starts import DiscStart, PointsStart, Start
+from robocov.environment import DiscStart, PointsStart, Start, in_the_way, swept_area
 from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
 from robocov.mapfile.rules import check_rules
@@ -29,7 +28,7 @@ from robocov_app.editor.selection import called, rings_of
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import StartSpec
 
 _LONGEST_TEXT = 10_000
 

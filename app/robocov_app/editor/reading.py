@@ -5,16 +5,22 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.obstacle_path import REPEATS, ObstaclePath
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    REPEATS,
+    CircleObstacle,
+    DiscStart,
+    ObstaclePath,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError, Mistake, place, shown_json, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from robocov.environment import Obstacle, Point, Ring
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
     from robocov.errors import JsonPath
 
 _KEYS = {

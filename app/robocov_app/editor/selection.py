@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov_app.demo.editing import words_for
 from robocov_app.editor.document import BOUNDARY, Item, Owner, Sketch
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array
-    from robocov.environment import Obstacle, Point
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, StartSpec
 
 
 @dataclass(frozen=True, slots=True)

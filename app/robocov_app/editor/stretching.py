@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor import edits
 from robocov_app.editor.coordinates import length_of, point_of, size_of
 from robocov_app.editor.drawing import SAME

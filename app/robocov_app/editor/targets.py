@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from robocov.environment import CircleObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, WallObstacle
 from robocov_app.editor.document import BOUNDARY, Owner, Sketch
 from robocov_app.editor.plane import nearest_on
 from robocov_app.editor.selection import Vertex, ring_points

@@ -12,8 +12,7 @@ from robocov.errors import MapError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robocov.environment import Obstacle, Point, Ring
-    from robocov.environment.starts import StartSpec
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
     from robocov_app.editor.desk import Desk
     from robocov_app.editor.snapping import Guide
 

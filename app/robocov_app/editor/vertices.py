@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile.models import SMALLEST
 from robocov_app.editor.corners import bevelled as bevelled

@@ -10,8 +10,15 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import GAP, DiscStart, PointsStart, StartSpec, UniformStart
+from robocov.environment import (
+    START_GAP,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    StartSpec,
+    UniformStart,
+)
 from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
@@ -434,7 +441,7 @@ def _obstacles(solid: list[Polygon], digits: int, told: _Told) -> tuple[PolygonO
 
 def _clearance(shaping: Shaping) -> float:
     """Return how far from walls a robot starts, m: the rules of maps want room for the usual one."""
-    return max(DEFAULT_RADIUS, shaping.radius) * (1 + GAP)
+    return max(DEFAULT_RADIUS, shaping.radius) * (1 + START_GAP)
 
 
 def _require_few(count: int, what: str, most: int, where: str) -> None:
@@ -456,8 +463,8 @@ def _require_room(parts: list[Polygon], shaping: Shaping, where: str) -> None:
         if widest >= clearance:
             return
     raise MapError(
-        f"{where}: no place is wide enough for a robot of radius {clearance / (1 + GAP):g} m "
-        f"(the widest is for one of {widest / (1 + GAP):.3g} m): is the scale right?"
+        f"{where}: no place is wide enough for a robot of radius {clearance / (1 + START_GAP):g} m "
+        f"(the widest is for one of {widest / (1 + START_GAP):.3g} m): is the scale right?"
     )
 
 

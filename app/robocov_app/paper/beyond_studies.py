@@ -169,7 +169,7 @@ def hot_spots(environment: Environment, seed: int) -> Gaussians:
     seed : int
         The same seed gives the same density.
     """
-    from robocov.environment.starts import UniformStart
+    from robocov.environment import UniformStart
 
     start = replace(environment, starts={"uniform": UniformStart()}).start("uniform")
     centres = start.sample(HOT_SPOTS, seed=seed, radius=0.3)

@@ -17,8 +17,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from robocov.environment import Environment
-from robocov.environment.starts import DiscStart, StartSpec, UniformStart
+from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
 from robocov.errors import StartError
 
 KINDS = ("corner", "centre", "uniform")

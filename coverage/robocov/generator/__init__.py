@@ -10,9 +10,8 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
-from robocov.environment import Environment, Obstacle
+from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart
 from robocov.environment.passages import narrowest_gap
-from robocov.environment.starts import DiscStart, StartSpec, UniformStart
 from robocov.errors import MapError, ParameterError, checked, is_number, shown, unknown_name
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave

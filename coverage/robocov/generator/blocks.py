@@ -10,8 +10,7 @@ import shapely
 from shapely import Polygon
 from shapely.affinity import scale
 
-from robocov.environment import Obstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
 # streets of a town bend by about so much (standard deviation, radians): each is taken as often

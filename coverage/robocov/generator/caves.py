@@ -17,9 +17,8 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import Obstacle, PolygonObstacle
+from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.environment.passages import Gap, gaps_narrower
-from robocov.environment.starts import DiscStart
 from robocov.generator.request import AREA_TOLERANCE, Request
 
 _WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber

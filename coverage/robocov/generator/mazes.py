@@ -20,8 +20,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import BoolArray
-from robocov.environment import Obstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import DiscStart, Obstacle, WallObstacle
 from robocov.generator.request import AREA_TOLERANCE, Request
 
 Cell: TypeAlias = tuple[int, int]

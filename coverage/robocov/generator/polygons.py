@@ -8,8 +8,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array
-from robocov.environment import Obstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
 MIX = {"convex": 0.6, "L": 0.2, "U": 0.2}

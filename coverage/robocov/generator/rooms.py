@@ -13,8 +13,7 @@ import shapely
 from scipy.cluster.hierarchy import DisjointSet
 from shapely import Polygon
 
-from robocov.environment import CircleObstacle, Obstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.generator.request import Request
 
 _CORRIDOR, _MANY = 0.5, 5  # chance of a corridor across a plan, and the least number of rooms for one

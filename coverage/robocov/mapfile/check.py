@@ -10,10 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from robocov.environment import Environment, PolygonObstacle, Ring, WallObstacle
-from robocov.environment.obstacle_path import in_the_way, swept_area
+from robocov.environment import (
+    START_GAP,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    Ring,
+    WallObstacle,
+    in_the_way,
+    swept_area,
+)
 from robocov.environment.passages import Gap, narrowest_gap
-from robocov.environment.starts import GAP, DiscStart, PointsStart
 from robocov.errors import StartError, listed, place
 from robocov.robots import DEFAULT_RADIUS
 
@@ -232,6 +240,6 @@ def _start_report(environment: Environment, name: str, radius: float) -> StartRe
     if isinstance(spec, PointsStart):
         return StartReport(name, "points", len(spec.positions))
     # robots in the densest packing, a hexagonal one
-    cell = 2 * math.sqrt(3) * (radius * (1 + GAP)) ** 2
+    cell = 2 * math.sqrt(3) * (radius * (1 + START_GAP)) ** 2
     capacity = max(1, int(environment.start(name).room(radius).area / cell))
     return StartReport(name, "disc" if isinstance(spec, DiscStart) else "uniform", capacity)

@@ -19,9 +19,16 @@ from robocov.density import (
     WeightedArea,
     WeightedPolygons,
 )
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath, Repeat
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    ObstaclePath,
+    PointsStart,
+    PolygonObstacle,
+    Repeat,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import Mistake, place, shown_json, unknown_name
 from robocov.files.documents import check_header, refused
 

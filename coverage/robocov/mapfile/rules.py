@@ -10,8 +10,16 @@ from shapely import Polygon
 
 from robocov.arrays import Array
 from robocov.density import WeightedArea, WeightedPolygons
-from robocov.environment import Environment, PolygonObstacle, Ring, WallObstacle
-from robocov.environment.starts import GAP, DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    START_GAP,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    Ring,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import JsonPath, MapError, Mistake, StartError, place
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
@@ -190,4 +198,4 @@ def _plainly_has_room(environment: Environment, spec: DiscStart | UniformStart) 
     centres = shapely.points(given)
     inside = shapely.contains_properly(environment.free, centres)
     clearance = shapely.distance(environment.free.boundary, centres)
-    return bool((inside & (clearance > DEFAULT_RADIUS * (1 + GAP) + 0.01)).any())
+    return bool((inside & (clearance > DEFAULT_RADIUS * (1 + START_GAP) + 0.01)).any())

@@ -11,7 +11,7 @@ from scipy.optimize import LbfgsInvHessProduct
 from scipy.spatial import cKDTree
 
 from robocov.arrays import Array, IntArray
-from robocov.environment.starts import GAP
+from robocov.environment import START_GAP
 from robocov.k_median import Beat
 
 if TYPE_CHECKING:
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
     from robocov.cost import CoverageCost, CoverageResult
 
-_SEGMENTS = 32  # edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than `GAP`
+_SEGMENTS = (
+    32  # edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than `START_GAP`
+)
 _PUSHES = 60  # times that overlapping robots are pushed apart before the place counts as too narrow for them
 _FARTHER = 1.005  # they are pushed a little too far, else they would never quite arrive
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: its multiples are spread evenly
@@ -35,12 +37,12 @@ class Room:
     """Free configuration space of robots of some radius (m).
 
     They keep from walls (`clearance`), and from each other (`spacing`, m), the distance that starts leave as
-    well: their radius (their diameter), and `robocov.environment.starts.GAP` of it. There is a part for each
+    well: their radius (their diameter), and `robocov.environment.START_GAP` of it. There is a part for each
     component of the free space, empty where no robot fits.
     """
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
-        self.clearance, self.spacing = radius * (1.0 + GAP), 2.0 * radius * (1.0 + GAP)
+        self.clearance, self.spacing = radius * (1.0 + START_GAP), 2.0 * radius * (1.0 + START_GAP)
         self.parts: tuple[BaseGeometry, ...] = tuple(
             part.buffer(-self.clearance, quad_segs=_SEGMENTS) for part in free.geoms
         )

@@ -16,8 +16,7 @@ from robocov.arrays import Array, frozen
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from robocov.environment import Environment
-    from robocov.environment.obstacle_path import ObstaclePath
+    from robocov.environment import Environment, ObstaclePath
 
 Corner: TypeAlias = tuple[float, float]
 Loop: TypeAlias = list[Corner]

@@ -5,8 +5,7 @@ import pytest
 
 from robocov.cost import CoverageCost
 from robocov.cost.momentary_cost import MomentaryCost
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 
 SQUARE = ((0, 0), (6, 0), (6, 4), (0, 4))
 STANDING = Environment("standing", SQUARE, (CircleObstacle((4.5, 2.0), 0.5),))

@@ -8,8 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath, Repeat
+from robocov.environment import (
+    CircleObstacle,
+    Environment,
+    ObstaclePath,
+    PolygonObstacle,
+    Repeat,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, from_json, map_schema, parse_map, to_json
 

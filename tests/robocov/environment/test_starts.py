@@ -6,8 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import Environment
-from robocov.environment.starts import DiscStart, PointsStart, Start
+from robocov.environment import DiscStart, Environment, PointsStart, Start
 from robocov.errors import StartError
 
 SQUARE = shapely.box(0, 0, 10, 10)

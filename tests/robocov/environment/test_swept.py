@@ -8,8 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.obstacle_path import ObstaclePath, in_the_way, swept_area
+from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, in_the_way, swept_area
 
 FRAME = PolygonObstacle(
     ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)), (((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),)

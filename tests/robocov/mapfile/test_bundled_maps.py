@@ -9,8 +9,7 @@ import jsonschema
 import pytest
 import shapely
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import PointsStart, UniformStart
+from robocov.environment import CircleObstacle, PointsStart, PolygonObstacle, UniformStart, WallObstacle
 from robocov.mapfile import bundled_maps, dump_map, load_map, map_schema
 from robocov.mapfile.check import check_map
 

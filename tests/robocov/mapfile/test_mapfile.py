@@ -15,8 +15,15 @@ from example_map import DOCUMENT, SCHEMA, changed
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import (
     dump_map,

@@ -9,8 +9,7 @@ import shapely
 from robocov.conditions import Conditions
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov.metrics import (
     clearances,
     contacts,

@@ -9,8 +9,7 @@ import pytest
 from called import COMMAND, SHORT, answer, complaint
 from PIL import Image
 
-from robocov.environment import Environment, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import DiscStart, Environment, WallObstacle
 from robocov.mapfile import save_map
 from robocov.optimum import optimum
 from robocov_app.cli import main

@@ -12,8 +12,7 @@ from shapely import Polygon
 
 from robocov.conditions import Conditions
 from robocov.cost import CoverageCost
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.simulation import Simulation
 from robocov_app.demo.costs import DirectCosts, WorkerCosts

@@ -11,8 +11,7 @@ import pytest
 from touched_run import HALL
 
 from robocov.cost import CoverageCost
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov_app.demo import costs as module
 from robocov_app.demo.costs import DirectCosts, WorkerCosts
 from robocov_app.live.messages import Answer, Building, Failed, Ready

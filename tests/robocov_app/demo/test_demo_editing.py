@@ -6,8 +6,15 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
 from robocov_app.demo.editing import (

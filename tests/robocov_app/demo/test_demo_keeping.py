@@ -10,8 +10,7 @@ import pytest
 from kept_run import COUNTING, record_of, records_of, repeated, said_by, same_arrays
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
-from robocov.environment import CircleObstacle
-from robocov.environment.starts import PointsStart
+from robocov.environment import CircleObstacle, PointsStart
 from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov_app.cli import main

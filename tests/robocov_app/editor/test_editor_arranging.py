@@ -4,8 +4,7 @@ from drawn_sketches import HALL, sound_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart
 from robocov.errors import MapError
 from robocov_app.editor.arranging import SIDES, aligned, distributed, distributed_centres
 from robocov_app.editor.document import BOUNDARY, Sketch

@@ -5,8 +5,7 @@ from drawn_sketches import HALL, drafts, sound_sketches
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map
 from robocov_app.editor import edits

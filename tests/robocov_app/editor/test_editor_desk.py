@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.demo.actions import all_actions as demo_actions
 from robocov_app.editor import actions

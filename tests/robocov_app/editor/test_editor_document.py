@@ -10,8 +10,15 @@ from drawn_sketches import HALL, anywhere, drafts, floats, json_values, shapes, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
 from robocov_app.editor import vertices

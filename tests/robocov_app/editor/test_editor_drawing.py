@@ -7,8 +7,7 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 
 
 @pytest.fixture

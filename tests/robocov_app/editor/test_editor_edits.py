@@ -9,8 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import affinity
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov_app.editor import edits
 from robocov_app.editor.affine import Affine

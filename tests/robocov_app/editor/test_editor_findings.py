@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.findings import STEM
 from robocov_app.editor.strips import map_words

@@ -9,8 +9,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.actions import all_actions
 from robocov_app.editor.document import parse_sketch, sketch_text
 from robocov_app.editor.panel import TABS

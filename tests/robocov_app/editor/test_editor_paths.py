@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from driven_editor import opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import load_map
 from robocov_app.editor import edits, paths

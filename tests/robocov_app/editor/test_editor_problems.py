@@ -6,9 +6,15 @@ from drawn_sketches import HALL, drafts, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    ObstaclePath,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.document import BOUNDARY, Sketch

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from shapely import MultiPolygon
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.mapfile import bundled_maps, load_map
 from robocov.mapfile.check import check_map
 from robocov_app.editor.document import Sketch

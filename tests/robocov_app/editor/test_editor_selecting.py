@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from driven_editor import Hands, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.document import BOUNDARY
 from robocov_app.editor.grips import grip_at, grips, handled
 from robocov_app.editor.selection import Selection, Vertex

@@ -7,8 +7,14 @@ from drawn_sketches import HALL, places, sound_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart, UniformStart
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    PointsStart,
+    PolygonObstacle,
+    UniformStart,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.selection import (

@@ -8,8 +8,7 @@ from drawn_sketches import HALL, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.selection import Vertex, points_of
 from robocov_app.editor.snapping import KINDS, Snapping, Targets, snapped, snapped_angle, snapped_move

@@ -6,8 +6,7 @@ import numpy as np
 import pygame
 from driven_editor import Hands, of_map, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor import edits
 from robocov_app.editor.document import Sketch
 from robocov_app.editor.selection import Selection

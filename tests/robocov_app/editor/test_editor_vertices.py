@@ -7,8 +7,7 @@ from drawn_sketches import HALL, sound_sketches
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.environment.starts import DiscStart, PointsStart
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor import vertices
 from robocov_app.editor.document import BOUNDARY, Sketch

@@ -8,8 +8,7 @@ import pygame
 import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.demo.layout import SMALLEST
 from robocov_app.editor.actions import told_actions
 from robocov_app.editor.document import Sketch

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.environment.starts import UniformStart
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import ParameterError
 from robocov_app.exporters import WriteOptions, cells, export_map
 from robocov_app.exporters.cells import Grid, free_cells, grid_over, lost_passages, not_held

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, box
 
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import DiscStart, UniformStart
+from robocov.environment import DiscStart, Environment, PolygonObstacle, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
 from robocov_app.importers import Shaping, detect, import_map

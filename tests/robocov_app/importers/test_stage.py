@@ -7,7 +7,7 @@ import shapely
 from raster_files import drawn, pgm
 from shapely import affinity, box
 
-from robocov.environment.starts import PointsStart
+from robocov.environment import PointsStart
 from robocov.errors import MapError
 from robocov_app.importers import ForeignMap, ReadOptions, detect, import_map
 from robocov_app.importers.stage import IMPORTER

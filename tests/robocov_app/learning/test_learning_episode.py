@@ -9,8 +9,7 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import InputError, ParameterError, StartError
 from robocov.metrics import clearances, contacts
 from robocov.simulation import Simulation

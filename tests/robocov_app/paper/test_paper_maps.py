@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 import shapely
 
-from robocov.environment import CircleObstacle, Environment, PolygonObstacle
-from robocov.environment.starts import DiscStart
+from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.paper import maps

@@ -5,8 +5,7 @@ import pytest
 from drawn_run import SQUARE
 
 from robocov.cost import CoverageCost
-from robocov.environment import Environment
-from robocov.environment.starts import UniformStart
+from robocov.environment import Environment, UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
 from robocov_app.interruption import Interruption

@@ -14,8 +14,7 @@ from driven_browser import CHROMIUM, DRIVER, Browser
 from reported_results import HOSTILE, entry, falling, walk, watched
 
 from robocov.conditions import Conditions
-from robocov.environment import CircleObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.voronoi import partition
 from robocov_app.plots.curves import curve_styles
 from robocov_app.report.document import report

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov_app.plots.curves import curve_styles
 from robocov_app.report.embedding import (
     NONE,

@@ -4,8 +4,7 @@ import shapely
 from drawn_run import HALL, ROOMS
 
 from robocov.cost import CoverageCost
-from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath, WallObstacle
 from robocov_app.view.field import Field, FieldLattice, Fields
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))

@@ -8,8 +8,7 @@ from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, neare
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import UniformStart
+from robocov.environment import Environment, PolygonObstacle, UniformStart
 from robocov_app.view import knowledge
 from robocov_app.view.camera import Camera
 from robocov_app.view.knowledge import CursorPath, RayScan, SensedObstacles

@@ -8,8 +8,7 @@ import shapely
 from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
-from robocov.environment import Environment, PolygonObstacle
-from robocov.environment.starts import UniformStart
+from robocov.environment import Environment, PolygonObstacle, UniformStart
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import partition

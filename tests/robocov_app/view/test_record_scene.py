@@ -3,8 +3,7 @@ import pytest
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
-from robocov.environment import CircleObstacle, Environment
-from robocov.environment.obstacle_path import ObstaclePath
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
