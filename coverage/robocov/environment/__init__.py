@@ -49,20 +49,13 @@ _LEAST_OVERLAP = 1e-6
 
 @dataclass(frozen=True)
 class ObstaclePath:
-    """A poly-line along which an obstacle is shifted at a constant speed, without turning.
+    """A poly-line, (x, y) m, along which an obstacle is shifted at a constant speed, m/s, without turning.
 
-    The obstacle is where its map has it when the path's point is at the first of `points`, at time zero;
-    at other times it is shifted by as much as the path's point has moved.
-
-    Attributes
-    ----------
-    points : ring of [x, y], m
-        At least two.
-    speed : float, m/s
-    repeat : "loop" or "back-and-forth"
+    At time zero the obstacle is where its map has it, and the path's point at the first of `points`; later it
+    is shifted by as much as that point has moved.
     """
 
-    points: tuple[tuple[float, float], ...]
+    points: Ring
     speed: float
     repeat: Repeat = "loop"
 
@@ -81,16 +74,10 @@ class ObstaclePath:
         return float(self._line[1][-1]) / self.speed
 
     def shift(self, time: float) -> Array:
-        """Return by how much the obstacle has moved at a time, s; (2,) m.
-
-        >>> path = ObstaclePath(((1.0, 1.0), (3.0, 1.0)), 0.5, "back-and-forth")
-        >>> path.shift(2.0).tolist(), path.shift(5.0).tolist(), path.period
-        ([1.0, 0.0], [1.5, 0.0], 8.0)
-        """
+        """Return by how much the obstacle has moved at a time, s; (2,) m."""
         line, along = self._line
         place = (time * self.speed) % along[-1]
-        at = np.array([np.interp(place, along, line[:, k]) for k in (0, 1)])
-        return np.asarray(at - line[0])
+        return np.array([np.interp(place, along, line[:, k]) for k in (0, 1)]) - line[0]
 
 
 @dataclass(frozen=True)
@@ -104,7 +91,7 @@ class PolygonObstacle:
 
     @cached_property
     def polygon(self) -> Polygon:
-        """The obstacle as a shapely polygon."""
+        """The obstacle's shape."""
         return Polygon(self.vertices, self.holes)
 
     def shifted(self, by: Array) -> PolygonObstacle:
@@ -124,7 +111,7 @@ class CircleObstacle:
 
     @cached_property
     def polygon(self) -> Polygon:
-        """The obstacle as a shapely polygon."""
+        """The polygon that stands for it."""
         sides = 12
         if self.radius > SAGITTA:
             sides = max(sides, math.ceil(math.pi / math.acos(1.0 - SAGITTA / self.radius)))
@@ -147,7 +134,7 @@ class WallObstacle:
 
     @cached_property
     def polygon(self) -> BaseGeometry:
-        """The obstacle as a shapely polygon (or polygons, where the line doubles back)."""
+        """The obstacle's shape; several polygons where the line doubles back."""
         line = LineString(self.points)
         return line.buffer(self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=4.0)
 
@@ -191,18 +178,14 @@ class Environment(Drawable):
 
     Attributes
     ----------
-    name, description : str
     boundary : ring of [x, y], m
-        The outer boundary as it was given: either way round, convex or not.
+        As it was given: either way round, convex or not.
     obstacles : tuple of obstacles
-        They may overlap, touch and stick out of the boundary. One with a `path` moves; here it is where it
-        is at time zero.
+        At time zero, where they have a path. They may overlap, touch and stick out of the boundary.
     starts : dict of name to start
         The first is the default.
-    extra : dict
-        Free keys of the file, kept untouched.
-    schema : str or None
-        The file's ``$schema``, kept untouched.
+    extra, schema : dict, str or None
+        Free keys of the file and its ``$schema``, kept untouched.
     density : Density or None
         φ, how much each place counts: part of the task, which robots know. None: every place the same.
     """
@@ -238,10 +221,7 @@ class Environment(Drawable):
 
     @cached_property
     def free(self) -> MultiPolygon:
-        """The free space: inside the boundary, outside every obstacle; one polygon a component.
-
-        Components are ordered by area, the largest first.
-        """
+        """The parts of the free space, inside the boundary and outside every obstacle, the largest first."""
         inside = shapely.set_precision(self.boundary_polygon, GRID)
         if self.obstacles:
             solid = _united(np.array([shape.polygon for shape in self.obstacles]))
@@ -307,20 +287,14 @@ class Environment(Drawable):
         return self.boundary == other.boundary and self.obstacles == other.obstacles
 
     def start(self, name: str | None = None) -> Start:
-        """Return the start called `name`, by default the map's first.
+        """Return the start called `name`, by default the map's first; raise StartError for an unknown one.
 
         Every map has a start ``uniform``, anywhere in the free space, whether the file names it
         or not; it is the default of a map without starts.
-
-        Raises
-        ------
-        StartError
-            When there is none of that name; the message names the nearest.
         """
         starts = {**self.starts}
         starts.setdefault("uniform", UniformStart())
-        if name is None:
-            name = next(iter(starts))
+        name = next(iter(starts)) if name is None else name
         if name not in starts:
             raise StartError(f"map {self.name!r}: {unknown_name('start', name, starts)}")
         return Start(name, starts[name], self.free)
@@ -328,27 +302,20 @@ class Environment(Drawable):
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A named start of one environment, with its free space, ready to draw positions from."""
+    """A named start of one environment, ready to draw positions from.
+
+    A draw depends on the start, the number of robots, their radius and the seed only, so that every
+    controller gets the same positions for the same seed.
+    """
 
     name: str
     spec: StartSpec
     free: BaseGeometry
 
     def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
-        """Draw positions of the centres of `n` discs that touch neither walls nor each other, (n, 2) m.
+        """Draw positions of `n` robots of a radius, m, that touch neither walls nor each other, (n, 2) m.
 
-        Parameters
-        ----------
-        n : int
-        seed : int
-            The same seed gives the same positions. It is not used where positions are given.
-        radius : float, m
-            Radius of a robot.
-
-        Raises
-        ------
-        StartError
-            When the robots do not fit.
+        Where positions are given, the seed is not used. Raises StartError when the robots do not fit.
         """
         for name, value in (("robots", n), ("seed", seed)):
             if not is_number(value, Integral) or value < (name == "robots"):
@@ -371,10 +338,8 @@ class Start:
                 points = _hexagonal(rng, room, n, spacing)
             most = len(points)
         if len(points) < n:
-            raise self._error(
-                f"room for about {most} robots of radius {radius:g} m, but {n} were asked for; "
-                f"fewer robots or a wider start was wanted"
-            )
+            found = f"room for about {most} robots of radius {radius:g} m, but {n} were asked for"
+            raise self._error(f"{found}; fewer robots or a wider start was wanted")
         return points
 
     def room(self, radius: float) -> BaseGeometry:
@@ -390,10 +355,8 @@ class Start:
 
     def _given(self, n: int, radius: float, positions: tuple[tuple[float, float], ...]) -> Array:
         if n > len(positions):
-            raise self._error(
-                f"has {len(positions)} positions, but {n} robots were asked for; "
-                f"at most {len(positions)} robots or another start was wanted"
-            )
+            found = f"has {len(positions)} positions, but {n} robots were asked for"
+            raise self._error(f"{found}; at most {len(positions)} robots or another start was wanted")
         points = np.array(positions[:n], dtype=float)
         distance = shapely.distance(shapely.points(points), self.free.boundary)
         inside = shapely.contains_properly(self.free, shapely.points(points))
@@ -405,21 +368,16 @@ class Start:
                 away = f"{distance[k]:.3g} m from a wall"
                 raise self._error(f"{place} is {away}, but a robot of radius {radius:g} m must fit")
         gaps = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-        gaps[np.arange(n), np.arange(n)] = np.inf
-        if n > 1 and gaps.min() < 2 * radius:
-            i, j = np.unravel_index(int(gaps.argmin()), gaps.shape)
-            raise self._error(
-                f"positions[{min(i, j)}] and positions[{max(i, j)}] are {gaps.min():.3g} m apart, "
-                f"but at least {2 * radius:g} m, a robot's diameter, was wanted"
-            )
+        np.fill_diagonal(gaps, np.inf)
+        if gaps.min() < 2 * radius:
+            i, j = sorted(np.unravel_index(int(gaps.argmin()), gaps.shape))
+            found = f"positions[{i}] and positions[{j}] are {gaps.min():.3g} m apart"
+            raise self._error(f"{found}, but at least {2 * radius:g} m, a robot's diameter, was wanted")
         return points
 
 
 def _darts(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:
-    """Throw darts at `room`, keep those at least `spacing` apart; (up to n, 2).
-
-    It gives up when a round keeps less than one dart in a hundred: the rest would take for ever.
-    """
+    """Return up to n random points that are at least `spacing` apart: darts, until hardly any is kept."""
     low_x, low_y, high_x, high_y = room.bounds
     kept = np.empty((0, 2))
     shapely.prepare(room)
@@ -477,12 +435,8 @@ def _hexagonal(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: fl
 
 
 def swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
-    """Return all places that an obstacle comes by on its path, given its polygon at time zero.
-
-    >>> swept_area(shapely.box(0, 0, 1, 1), ObstaclePath(((0, 0), (2, 0)), 1.0)).area
-    3.0
-    """
-    points = np.array([*path.points, *path.points[: path.repeat == "loop"]], dtype=float).reshape(-1, 2)
+    """Return all places that an obstacle comes by on its path, given its polygon at time zero."""
+    points = np.array([*path.points, *path.points[: path.repeat == "loop"]], dtype=float)
     shifts = points - points[:1]
     return shapely.union_all([polygon, *(_along(polygon, a, b) for a, b in pairwise(shifts))])
 
@@ -490,23 +444,15 @@ def swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 def in_the_way(
     area: BaseGeometry, others: Mapping[Key, BaseGeometry], inside: BaseGeometry | None = None
 ) -> tuple[dict[Key, BaseGeometry], BaseGeometry | None]:
-    """Return what of an area the others take, by more than they touch it, and what of it is not inside.
-
-    Without `inside`, the polygon of the boundary, all is inside.
-    """
+    """Return what of an area the others take, by more than a touch, and what of it is not `inside`."""
     shared = {name: area.intersection(shape) for name, shape in others.items()}
+    met = {name: part for name, part in shared.items() if part.area > _LEAST_OVERLAP}
     beyond = None if inside is None else area.difference(inside)
-    return (
-        {name: part for name, part in shared.items() if part.area > _LEAST_OVERLAP},
-        beyond if beyond is not None and beyond.area > _LEAST_OVERLAP else None,
-    )
+    return met, beyond if beyond is not None and beyond.area > _LEAST_OVERLAP else None
 
 
 def _along(polygon: Polygon, begin: Array, end: Array) -> BaseGeometry:
-    """Return the Minkowski sum of a polygon and a line: the polygon at both ends, and what each edge sweeps.
-
-    Whoever gets outside of the polygon on the way does so through its rim.
-    """
+    """Return the Minkowski sum of a polygon and a line: the polygon at both ends and what its edges sweep."""
     parts: list[BaseGeometry] = []
     for ring in (polygon.exterior, *polygon.interiors):
         at = shapely.get_coordinates(ring)

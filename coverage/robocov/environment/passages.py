@@ -10,20 +10,16 @@ and such a corner ends one of them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.environment import GRID, SAGITTA
+from robocov.arrays import Array, IntArray
+from robocov.environment import GRID, SAGITTA, Point
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov.arrays import Array, BoolArray, IntArray
 
 NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
@@ -38,20 +34,11 @@ _DIGITS = 6
 """Results are rounded to the grid of the derived geometry, a micrometre."""
 
 
-@dataclass(frozen=True)
-class Gap:
-    """A passage of the free space.
-
-    Attributes
-    ----------
-    width : float, m
-        Diameter of the largest disc that passes.
-    between : two points (x, y), m
-        Where the walls are closest to each other.
-    """
+class Gap(NamedTuple):
+    """A passage: the diameter of the largest disc that passes, m, and where the walls face each other, m."""
 
     width: float
-    between: tuple[tuple[float, float], tuple[float, float]]
+    between: tuple[Point, Point]
 
 
 def narrowest_gap(free: MultiPolygon) -> Gap | None:
@@ -106,25 +93,16 @@ class _Search:
         self.boundary = free.boundary
         shapely.prepare(self.boundary)
         shapely.prepare(free)
-        rings = [
-            np.asarray(ring.coords)[:-1] for part in free.geoms for ring in (part.exterior, *part.interiors)
-        ]
+        rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(shapely.get_parts(free))]
         sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
         self.ring = np.repeat(np.arange(len(rings)), sizes)
         self.start = np.concatenate([np.empty((0, 2)), *rings])
         self.end = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
-        # the edge that ends where each one starts
-        last = np.cumsum(sizes) - 1
-        first = last - sizes + 1
+        # the first edge of each one's ring and the one after the last, and the edge that ends where it starts
+        self.last = np.cumsum(sizes)
+        self.first = self.last - sizes
         self.before = np.arange(len(self.start)) - 1
-        self.before[first] = last
-        # the first vertex of each edge's ring, and the area, m², that the ring sweeps about it: up to the
-        # edge's start, and in all
-        self.origin = self.start[first][self.ring]
-        area = _cross(self.start - self.origin, self.end - self.origin) / 2
-        sums = [np.cumsum(part) for part in np.split(area, first[1:])] if rings else []
-        self.swept = np.concatenate([np.empty(0), *sums]) - area
-        self.total = np.array([part[-1] for part in sums])[self.ring] if rings else area
+        self.before[self.first] = self.last - 1
         # the edges whose start is a corner that juts into the free space
         turn = _cross(self.start - self.start[self.before], self.end - self.start)
         self.jutting = np.flatnonzero(turn < 0)
@@ -134,8 +112,7 @@ class _Search:
 
     def chunks(self) -> list[IntArray]:
         """Return the corners that jut into the free space, some at a time."""
-        corners = self.jutting
-        return np.array_split(corners, math.ceil(len(corners) / _CHUNK)) if len(corners) else []
+        return np.array_split(self.jutting, math.ceil(len(self.jutting) / _CHUNK) or 1)
 
     def gaps(self, corners: IntArray, below: float, limit: float) -> Iterator[Gap]:
         """Yield the passages at some corners, wider than `below` and narrower than `limit`, by width."""
@@ -151,40 +128,34 @@ class _Search:
         # the sides of the corner may not lean into the disc
         for side in (self.start[self.before[corner]], self.end[corner]):
             wanted &= np.einsum("kd,kd->k", side - p, q - p) <= 1e-9 * width * np.hypot(*(side - p).T)
-        p, q, width, corner, edge = p[wanted], q[wanted], width[wanted], corner[wanted], edge[wanted]
-        passage = self._leads_on(corner, edge, p, q, width)
-        p, q, width = p[passage], q[passage], width[passage]
-        order = np.argsort(width, kind="stable")
+        found = np.flatnonzero(wanted)
+        order = found[np.argsort(width[found], kind="stable")]
         for some in np.array_split(order, max(1, len(order) // 512)):
             middle = shapely.points((p[some] + q[some]) / 2)
             # prepared, which `shapely.distance` would not be: of thousands of walls that makes a difference
             empty = ~shapely.dwithin(self.boundary, middle, width[some] / 2 * (1 - 1e-9) - 1e-12)
             empty[empty] = shapely.contains_properly(self.free, middle[empty])
             for k in some[empty].tolist():
-                ends = sorted(
-                    (round(x, _DIGITS), round(y, _DIGITS)) for x, y in (p[k].tolist(), q[k].tolist())
-                )
-                yield Gap(round(float(width[k]), _DIGITS), (ends[0], ends[1]))
+                if self._leads_on(corner[k], edge[k], q[k], width[k]):
+                    one, other = sorted(map(tuple, np.round([p[k], q[k]], _DIGITS).tolist()))
+                    yield Gap(round(float(width[k]), _DIGITS), (one, other))
 
-    def _leads_on(self, corner: IntArray, edge: IntArray, p: Array, q: Array, width: Array) -> BoolArray:
-        """Return whether the gaps from corner points p to edge points q lead to more than a pocket.
+    def _leads_on(self, corner: int, edge: int, q: Array, width: float) -> bool:
+        """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
         A cut between two rings separates nothing: the way round is another one. A cut from a ring
         to itself separates the part that the ring sweeps between the two points.
         """
-
-        def swept(index: IntArray, point: Array) -> Array:
-            origin = self.origin[index]
-            return self.swept[index] + _cross(self.start[index] - origin, point - origin) / 2
-
-        origin, total = self.origin[corner], self.total[corner]
-        between = swept(edge, q) - swept(corner, p) + _cross(q - origin, p - origin) / 2
-        between = np.where(edge < corner, total + between, between)
-        sides = np.stack([between, total - between])
+        ring = self.ring[corner]
+        if ring != self.ring[edge]:
+            return True
+        points = np.roll(self.start[self.first[ring] : self.last[ring]], self.first[ring] - corner, axis=0)
+        cut = (edge - corner) % len(points) + 1
+        halves = np.vstack([points[:cut], q]), np.vstack([q, points[cut:], points[:1]])
+        sides = np.array([_area(half) for half in halves])
         # outside a hole's ring there is no pocket: only the side of positive area is one
-        pocket = np.where(sides > 0, sides, np.inf).min(axis=0)
-        around = self.ring[corner] != self.ring[edge]
-        return np.asarray(around | (pocket >= np.maximum(NEGLIGIBLE, width * width)))
+        pocket = sides.min(where=sides > 0, initial=np.inf)
+        return bool(pocket >= max(NEGLIGIBLE, width * width))
 
 
 def _without_cracks(free: MultiPolygon) -> MultiPolygon:
@@ -202,3 +173,9 @@ def _without_cracks(free: MultiPolygon) -> MultiPolygon:
 
 def _cross(a: Array, b: Array) -> Array:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _area(ring: Array) -> float:
+    """Return the area of a ring, m², negative when clockwise."""
+    points = ring - ring[0]
+    return float(_cross(points[:-1], points[1:]).sum()) / 2
