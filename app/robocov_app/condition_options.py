@@ -46,19 +46,15 @@ class ConditionOptions:
         """
         if self == ConditionOptions():
             return None
-        from robocov.conditions import Conditions, Failure, Join, parsed_failure, parsed_join
+        from robocov.conditions import Conditions, Failure, Join, parsed_entry
 
-        failures: list[Failure] = []
-        joins: list[Join] = []
-        for option, texts in (("--fail", self.fail), ("--join", self.join)):
-            for text in texts:
-                try:
-                    if option == "--fail":
-                        failures.append(parsed_failure(text))
-                    else:
-                        joins.append(parsed_join(text))
-                except ParameterError as error:
-                    raise ParameterError(f"{option}: {error}") from None
+        option = "--fail"
+        try:
+            failures = tuple(parsed_entry(Failure, text) for text in self.fail)
+            option = "--join"
+            joins = tuple(parsed_entry(Join, text) for text in self.join)
+        except ParameterError as error:
+            raise ParameterError(f"{option}: {error}") from None
         conditions = Conditions(
             loss=self.loss,
             delay=self.delay,
@@ -67,8 +63,8 @@ class ConditionOptions:
             position_noise=self.position_noise,
             sensing_noise=self.sensing_noise,
             failure_rate=self.failure_rate,
-            failures=tuple(failures),
-            joins=tuple(joins),
+            failures=failures,
+            joins=joins,
             seed=seed,
         )
         conditions.check_team(robots)

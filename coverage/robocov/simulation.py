@@ -12,8 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
-from robocov.conditions.communication import Inbox
-from robocov.conditions.perception import Perception, of_working
+from robocov.conditions.perception import Inbox, Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller
 from robocov.controllers.user_modules import fault_of

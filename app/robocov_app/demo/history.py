@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array, IntArray
     from robocov.conditions import Conditions
-    from robocov.conditions.communication import Inbox
+    from robocov.conditions.perception import Inbox
     from robocov.environment import Environment
     from robocov.observation import Decision
     from robocov.robots import Team

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
-from robocov.conditions import QUANTITIES, Conditions, parsed_failure, parsed_join
+from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.errors import ParameterError, place, shown, unknown_name
 from robocov.robots import UNITS as TEAM_UNITS
@@ -18,7 +18,7 @@ TeamValue: TypeAlias = float | str | None
 WORDS = ("fail", "join")
 """Conditions that are texts: ``3@20 5@40`` are two failures, in one run."""
 
-CONDITIONS = (*QUANTITIES, *WORDS)
+CONDITIONS = (*LIMITS, *WORDS)
 """The conditions that a study may sweep."""
 
 GROUPS = "groups"
@@ -103,11 +103,11 @@ def conditions_of(circumstances: Mapping[str, TeamValue], seed: int, robots: int
     ParameterError
         When they cannot be for so many robots.
     """
-    values: dict[str, Any] = {name: circumstances[name] for name in QUANTITIES if name in circumstances}
+    values: dict[str, Any] = {name: circumstances[name] for name in LIMITS if name in circumstances}
     conditions = Conditions(
         **values,
-        failures=tuple(map(parsed_failure, str(circumstances.get("fail", "")).split())),
-        joins=tuple(map(parsed_join, str(circumstances.get("join", "")).split())),
+        failures=tuple(parsed_entry(Failure, word) for word in str(circumstances.get("fail", "")).split()),
+        joins=tuple(parsed_entry(Join, word) for word in str(circumstances.get("join", "")).split()),
         seed=seed,
     )
     conditions.check_team(robots)
@@ -118,9 +118,9 @@ def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
     if name in WORDS:
         if not isinstance(value, str):
             raise ParameterError(f'{place(path)}: {shown(value)}, but a text, as in "3@20", was wanted')
-        parse = parsed_failure if name == "fail" else parsed_join
+        kind: type[Failure | Join] = Failure if name == "fail" else Join
         try:
-            return " ".join(str(parse(word)) for word in value.split())
+            return " ".join(str(parsed_entry(kind, word)) for word in value.split())
         except ParameterError as error:
             raise ParameterError(f"{place(path)}: {error}") from None
     if name == "message_rate" and value in (None, NO_LIMIT):

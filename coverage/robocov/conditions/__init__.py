@@ -38,8 +38,6 @@ LIMITS: dict[str, tuple[float, float, str, str]] = {
     "failure_rate": (0.0, 1e3, "1/s", "failure_rate_per_s"),
 }
 """Ranges of the conditions that are numbers."""
-QUANTITIES = tuple(LIMITS)
-"""The conditions that are numbers."""
 UNITS = {name: unit for name, (_, _, unit, _) in LIMITS.items()}
 
 
@@ -117,10 +115,9 @@ class Conditions:
 
     def __post_init__(self) -> None:
         for name, (low, high, unit, _) in LIMITS.items():
-            value = getattr(self, name)
-            if name == "message_rate":
-                unit += " or null"
-            if name != "message_rate" or value is not None:
+            value, null = getattr(self, name), name == "message_rate"
+            if value is not None or not null:
+                unit += " or null" * null
                 object.__setattr__(self, name, checked(f"conditions.{name}", value, low, high, unit))
         object.__setattr__(self, "failures", _entries("failures", Failure, self.failures))
         object.__setattr__(self, "joins", _entries("joins", Join, self.joins))
@@ -160,17 +157,15 @@ class Conditions:
         return None if rest.ideal else rest
 
     def check_team(self, count: int) -> None:
-        """Check that a team of `count` robots can be under these conditions.
+        """Check that a team of `count` robots has all that are to fail or join, and some at the beginning.
 
-        Raises ParameterError when it has no robot of a number that is to fail or join, or no robot is there
-        at the beginning.
+        Raises ParameterError when it does not.
         """
         for name in ("failures", "joins"):
             for k, each in enumerate(getattr(self, name)):
                 if each.robot > count:
-                    raise ParameterError(
-                        f"conditions.{name}[{k}]: robot {each.robot}, but one of 1 to {count} was wanted"
-                    )
+                    wanted = f"one of 1 to {count} was wanted"
+                    raise ParameterError(f"conditions.{name}[{k}]: robot {each.robot}, but {wanted}")
         if len(self.joins) == count and min(each.time for each in self.joins) > 0.0:
             raise ParameterError("conditions.joins: all robots, but at least one from the start was wanted")
 
@@ -210,10 +205,7 @@ class Conditions:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
-        """Return the conditions that `to_dict` wrote.
-
-        Raises ParameterError when a key is missing or a value cannot be used.
-        """
+        """Return the conditions that `to_dict` wrote; raises ParameterError when they cannot be used."""
         try:
             given: dict[str, Any] = {name: plain[key] for name, (*_, key) in LIMITS.items()}
             given["failures"] = [(each["robot"], each["time_s"]) for each in plain["failures"]]
@@ -223,41 +215,27 @@ class Conditions:
             raise ParameterError(f"conditions: cannot be read ({error!r})") from error
 
     def __repr__(self) -> str:
-        said = {each.name: getattr(self, each.name) for each in fields(self)}
-        usual = {each.name: each.default for each in fields(self)}
-        words = (f"{name}={value!r}" for name, value in said.items() if repr(value) != repr(usual[name]))
-        return f"Conditions({', '.join(words)})"
+        said = ((each.name, repr(getattr(self, each.name)), repr(each.default)) for each in fields(self))
+        return f"Conditions({', '.join(f'{name}={value}' for name, value, usual in said if value != usual)})"
 
+
+Entry = TypeVar("Entry", bound=Failure | Join)
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
-_FAILURE = re.compile(rf"(\d{{1,9}})@({_NUMBER})", re.ASCII)
-_JOIN = re.compile(rf"{_FAILURE.pattern}(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
+_ENTRY = re.compile(rf"(\d{{1,9}})@({_NUMBER})(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
 
 
-def parsed_failure(text: str) -> Failure:
-    """Return a failure from a text like ``3@20``: robot 3 fails after 20 s.
+def parsed_entry(kind: type[Entry], text: str) -> Entry:
+    """Return what a text says: a failure ``3@20``, of robot 3 after 20 s, or a join ``5@30``, ``5@30:2.5,1``.
 
-    Raises ParameterError when it is none.
+    Raises ParameterError when it says none.
     """
-    found = _FAILURE.fullmatch(text)
-    if found is None:
-        raise ParameterError(f"{shown(text)}, but ROBOT@SECONDS, as in 3@20, was wanted")
-    return Failure(int(found[1]), float(found[2]))
-
-
-def parsed_join(text: str) -> Join:
-    """Return a join from a text like ``5@30`` or ``5@30:2.5,1``: robot 5 joins after 30 s, at [2.5, 1].
-
-    Raises ParameterError when it is none.
-    """
-    found = _JOIN.fullmatch(text)
-    if found is None:
-        raise ParameterError(f"{shown(text)}, but ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted")
-    place = None if found[3] is None else (float(found[3]), float(found[4]))
-    return Join(int(found[1]), float(found[2]), place)
-
-
-Entry = TypeVar("Entry", Failure, Join)
+    found = _ENTRY.fullmatch(text)
+    if found is None or (kind is Failure and found[3] is not None):
+        wanted = "ROBOT@SECONDS, as in 3@20," if kind is Failure else "ROBOT@SECONDS or ROBOT@SECONDS:X,Y"
+        raise ParameterError(f"{shown(text)}, but {wanted} was wanted")
+    place = () if found[3] is None else ((float(found[3]), float(found[4])),)
+    return kind(int(found[1]), float(found[2]), *place)
 
 
 def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry, ...]:
@@ -267,7 +245,7 @@ def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry,
         at = f"conditions.{name}[{k}]"
         try:
             robot, time, *rest = each
-            entry = kind(robot, time, *rest)
+            kind(robot, time, *rest)
         except (TypeError, ValueError):
             raise ParameterError(f"{at}: {shown(each)}, but a robot and a time were wanted") from None
         if not is_number(robot, Integral) or robot < 1:
@@ -277,10 +255,8 @@ def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry,
         if not is_number(time) or not 0.0 <= time <= _LONGEST:
             wanted = f"a number from 0 to {_LONGEST:g} s"
             raise ParameterError(f"{at}: time {shown(time)}, but {wanted} was wanted")
-        entry = entry._replace(robot=int(robot), time=float(time))
-        if isinstance(entry, Join) and entry.place is not None:
-            entry = entry._replace(place=_place(at, entry.place))
-        found[int(robot)] = entry
+        places = [None if place is None else _place(at, place) for place in rest]
+        found[int(robot)] = kind(int(robot), float(time), *places)
     return tuple(found[robot] for robot in sorted(found))
 
 

@@ -1,18 +1,29 @@
-"""What robots know under conditions: the ideal observations, made as bad as the conditions say."""
+"""What robots know under conditions: the ideal observations, made as bad as the conditions say.
+
+A message tells where its sender believes itself to be. It goes to all that are in range of it, and it in
+range of them, when it is sent; for each of these it is lost or not by itself; and it arrives after the
+delay. Of every other robot, a robot knows the newest message that arrived, until nothing has arrived for
+so long that the other is taken to be gone.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
-from robocov.conditions import POSITION, SCANNING, SENSING, Conditions
-from robocov.conditions.communication import Inbox, Radio
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, SOON, Conditions
 from robocov.conditions.draws import Draws
 from robocov.observation import Decision, Observations
+from robocov.observation.neighbours import Neighbours
 from robocov.observation.scans import Scans
 from robocov.robots import Team
+
+NEVER = -1
+"""The step at which something has not happened."""
 
 NEAREST = 1e-3
 """The shortest distance in metres that a noisy range sensor measures."""
@@ -45,8 +56,7 @@ class Perception:
         `seen` is the truth: where the robots are, who is in range, what the sensor ought to measure; `inbox`
         is as after the step before.
         """
-        step = round(seen.time / self._dt)
-        truth = seen.positions
+        step, truth = round(seen.time / self._dt), seen.positions
         positions = self._estimated(step, truth)
         points = self._sensed(step, seen, positions)
         if not working.all():
@@ -87,7 +97,7 @@ class Perception:
         scans, sigma = seen.scans, self._conditions.sensing_noise
         if scans is None or not sigma:
             return scans
-        rays = np.arange(scans.distances.shape[1])
+        rays = np.arange(scans.rays)
         error = sigma * self._scanning_chance.normal(step, self._robots[:, None], rays)[..., 0]
         distances = np.where(scans.hit, np.maximum(scans.distances + error, NEAREST), scans.distances)
         distances.setflags(write=False)
@@ -98,8 +108,117 @@ def of_working(decision: Decision, working: BoolArray) -> Decision:
     """Return a decision in which robots that do not work, (n,) bool, want nothing."""
     if working.all():
         return decision
-    idle = ~working
-    forces = np.where(idle[:, None], 0.0, decision.forces)
-    goals = None if decision.goals is None else np.where(idle[:, None], np.nan, decision.goals)
-    terms = {name: np.where(idle[:, None], 0.0, term) for name, term in decision.terms.items()}
+    there = working[:, None]
+    forces = np.where(there, decision.forces, 0.0)
+    goals = None if decision.goals is None else np.where(there, decision.goals, np.nan)
+    terms = {name: np.where(there, term, 0.0) for name, term in decision.terms.items()}
     return replace(decision, forces=forces, goals=goals, terms=terms)
+
+
+class Broadcast(NamedTuple):
+    """Messages of all robots from one step, on their way.
+
+    They said `places`, (n, 2) m, and reach those robots of the rows whose entries, (n, n), are True.
+    """
+
+    arrives: int
+    sent: int
+    places: Array
+    reaches: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inbox:
+    """What has arrived, and what is on its way; never changed, only replaced.
+
+    Attributes
+    ----------
+    sent : (n, n) int
+        The step at which the newest message that row's robot has of column's was sent, `NEVER` if none.
+    arrived : (n, n) int
+        The step at which it arrived.
+    places : (n, n, 2) m
+        What it said.
+    on_the_way : tuple of Broadcast
+        In the order in which they arrive.
+    """
+
+    sent: IntArray
+    arrived: IntArray
+    places: Array
+    on_the_way: tuple[Broadcast, ...] = ()
+
+    @classmethod
+    def empty(cls, count: int) -> Inbox:
+        """Return what `count` robots know that have heard nothing yet."""
+        sent, arrived = np.full((2, count, count), NEVER, dtype=np.intp)
+        return cls(sent, arrived, np.zeros((count, count, 2)))
+
+    def rearranged(self, rows: IntArray) -> Inbox:
+        """Return what remains for a team in which robot i was that of `rows[i]`; -1 is one that is new."""
+        old, new = np.maximum(rows, 0), np.asarray(rows) < 0
+        strange, pairs = new[:, None] | new, np.ix_(old, old)
+        on_the_way = tuple(
+            each._replace(places=each.places[old], reaches=each.reaches[pairs] & ~strange)
+            for each in self.on_the_way
+        )
+        sent, arrived = (np.where(strange, NEVER, steps[pairs]) for steps in (self.sent, self.arrived))
+        return Inbox(sent, arrived, self.places[pairs], on_the_way)
+
+
+class Radio:
+    """Sends and delivers messages under some conditions among robots of communication ranges, (n,) m."""
+
+    def __init__(self, conditions: Conditions, ranges: Array, dt: float) -> None:
+        self._conditions, self._ranges, self._dt = conditions, ranges, dt
+        self._chance = Draws(conditions.seed, LOSS)
+        self._delay = math.ceil(conditions.delay / dt - SOON)
+
+    def exchange(self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray) -> Inbox:
+        """Return what the robots have once messages were sent and delivered at a step since time zero.
+
+        Robots tell where they believe themselves to be, (n, 2) m; where they are says who is in range.
+        """
+        on_the_way = inbox.on_the_way
+        if self._sends(step):
+            reaches = self._reached(step, positions, working)
+            on_the_way = (*on_the_way, Broadcast(step + self._delay, step, np.array(told), reaches))
+        due = [each for each in on_the_way if each.arrives <= step]
+        if not due:
+            return replace(inbox, on_the_way=on_the_way)
+        sent, arrived, places = inbox.sent.copy(), inbox.arrived.copy(), inbox.places.copy()
+        for each in due:
+            sent[each.reaches], arrived[each.reaches] = each.sent, each.arrives
+            receiver, sender = np.nonzero(each.reaches)
+            places[receiver, sender] = each.places[sender]
+        return Inbox(sent, arrived, places, on_the_way[len(due) :])
+
+    def reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+        """Return of whom robots that work have a message that is not forgotten, what it said, and its age.
+
+        These are (m, 2) m and (m,) s, in the order of the neighbours' ``indices``.
+        """
+        silence = (step - inbox.arrived) * self._dt
+        known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + SOON)
+        robot, neighbour = np.nonzero(known & working[:, None])
+        neighbours = Neighbours.of_pairs(len(known), robot, neighbour, self._ranges)
+        ages = (step - inbox.sent[robot, neighbour]) * self._dt
+        return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
+
+    def _sends(self, step: int) -> bool:
+        """Whether messages are sent at a step: at time zero, and whenever a period has passed."""
+        rate = self._conditions.message_rate
+        if rate is None:
+            return True
+        period = self._dt * rate
+        return math.floor(step * period + SOON) > math.floor((step - 1) * period + SOON)
+
+    def _reached(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
+        """Return whom a message of each robot gets to, (receiver, sender) bool."""
+        receiver, sender = Neighbours.within(positions, self._ranges).among(working).pairs()
+        reaches = np.zeros((len(positions), len(positions)), dtype=bool)
+        reaches[receiver, sender] = True
+        if self._conditions.loss:
+            chance = self._chance.uniform(step, receiver, sender)
+            reaches[receiver, sender] = chance >= self._conditions.loss
+        return reaches

@@ -27,20 +27,15 @@ Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obs
 
 _ATTEMPTS = 40  # layouts that are drawn before the parameters count as impossible
 _TEAM = 0.6  # radius in metres of a start in which some robots of the usual size find room
-_DISC = (
-    0.25,
-    0.1,
-)  # radius of a start, in sides of a square per obstacle, and at most, in shorter sides of the map
+# radius of a start, in sides of a square per obstacle, and at most, in shorter sides of the map
+_DISC, _LARGEST_DISC = 0.25, 0.1
 _LEAST = 0.4  # part of that radius that is left at least where walls are near
 _MARGIN, _OFF = 0.02, 0.3  # of the discs from the boundary, and from the middle at most, in shorter sides
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of generated maps, with its usual number of obstacles and its usual area.
-
-    `counted` is what they are, in the plural; a map has `about` as many as are asked for, or exactly.
-    """
+    """A kind of generated maps, with its usual number of obstacles, and of what, and its usual area."""
 
     layout: Layout
     description: str
@@ -48,15 +43,16 @@ class Kind:
     obstacles: int
     area: float
     about: bool = False
+    """Whether a map has about as many obstacles as are asked for, not exactly."""
 
 
 GENERATORS: dict[str, Kind] = {
     "polygons": Kind(scattered, "scattered obstacles: convex polygons, L and U shapes", "obstacles", 6, 0.2),
     "blocks": Kind(city, "a town: blocks between streets", "blocks", 12, 0.4),
     "rooms": Kind(building, "a building: rooms with doors, and some furniture", "rooms", 6, 0.12),
-    "mazes": Kind(maze, "a maze: corridors, some dead ends, some ways round", "cells", 36, 0.12, about=True),
+    "mazes": Kind(maze, "a maze: corridors, some dead ends, some ways round", "cells", 36, 0.12, True),
     "caves": Kind(
-        cave, "a cave: chambers and tunnels with smooth walls, and pillars", "chambers", 12, 0.4, about=True
+        cave, "a cave: chambers and tunnels with smooth walls, and pillars", "chambers", 12, 0.4, True
     ),
 }
 """The kinds of maps by their names."""
@@ -81,7 +77,6 @@ def generated_map(
 
     Parameters
     ----------
-    seed : int
     kind : str
         One of `GENERATORS`. ``polygons``: obstacles that keep `gap` from each other and from the
         boundary, convex, L-shaped or U-shaped. ``blocks``: blocks between streets, also along the boundary.
@@ -94,10 +89,7 @@ def generated_map(
     gap, side, width, height : float, m
         A map is square, or a rectangle where width and height are given.
 
-    Raises
-    ------
-    ParameterError
-        When a parameter is out of range, or no layout is found that fulfils all of them.
+    Raises ParameterError when a parameter is out of range, or no layout is found that fulfils all of them.
 
     Examples
     --------
@@ -136,7 +128,7 @@ def _corner(request: Request, rng: np.random.Generator) -> DiscStart:
     """Return a disc in one of the corners."""
     right, top = rng.integers(0, 2, 2).tolist()
     side = min(request.width, request.height)
-    radius = request.floor(min(_DISC[1] * side, max(_DISC[0] * request.unit, _TEAM)))
+    radius = request.floor(min(_LARGEST_DISC * side, max(_DISC * request.unit, _TEAM)))
     off = radius + _MARGIN * side
     x, y = (request.width - off if right else off), (request.height - off if top else off)
     return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
@@ -146,9 +138,7 @@ def _environment(
     seed: int, kind: str, request: Request, layout: list[Obstacle], corner: DiscStart
 ) -> Environment | None:
     """Return the map with its starts; None if it is not valid, or not as it was asked for."""
-    width, height = float(request.width), float(request.height)
-    of_kind = GENERATORS[kind]
-    about = "about " if of_kind.about else ""
+    width, height, of_kind = float(request.width), float(request.height), GENERATORS[kind]
     words = {"kind": kind, "seed": seed, "obstacles": int(request.obstacles), "area": float(request.area)}
     words |= {"gap_m": float(request.gap), "width_m": width, "height_m": height}
     starts: dict[str, StartSpec] = {}
@@ -157,29 +147,27 @@ def _environment(
         ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         tuple(layout),
         starts,
-        f"Generated with seed {seed}: {about}{request.obstacles} {of_kind.counted}, "
+        f"Generated with seed {seed}: {'about ' * of_kind.about}{request.obstacles} {of_kind.counted}, "
         f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide.",
         {"generator": words},
     )
     try:
-        if not _fulfils(environment, request):
-            return None
-        within, centre = _within(environment, request, corner), _centre(environment, request, corner)
-        if within is None or centre is None:
-            return None
-        # only now: they depend on the free space, which is to be derived once
-        starts |= {"corner": within, "centre": centre, "uniform": UniformStart()}
-        check_rules(environment, environment.name)
+        if _fulfils(environment, request):
+            within, centre = _within(environment, request, corner), _centre(environment, request, corner)
+            if within is not None and centre is not None:
+                # only now: they depend on the free space, which is to be derived once
+                starts |= {"corner": within, "centre": centre, "uniform": UniformStart()}
+                check_rules(environment, environment.name)
+                return environment
     except (MapError, shapely.GEOSException):
-        return None
-    return environment
+        pass
+    return None
 
 
 def _within(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
     """Return the disc, smaller and nearer to its corner where walls are in its way; None for none."""
-    middle = np.array(corner.center)
-    away = np.sign(middle - np.array([request.width, request.height]) / 2.0)
-    radius = corner.radius
+    middle, radius = np.array(corner.center), corner.radius
+    away = np.sign(middle - request.size / 2.0)
     while radius >= _LEAST * corner.radius:
         x, y = request.rounded(middle + away * (corner.radius - radius)).tolist()
         if environment.free.contains(shapely.Point(x, y).buffer(radius)):
@@ -190,9 +178,9 @@ def _within(environment: Environment, request: Request, corner: DiscStart) -> Di
 
 def _centre(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
     """Return a disc near the middle, at most about as large, with as much room as there is; None for none."""
-    reach = _OFF * min(request.width, request.height)
+    reach = _OFF * float(request.size.min())
     offset = np.stack(np.meshgrid(*[np.linspace(-reach, reach, 41)] * 2), axis=-1).reshape(-1, 2)
-    place = request.rounded(offset + np.array([request.width, request.height]) / 2.0)
+    place = request.rounded(offset + request.size / 2.0)
     inside = shapely.contains_xy(environment.free, place[:, 0], place[:, 1])
     if not inside.any():
         return None

@@ -62,7 +62,7 @@ def _placed(
     request: Request, shape: str, area: float, others: Array, clear: shapely.Polygon, rng: np.random.Generator
 ) -> shapely.Polygon | None:
     """Return an outline of a shape at the first of many places that is good, None for none."""
-    size, gap = np.array([request.width, request.height]), request.gap
+    size, gap = request.size, request.gap
     tree = shapely.STRtree(others)
     for _ in range(_OUTLINES):
         # corners are rounded later: no opening may become narrower than the gap by that

@@ -40,6 +40,11 @@ class Request:
         checked("gap", self.gap, LEAST_GAP, min(self.width, self.height) / 3.0)
 
     @property
+    def size(self) -> Array:
+        """Width and height, (2,) m."""
+        return np.array([self.width, self.height])
+
+    @property
     def blocked(self) -> float:
         """The area to be blocked, m²."""
         return self.area * self.width * self.height

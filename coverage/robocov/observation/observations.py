@@ -134,7 +134,7 @@ class Snapshot:
         Where the robots are, if that is not where they believe themselves to be, ``seen.positions``.
     working : (n,) bool or None
         Which robots are there and have not failed; None: all.
-    inbox : robocov.conditions.communication.Inbox or None
+    inbox : robocov.conditions.perception.Inbox or None
         The messages that the robots then have; None where they know the others as they are.
     """
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.conditions import Conditions, Failure, Join, parsed_failure, parsed_join
+from robocov.conditions import Conditions, Failure, Join, parsed_entry
 from robocov.errors import ParameterError
 
 
@@ -141,25 +141,25 @@ def test_what_is_not_conditions_is_refused() -> None:
 
 
 def test_failures_and_joins_can_be_typed() -> None:
-    assert parsed_failure("3@20") == (3, 20.0)
-    assert parsed_join("5@30") == (5, 30.0, None)
-    assert parsed_join("5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
+    assert parsed_entry(Failure, "3@20") == (3, 20.0)
+    assert parsed_entry(Join, "5@30") == (5, 30.0, None)
+    assert parsed_entry(Join, "5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
     for text in ("3", "3@", "@20", "a@20", "3@x", "3@20s", "-1@2", "3@inf", "3@1@2"):
         with pytest.raises(ParameterError, match="but ROBOT@SECONDS, as in 3@20, was wanted"):
-            parsed_failure(text)
+            parsed_entry(Failure, text)
     for text in ("3@2:", "3@2:1", "3@2:1,", "3@2:1,2,3", "3@2:a,b", "3@2:nan,1"):
         with pytest.raises(ParameterError, match="ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted"):
-            parsed_join(text)
+            parsed_entry(Join, text)
 
 
 @given(st.text("0123456789@:,.-+e x", max_size=12))
 def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
     try:
-        join = parsed_join(text)
+        join = parsed_entry(Join, text)
     except ParameterError as error:
         assert "\n" not in str(error)
     else:
-        assert parsed_join(text) == join
+        assert parsed_entry(Join, text) == join
 
 
 def test_a_repr_says_what_differs() -> None:
