@@ -198,8 +198,11 @@ def rebuilt(table: Array, sources: IntArray, fixed: BoolArray, threshold: float)
     array is returned where none lowers the sum by the threshold.
     """
     free = np.flatnonzero(~fixed).tolist()
-    away = [np.array(some) for size in _REMOVED for some in combinations(free, size)]
-    found = sorted((_put_back(table, sources, some) for some in away), key=lambda each: each[0])
+    found = []
+    for away in (each for size in _REMOVED for each in combinations(free, size)):
+        order = np.append(np.delete(np.arange(len(sources)), away), away)
+        found.append(_put_back(table, sources, order, len(sources) - len(away)))
+    found.sort(key=lambda each: each[0])
     least, chosen = _total(table, sources) * (1.0 - threshold), sources
     for _, after in found[:_TRIED]:
         after = lloyd_iterations(table, after, fixed)
@@ -210,31 +213,22 @@ def rebuilt(table: Array, sources: IntArray, fixed: BoolArray, threshold: float)
 
 
 @kernel
-def _put_back(table: Array, sources: IntArray, away: IntArray) -> tuple[float, IntArray]:
-    """Return the sum, and the sources, after some of them were put back where each helps most."""
-    after, left = sources.copy(), np.ones(len(sources), dtype=np.bool_)
-    for k in away:
-        left[k] = False
-    taken, near = np.zeros(table.shape[1], dtype=np.bool_), np.full(len(table), np.inf)
-    for k in range(len(sources)):
-        if left[k]:
-            _add(table, sources[k], near, taken)
-    for k in away:
-        sums = np.zeros(table.shape[1])
+def _put_back(table: Array, sources: IntArray, order: IntArray, stay: int) -> tuple[float, IntArray]:
+    """Return the sum, and the sources, after all but the first `stay` in this order were put back."""
+    after, near = sources.copy(), np.full(len(table), np.inf)
+    taken = np.zeros(table.shape[1], dtype=np.bool_)
+    for number in range(len(order)):
+        k = order[number]
+        if number >= stay:
+            sums = np.zeros(table.shape[1])
+            for t in range(len(table)):
+                for s in range(table.shape[1]):
+                    sums[s] += min(table[t, s], near[t])
+            after[k] = _least(sums, taken)
+        taken[after[k]] = True
         for t in range(len(table)):
-            for s in range(table.shape[1]):
-                sums[s] += min(table[t, s], near[t])
-        after[k] = _least(sums, taken)
-        _add(table, after[k], near, taken)
+            near[t] = min(near[t], table[t, after[k]])
     return near.sum(), after
-
-
-@kernel
-def _add(table: Array, source: int, near: Array, taken: BoolArray) -> None:
-    """Take one source more: update the distances to the nearest, and which are taken."""
-    taken[source] = True
-    for t in range(len(table)):
-        near[t] = min(near[t], table[t, source])
 
 
 def _total(table: Array, sources: IntArray) -> float:

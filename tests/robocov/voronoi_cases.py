@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from robocov.locational import Performance, Sensing, SquaredDistance
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
@@ -35,6 +36,13 @@ ROUNDING = 3e-11
 
 seeds = st.integers(0, 2**32 - 1)
 names = st.sampled_from(sorted(REGIONS))
+
+
+def performance(f: Performance, r: Array) -> Array:
+    """Return f(r) of the locational cost (4)."""
+    if isinstance(f, Sensing):
+        return 1.0 / (r**2 + f.height**2)
+    return r**2 if isinstance(f, SquaredDistance) else r
 
 
 def scattered(region: Region, n: int, rng: np.random.Generator) -> Array:

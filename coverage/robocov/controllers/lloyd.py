@@ -9,7 +9,7 @@ import numpy as np
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
+from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
 from robocov.voronoi.disc_cells import disc_limited, disc_polygons
 

@@ -10,7 +10,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.locational.targets import HEIGHT, MEANING, TARGETS, targets
+from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import NOBODY
 from robocov.observation.region import Region

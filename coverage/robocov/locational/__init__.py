@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, gradient, hessian, value
+from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, gradient, value
 
-__all__ = ["Distance", "Performance", "Sensing", "SquaredDistance", "gradient", "hessian", "value"]
+__all__ = ["Distance", "Performance", "Sensing", "SquaredDistance", "gradient", "value"]

@@ -1,10 +1,11 @@
-"""The point of a cell from which its locational cost is best: by Newton's method, in all cells at once.
+"""What a robot heads for in its cell: the point from which the cell's locational cost (4) is best.
 
-For f = r the cost of a convex cell is strictly convex. For f = 1/(r²+h²) it need not be, but it has no second
-optimum: f is (-1/2)-concave, and in the plane the integral of such a function over a convex set that moves is
-quasi-concave (Borell; Brascamp and Lieb). Along any line the cost therefore falls, and then rises. So where
-it still falls at the end of a step, the step has not gone too far. That is all that is asked of a step,
-beside that it stays in the cell; no difference of two costs is ever formed, which would cancel.
+It is found by Newton's method, in all cells at once. For f = r the cost of a convex cell is strictly convex.
+For f = 1/(r²+h²) it need not be, but it has no second optimum: f is (-1/2)-concave, and in the plane the
+integral of such a function over a convex set that moves is quasi-concave (Borell; Brascamp and Lieb). Along
+any line the cost therefore falls, and then rises. So where it still falls at the end of a step, the step has
+not gone too far. That is all that is asked of a step, beside that it stays in the cell; no difference of two
+costs is ever formed, which would cancel.
 
 With a density φ that varies, derivatives are by quadrature. A cell is taken apart into the triangles that the
 point itself spans with the edges. In the coordinates q = p + u (e(t) - p), where e(t) runs along an edge,
@@ -20,126 +21,84 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import inner_kernel, kernel
+from robocov.errors import ParameterError, unknown_name
 from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, derivatives
 from robocov.observation.cells import Cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from robocov.density import Density
 
-_NEAR, _WEIGHED_NEAR = 1e-7, 1e-6
-"""A Newton step so short, relative to the cell's size, is the last: the next would be its square."""
+TARGETS = ("centroid", "sensing", "median")
+"""The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, by which the coverage cost (22) counts."""
 
-_ROUNDS, _WEIGHED_ROUNDS = 80, 30
-"""Evaluations after which a cell has what it has: most need 4, hairs below a low sensor some dozens."""
+MEANING = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h²), or for r"
+HEIGHT = "h of (14), for the target sensing: how high the sensor is; what is much farther counts little"
 
-_FLATTEST = 1e-14
-"""Least curvature, relative to the greatest, that is more than rounding."""
-
-_FLAT = 1e-9
-"""Area by the square of the size of a cell that is no rounding."""
-
-_NOTHING = 1e-15
-"""A step so short, relative to the cell's size, changes nothing."""
-
-_EMPTY = 1e-12
-"""φ so small, relative to its highest value, all over a cell is nothing: its centroid is as good a point."""
-
-_RISE = 0.5
-"""Where the cost rises again at the end of a step, it may rise so many times as fast as it fell."""
-
-_LEAST, _MOST = 0.1, 0.5
-"""Of a step that went too far, so much is tried next."""
-
-_ALONG, _OUTWARD = 16, 12
-"""Nodes along an edge, and from the point to it."""
+_NEAR, _WEIGHED_NEAR = 1e-7, 1e-6  # a step so short, relative to the cell's size, is the last
+_ROUNDS, _WEIGHED_ROUNDS = 80, 30  # evaluations; most need 4, hairs below a low sensor some dozens
+_FLATTEST = 1e-14  # least curvature, relative to the greatest, that is more than rounding
+_FLAT = 1e-9  # area by the square of the size of a cell that is no rounding
+_NOTHING = 1e-15  # a step so short, relative to the cell's size, changes nothing
+_EMPTY = 1e-12  # φ so small, relative to its highest value, all over a cell is nothing
+_RISE = 0.5  # where the cost rises again at the end of a step, it may rise so many times as fast as it fell
+_LEAST, _MOST = 0.1, 0.5  # of a step that went too far, so much is tried next
+_ALONG, _OUTWARD = 16, 12  # nodes along an edge, and from the point to it
 
 
-def best_points(cells: Cells, f: Performance, start: Array | None = None) -> Array:
-    """Return the points where ∫ f(|q-p|) dq over each cell is best, (n, 2) m.
+def targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
+    """Return where each robot heads for, (n, 2) m: within its cell, if that is convex.
 
-    A convex cell's lies in it, and is its only optimum. Of a cell that is not convex, as those of robots of
-    different speeds may be, it is one near the centroid; for f = r it is the best all the same. An empty
-    cell's is its generator, like its centroid.
+    Centroid and median count how far away places are, f = 1/(r²+h²) counts what is within a few h: in a cell
+    that is large against h it gives up the far ends, for h well above the size of the cells it is the
+    centroid. Where nothing is in the way that hardly changes the coverage cost (22). Walls magnify it: a goal
+    behind a wall holds a robot in front of it when the goal's foot on the wall lies between the wall's ends,
+    and where it lies beyond one of them, the robot gets round. Centimetres between two targets then decide
+    how a run ends, mostly against "sensing" with h of a metre or less.
 
-    Parameters
-    ----------
-    cells : Cells
-    f : Performance
-    start : (n, 2) m or None
-        Where the search begins, within the cells; None: at the centroids.
+    The `target` is one of `TARGETS`, the `height` (m) h of equation (14), for "sensing". A ParameterError
+    tells of another target, or a height that is not above 0.
+    """
+    if target == "centroid":
+        return cells.centroid
+    if target not in TARGETS:
+        raise ParameterError(f"target: {unknown_name('target', target, TARGETS)}")
+    return best_points(cells, Distance() if target == "median" else Sensing(height), density)
 
-    Examples
-    --------
+
+def best_points(cells: Cells, f: Performance, density: Density | None = None) -> Array:
+    """Return the points where ∫ f(|q-p|) φ(q) dq over each cell, with that density, is best, (n, 2) m.
+
+    With density 1, a convex cell's lies in it, and is its only optimum. Of a cell that is not convex, as
+    those of robots of different speeds may be, it is one near the centroid; for f = r it is the best all the
+    same. With another density, of f = r and a convex cell it is the best of all, of f = 1/(r²+h²) the one
+    that lies downhill from the centroid; a cell that is not convex, or in which φ is nothing, keeps its
+    centroid. An empty cell's is its generator.
+
     >>> from robocov import Region, partition
     >>> triangle = Region(np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]))
     >>> best_points(partition(np.array([[1.0, 0.5]]), triangle), Distance()).round(4)
     array([[0.9733, 0.9733]])
     """
-    start = (cells.centroid if start is None else start) - cells.generators
-    room, size, area = derivatives(cells.edges, start, SquaredDistance())[:, 5:].T
-    searching = (room > 0.0) | (area > _FLAT * np.square(size))
-
-    def slopes(points: Array, wanted: BoolArray) -> Array:
-        return derivatives(cells.edges, points, f)
-
-    return cells.generators + _newton(slopes, start, searching, f.sign, _NEAR, _ROUNDS)
-
-
-def weighed_best_points(cells: Cells, density: Density, f: Distance | Sensing) -> Array:
-    """Return the points where ∫ f(|q-p|) φ(q) dq over each cell is best, (n, 2) m.
-
-    From the centroid by φ on: of f = r and a convex cell it is the best of all, of f = 1/(r²+h²) the one
-    that lies downhill from there. A cell that is not convex, or in which φ is nothing, keeps its centroid.
-
-    Parameters
-    ----------
-    cells : Cells
-        With the density.
-    density : Density
-    f : Distance or Sensing
-    """
-    start = cells.centroid - cells.generators
-    room, size, area = derivatives(cells.edges, start, SquaredDistance())[:, 5:].T
-    searching = (room > 1e-9 * size) & (cells.mass > _EMPTY * density.highest * area)
-
-    def slopes(points: Array, wanted: BoolArray) -> Array:
-        found = derivatives(cells.edges, points, SquaredDistance())
-        found[:, :5] = _weighed_slopes(cells, density, f, size, points, wanted)
-        return found
-
-    return cells.generators + _newton(slopes, start, searching, 1.0, _WEIGHED_NEAR, _WEIGHED_ROUNDS)
-
-
-def _newton(
-    slopes: Callable[[Array, BoolArray], Array],
-    start: Array,
-    searching: BoolArray,
-    sign: float,
-    near: float,
-    rounds: int,
-) -> Array:
-    """Return where Newton's method, safeguarded, ends in each cell, (n, 2) m relative to the generators.
-
-    Parameters
-    ----------
-    slopes : callable
-        Of points (n, 2) m, and for which cells they are wanted: what `derivatives` returns.
-    start : (n, 2) m
-    searching : (n,)
-        In which cells.
-    sign, near, rounds
-        Of f, and when a search ends.
-    """
-    points, there = start.copy(), start.copy()
+    points = cells.centroid - cells.generators
+    room, size, area = derivatives(cells.edges, points, SquaredDistance())[:, 5:].T
+    weighed = None if density is None or density.uniform else density
+    if weighed is None:
+        searching = (room > 0.0) | (area > _FLAT * np.square(size))
+        sign, near, rounds = f.sign, _NEAR, _ROUNDS
+    else:
+        searching = (room > 1e-9 * size) & (cells.mass > _EMPTY * weighed.highest * area)
+        sign, near, rounds = 1.0, _WEIGHED_NEAR, _WEIGHED_ROUNDS
+    there = points.copy()
     # room, step in full, slope along it, part of it that is tried
-    state = np.full((len(start), 5), np.nan)
+    state = np.full((len(points), 5), np.nan)
     for _ in range(rounds + 1):
         if not searching.any():
             break
-        _advance(points, there, searching, state, slopes(there, searching), sign, near)
-    return points
+        slopes = derivatives(cells.edges, there, f)
+        if weighed is not None:
+            slopes[:, :5] = _weighed_slopes(cells, weighed, f, size, there, searching)
+        _advance(points, there, searching, state, slopes, sign, near)
+    return cells.generators + points
 
 
 @kernel
@@ -157,9 +116,8 @@ def _advance(
         fall, slope = state[i, 3], gx * state[i, 1] + gy * state[i, 2]
         if fresh or (room >= 0.0 and slope <= -_RISE * fall):
             points[i, 0], points[i, 1] = there[i, 0], there[i, 1]
-            go_x, go_y = _newton_step(
-                gx, gy, sign * slopes[i, 2], sign * slopes[i, 3], sign * slopes[i, 4], size
-            )
+            xx, xy, yy = sign * slopes[i, 2], sign * slopes[i, 3], sign * slopes[i, 4]
+            go_x, go_y = _newton_step(gx, gy, xx, xy, yy, size)
             state[i, 0], state[i, 1], state[i, 2] = room, go_x, go_y
             state[i, 3], state[i, 4] = gx * go_x + gy * go_y, 1.0
         else:
@@ -207,7 +165,7 @@ def _downhill(gx: float, gy: float, xx: float, xy: float, yy: float) -> tuple[fl
 
 
 def _weighed_slopes(
-    cells: Cells, density: Density, f: Distance | Sensing, size: Array, points: Array, wanted: BoolArray
+    cells: Cells, density: Density, f: Performance, size: Array, points: Array, wanted: BoolArray
 ) -> Array:
     """Return the derivatives of what is to be small by quadrature, (n, 5), zero where not wanted."""
     edges = cells.edges
@@ -220,10 +178,8 @@ def _weighed_slopes(
     if isinstance(f, Sensing):
         # as close to the point as f is steep
         bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
-        u, u_weights = (
-            np.sinh(bend * u) / np.sinh(bend),
-            u_weights * bend * np.cosh(bend * u) / np.sinh(bend),
-        )
+        u_weights = u_weights * bend * np.cosh(bend * u) / np.sinh(bend)
+        u = np.sinh(bend * u) / np.sinh(bend)
     u, u_weights = u[cell][:, None, :], (u * u_weights)[cell][:, None, :]
     # (edges, along, outward, 2)
     start, end = edges.start[some] - points[cell], edges.end[some] - points[cell]

@@ -28,74 +28,47 @@ from robocov.errors import ParameterError, shown
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
+# length of a panel of the quadrature in τ, where s = w sinh τ: the integrand is analytic for |Im τ| < π/2,
+# and 16 nodes leave less than a rounding error
 _PANEL = 2.0
-"""Length of a panel of the quadrature in τ, where s = w sinh τ: the integrand is analytic for |Im τ| < π/2,
-and 16 nodes leave less than a rounding error."""
 
 _SQUARES, _DISTANCES = 0, 1
 
 
 @dataclass(frozen=True)
 class SquaredDistance:
-    """f = r², equation (12): mean intervention by squares; its optimum is the centroid, (13). In m².
-
-    Attributes
-    ----------
-    sign : float
-        1 where f increases, and the cost is to be small; -1 where f decreases, and it is to be large.
-    """
+    """f = r², equation (12), in m²: mean intervention by squares; its optimum is the centroid, (13)."""
 
     kind: ClassVar[int] = _SQUARES
-    sign: ClassVar[float] = 1.0
+    sign: ClassVar[float] = 1.0  # f increases, and the cost is to be small
     height: ClassVar[float] = 1.0
-
-    def __call__(self, distance: Array) -> Array:
-        """Return f(r), m²."""
-        return np.square(distance)
 
 
 @dataclass(frozen=True)
 class Distance:
-    """f = r: what the coverage cost (22) asks for within a convex cell; its optimum is the median. In m."""
+    """f = r, in m: what the coverage cost (22) asks for within a convex cell; its optimum is the median."""
 
     kind: ClassVar[int] = _DISTANCES
     sign: ClassVar[float] = 1.0
     height: ClassVar[float] = 1.0
 
-    def __call__(self, distance: Array) -> Array:
-        """Return f(r), m."""
-        return np.asarray(distance)
-
 
 @dataclass(frozen=True)
 class Sensing:
-    """f = 1/(r²+h²), equation (14): what a sensor at height h tells of a place, which is to be much. In 1/m².
+    """f = 1/(r²+h²), equation (14), in 1/m²: what a sensor at height h (m) tells of a place.
 
     The optimum does depend on the height, other than the paper says after (14): it is the centroid for
-    h → ∞ alone.
-
-    Attributes
-    ----------
-    height : float, m
-
-    Raises
-    ------
-    ParameterError
-        When the height is no finite positive number.
+    h → ∞ alone. A ParameterError tells of a height that is no finite positive number.
     """
 
     kind: ClassVar[int] = 2
-    sign: ClassVar[float] = -1.0
+    sign: ClassVar[float] = -1.0  # f decreases, and the cost is to be large
 
     height: float
 
     def __post_init__(self) -> None:
         if not 0.0 < self.height < np.inf:
             raise ParameterError(f"height: {shown(self.height)}, but a number above 0 m was wanted")
-
-    def __call__(self, distance: Array) -> Array:
-        """Return f(r), 1/m²."""
-        return np.asarray(1.0 / (np.square(distance) + self.height**2))
 
 
 Performance: TypeAlias = SquaredDistance | Distance | Sensing
@@ -105,15 +78,8 @@ Performance: TypeAlias = SquaredDistance | Distance | Sensing
 def value(edges: CellEdges, points: Array, f: Performance) -> Array:
     """Return the locational cost (4) of each cell: ∫ f(|q-p|) dq over it, (n,), with density 1.
 
-    Parameters
-    ----------
-    edges : CellEdges
-    points : (n, 2) m
-        p for each cell, relative to the cell's generator: zeros are the generators themselves.
-    f : Performance
+    The points, p for each cell, (n, 2) m, are relative to the cells' generators: zeros are these themselves.
 
-    Examples
-    --------
     >>> from robocov import Region, partition
     >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
     >>> cells = partition(np.array([[1.0, 1.0]]), square)
@@ -128,17 +94,9 @@ def gradient(edges: CellEdges, points: Array, f: Performance) -> Array:
     """Return the gradient of `value` with respect to the points, (n, 2): equation (11) at the generators.
 
     As the cells move with their generators, this is also the gradient of the whole cost: what the boundary
-    between two cells adds to one it takes from the other, (8)-(10). The parameters are those of `value`.
+    between two cells adds to one it takes from the other, (8)-(10).
     """
     return derivatives(edges, points, f)[:, :2]
-
-
-def hessian(edges: CellEdges, points: Array, f: Performance) -> Array:
-    """Return the Hessian of `value` with respect to the points, (n, 2, 2); the cells stay where they are.
-
-    The parameters are those of `value`.
-    """
-    return derivatives(edges, points, f)[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
 
 
 def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -146,7 +104,7 @@ def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
 
     The room, m, is how far the point is inside its cell: negative outside, 0 in an empty cell; of a cell that
     is not convex it is how far the point is inside the part that sees all of it. The size, m, is half of the
-    perimeter, which is at least the diameter. The parameters are those of `value`.
+    perimeter, which is at least the diameter. The cells stay where they are.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
     return _derivatives(edges.start, edges.end, edges.cell, points, f.kind, f.height)

@@ -10,31 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad, quad
 from scipy.special import spence
-from voronoi_cases import PENTAGON, REGIONS, names, scattered, seeds
+from voronoi_cases import PENTAGON, REGIONS, names, performance, scattered, seeds
 
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
-from robocov.locational import (
-    Distance,
-    Performance,
-    Sensing,
-    SquaredDistance,
-    gradient,
-    hessian,
-    value,
-)
+from robocov.locational import Distance, Performance, Sensing, SquaredDistance, gradient, value
 from robocov.locational.cost import derivatives
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
-FUNCTIONS: list[Performance] = [
-    SquaredDistance(),
-    Distance(),
-    Sensing(0.02),
-    Sensing(1.0),
-    Sensing(60.0),
-]
+FUNCTIONS: list[Performance] = [SquaredDistance(), Distance(), Sensing(0.02), Sensing(1.0), Sensing(60.0)]
 functions = st.sampled_from(FUNCTIONS)
+
+
+def hessian(edges: CellEdges, points: np.ndarray, f: Performance) -> np.ndarray:
+    return derivatives(edges, points, f)[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
 
 
 def cell(ring: np.ndarray) -> CellEdges:
@@ -59,7 +49,7 @@ def quadrature(ring: np.ndarray, p: np.ndarray, f: Performance, tolerance: float
     total = 0.0
     for low, high in pairwise(cuts):
         total += dblquad(
-            lambda y, x: float(f(np.hypot(x - p[0], y - p[1]))),
+            lambda y, x: float(performance(f, np.hypot(x - p[0], y - p[1]))),
             low,
             high,
             lambda x: bounds(x)[0],
@@ -247,11 +237,3 @@ def test_cells_without_area_cost_nothing() -> None:
 def test_a_height_is_a_positive_number(height: float) -> None:
     with pytest.raises(ParameterError, match=r"height: .* above 0 m was wanted"):
         Sensing(height)
-
-
-@given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
-def test_functions_of_distance(r: float, h: float) -> None:
-    at = np.array([r])
-    assert SquaredDistance()(at)[0] == pytest.approx(r * r)
-    assert Distance()(at)[0] == r
-    assert Sensing(h)(at)[0] == pytest.approx(1.0 / (r * r + h * h))

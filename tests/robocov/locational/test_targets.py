@@ -12,8 +12,7 @@ from robocov.density import Uniform
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.locational import Distance, Sensing, value
-from robocov.locational.best_points import best_points
-from robocov.locational.targets import TARGETS, targets
+from robocov.locational.best_points import TARGETS, best_points, targets
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region

@@ -7,11 +7,11 @@ import pytest
 import shapely
 from density_cases import GAUSSIANS, KINDS, POLYGONS, RASTERS
 from numpy.testing import assert_allclose
+from voronoi_cases import performance
 
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
 from robocov.locational import Distance, Sensing
-from robocov.locational.best_points import best_points, weighed_best_points
-from robocov.locational.targets import targets
+from robocov.locational.best_points import best_points, targets
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import partition
@@ -30,7 +30,7 @@ def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
     """The slope there is nearly nothing of what all places pull, and no other place is better."""
     points, side = np.array([[2.5, 3.0], [6.5, 6.5]]), 500
     cells = partition(points, SQUARE, density=density)
-    for point, ring in zip(weighed_best_points(cells, density, f), cells.polygons, strict=True):
+    for point, ring in zip(best_points(cells, f, density), cells.polygons, strict=True):
         low, high = ring.min(axis=0), ring.max(axis=0)
         x, y = (low[k] + (np.arange(side) + 0.5) * (high[k] - low[k]) / side for k in (0, 1))
         places = np.column_stack([np.tile(x, side), np.repeat(y, side)])
@@ -43,9 +43,9 @@ def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
         assert np.hypot(*slope) < within * pull.sum()
         if isinstance(f, Sensing) and f.height < 1.0:
             continue  # where the density has several tops, so has what such a sensor sees
-        best = f.sign * float(weights @ f(r))
+        best = f.sign * float(weights @ performance(f, r))
         for other in places[:: len(places) // 9]:
-            assert f.sign * float(weights @ f(np.hypot(*(places - other).T))) > best
+            assert f.sign * float(weights @ performance(f, np.hypot(*(places - other).T))) > best
 
 
 @pytest.mark.parametrize("f", FUNCTIONS.values(), ids=FUNCTIONS)
@@ -55,7 +55,7 @@ def test_with_a_density_that_hardly_varies_it_is_the_closed_form(f):
     cells = partition(points, SQUARE, density=nearly)
     plain = best_points(partition(points, SQUARE), f)
     within = 3e-2 if isinstance(f, Sensing) and f.height < 1.0 else 2e-3
-    assert_allclose(weighed_best_points(cells, nearly, f), plain, atol=within)
+    assert_allclose(best_points(cells, f, nearly), plain, atol=within)
 
 
 @pytest.mark.parametrize("target", ["median", "sensing"])
@@ -72,7 +72,7 @@ def test_a_heavy_room_holds_the_median():
     room = WeightedArea(((6.0, 6.0), (8.0, 6.0), (8.0, 8.0), (6.0, 8.0)), 100.0)
     density = WeightedPolygons((room,))
     cells = partition(np.array([[2.0, 2.0]]), SQUARE, density=density)
-    x, y = weighed_best_points(cells, density, Distance())[0]
+    x, y = best_points(cells, Distance(), density)[0]
     assert 6.0 < x < 8.0 and 6.0 < y < 8.0
 
 
@@ -80,7 +80,7 @@ def test_where_nothing_counts_the_centroid_stays():
     room = WeightedArea(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), 1.0)
     density = WeightedPolygons((room,), 0.0)
     cells = partition(np.array([[1.0, 4.0], [7.0, 4.0]]), SQUARE, density=density)
-    found = weighed_best_points(cells, density, Distance())
+    found = best_points(cells, Distance(), density)
     assert np.array_equal(found[1], cells.centroid[1])
     assert found[0] == pytest.approx([0.5, 0.5], abs=0.2)
 
