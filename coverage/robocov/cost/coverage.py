@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.arrays.grouping import weighted_mean
 from robocov.cost.lattice import Number, Sites, lattice_of
-from robocov.cost.site_paths import CornerViews, Paths, corner_views, site_paths
+from robocov.cost.site_paths import CornerViews, Paths, TilePaths, corner_views, site_paths
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
@@ -179,7 +179,7 @@ class CoverageCost:
         self.sites, self._tiles = tiles = lattice_of(geodesics, self.lattice)
         rows, spans = geodesics.of_corners(partial(corner_views, geodesics.walls, tiles[1]), progress)
         order = np.argsort(rows[:, 1], kind="stable")
-        first = np.searchsorted(rows[order, 1], np.arange(len(tiles[1].first)))
+        first = np.searchsorted(rows[order, 1], np.arange(len(tiles[1].boxes) + 1))
         self._views = CornerViews(first, rows[order][:, [0, 2]], spans[order])
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         self.weights = self._weights()
@@ -246,7 +246,8 @@ class CoverageCost:
         n, m, count = len(places), len(self.points), len(self.corners)
         work = (
             np.empty((3, n), np.int64), np.empty((2, count + 1), np.int64),
-            np.empty(len(tiles.boxes), np.int64), Paths.room(count), Paths.room(m),
+            np.empty(len(tiles.boxes), np.int64), Paths(np.empty(count), np.empty((count, 4), np.int64)),
+            TilePaths(np.empty(tiles.places[0].shape), np.empty((3, *tiles.places[0].shape), np.int64)),
         )  # fmt: skip
         found = np.empty(m), np.empty((3, m), np.int64)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray, frozen
 from robocov.arrays.grouping import beginnings
-from robocov.cost.site_paths import GROUP, Tiles
+from robocov.cost.site_paths import GROUP, SLOTS, TILE, Tiles
 from robocov.errors import ParameterError
 from robocov.geodesic.walls import along_z_curve, box_tree
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from robocov.geodesic import Geodesics
 
 Number = TypeVar("Number", bound=np.generic)
-
-TILE = 4
-"""Cells along a side of a tile."""
 
 _BLOCK = 1 << 18
 """Cells that are looked at together, which bounds the memory."""
@@ -86,15 +83,17 @@ def lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
 
     tile = along_z_curve(cells % side // TILE, cells // side // TILE)
     order = np.argsort(tile, kind="stable")
-    places = grid.snap(sites.points[order])
     begin = beginnings(tile[order])
-    boxes = _boxes(places, places, begin)
-    groups = _boxes(boxes[:, :2], boxes[:, 2:], np.arange(0, len(boxes), GROUP))
-    facts = np.column_stack([order, component[order]])
-    tree = box_tree(boxes[:, :2], boxes[:, 2:])
-    return sites, Tiles(places, facts, np.append(begin, len(cells)), boxes, groups, tree)
-
-
-def _boxes(low: Array, high: Array, begin: IntArray) -> Array:
-    """Return boxes around groups of boxes, given by where the groups begin."""
-    return np.hstack([np.minimum.reduceat(low, begin), np.maximum.reduceat(high, begin)])
+    sizes = np.diff(begin, append=len(order))
+    slots = np.arange(SLOTS)
+    empty = slots >= sizes[:, None]
+    slots = np.where(empty, begin[:, None], begin[:, None] + slots)
+    places = np.ascontiguousarray(np.moveaxis(grid.snap(sites.points[order])[slots], -1, 0))
+    low, high = places.min(axis=2).T, places.max(axis=2).T
+    groups = np.arange(0, len(low), GROUP)
+    boxes, around = (
+        np.hstack([np.minimum.reduceat(low, each), np.maximum.reduceat(high, each)])
+        for each in (np.arange(len(low)), groups)
+    )
+    facts = np.stack([np.where(empty, -1, order[slots]), component[order][slots]])
+    return sites, Tiles(places, facts, boxes, around, box_tree(low, high))

@@ -20,16 +20,22 @@ from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
 GROUP = 16
 """Tiles that are looked at together first."""
 
+TILE = 4
+"""Cells along a side of a tile."""
+
+SLOTS = TILE * TILE
+
+_FEW = 12
+"""Robots of which it is known from the beginning what they see, however far: each is asked of most sites."""
+
 
 class Tiles(NamedTuple):
-    """The sites of a lattice in square tiles of at most 64, neighbours together, grid steps."""
+    """The sites of a lattice in square tiles, neighbours together, grid steps; a tile need not be full."""
 
-    sites: Array
-    """(m, 2) Where they are, by tile."""
+    places: Array
+    """(2, t, SLOTS) x and y; of a slot without a site those of another one of the tile."""
     facts: IntArray
-    """(m, 2) Their numbers in the lattice, and which component of the free space holds them."""
-    first: IntArray
-    """(t + 1,) The sites of a tile are those from its own `first` up to the next."""
+    """(2, t, SLOTS) Their numbers in the lattice, -1 without a site, and which component holds them."""
     boxes: Array
     """(t, 4) Around the sites of each tile,"""
     groups: Array
@@ -46,22 +52,27 @@ class CornerViews(NamedTuple):
     rows: IntArray
     """(r, 2) The corner, and a bit for each site of the tile: whether it is in useful view."""
     spans: Array
-    """(r, 2) Distance of the nearest of these sites; of the farthest if all are in useful view, else inf."""
+    """(r, 2) Distances of the nearest and the farthest of these sites."""
 
 
 class Paths(NamedTuple):
-    """The shortest ways to sites or corners."""
+    """The shortest ways to corners."""
 
     distance: Array
-    """(m,) grid steps, inf where none leads."""
+    """(k,) grid steps, inf where none leads."""
     ways: IntArray
-    """(m, 4) The robot where it begins, the corners where it bends first and last, -1 for none; and the robot
+    """(k, 4) The robot where it begins, the corners where it bends first and last, -1 for none; and the robot
     that is nearest as the crow flies."""
 
-    @classmethod
-    def room(cls, m: int) -> Paths:
-        """Return room for the ways to so many sites."""
-        return cls(np.empty(m), np.empty((m, 4), np.int64))
+
+class TilePaths(NamedTuple):
+    """The shortest ways to sites."""
+
+    distance: Array
+    """(t, SLOTS) grid steps, inf where none leads."""
+    ways: IntArray
+    """(3, t, SLOTS) The robot where it begins, the corner where it bends last, -1 for none; and the robot
+    that is nearest as the crow flies."""
 
 
 @inner_kernel
@@ -99,17 +110,14 @@ def corner_views(
 @inner_kernel
 def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, tile: int, span: Array) -> int:
     """Return the mask of a tile's sites in useful view of a corner; write their span."""
-    mask, bit, least, most = 0, 1, np.inf, 0.0
-    for s in range(tiles.first[tile], tiles.first[tile + 1]):
-        x, y = tiles.sites[s, 0], tiles.sites[s, 1]
-        if useful(walls.corners, k, x, y) and sees(walls, index, 0, x, y):
-            mask |= bit
+    mask, least, most = 0, np.inf, 0.0
+    for s in range(SLOTS):
+        x, y = tiles.places[0, tile, s], tiles.places[1, tile, s]
+        if tiles.facts[0, tile, s] >= 0 and useful(walls.corners, k, x, y) and sees(walls, index, 0, x, y):
+            mask |= 1 << s
             dx, dy = x - walls.corners[k, 0], y - walls.corners[k, 1]
             length = np.sqrt(dx * dx + dy * dy)
             least, most = min(least, length), max(most, length)
-        else:
-            most = np.inf
-        bit <<= 1
     span[0], span[1] = least, most
     return mask
 
@@ -140,20 +148,6 @@ def _within(
 
 
 @inner_kernel
-def _nearest_robot(
-    x: float, y: float, robots: Array, given: IntArray, count: int, paths: Paths, k: int
-) -> None:
-    """Write the nearest of `count` given robots as the crow flies, of equals the first, and its distance."""
-    best, nearest = np.inf, -1
-    for j in range(count):
-        dx, dy = x - robots[given[j], 0], y - robots[given[j], 1]
-        if dx * dx + dy * dy < best:
-            best, nearest = dx * dx + dy * dy, given[j]
-    paths.distance[k], paths.ways[k, 0], paths.ways[k, 3] = np.sqrt(best), nearest, nearest
-    paths.ways[k, 1], paths.ways[k, 2] = -1, -1
-
-
-@inner_kernel
 def _paths_to_corners(
     walls: Walls, graph: Graph, index: AngularWallIndex, robots: Array, lists: IntArray, queue: IntArray,
     paths: Paths,
@@ -165,8 +159,13 @@ def _paths_to_corners(
         x, y = corners[k, 0], corners[k, 1]
         if k % LEAF == 0:
             near = _perhaps_nearest(boxes, leaves + k // LEAF, robots, everyone, n, some)
-        _nearest_robot(x, y, robots, some, near, paths, k)
-        i, queue[1, k] = paths.ways[k, 0], 0
+        best, i, queue[1, k] = np.inf, -1, 0
+        for j in range(near):
+            dx, dy = x - robots[some[j], 0], y - robots[some[j], 1]
+            if dx * dx + dy * dy < best:
+                best, i = dx * dx + dy * dy, some[j]
+        paths.distance[k], paths.ways[k, 0], paths.ways[k, 3] = np.sqrt(best), i, i
+        paths.ways[k, 1], paths.ways[k, 2] = -1, -1
         if useful(corners, k, robots[i, 0], robots[i, 1]) and sees(walls, index, i, x, y):
             paths.ways[k, 1] = k
             queue[0, waiting], queue[1, k] = k, 1
@@ -201,80 +200,105 @@ def _paths_to_corners(
 
 
 @inner_kernel
+def _nearest_robots(
+    tiles: Tiles, tile: int, robots: Array, some: IntArray, count: int, paths: TilePaths
+) -> None:
+    """Write the nearest of `count` robots to the sites of a tile as the crow flies, of equals the first."""
+    for s in range(SLOTS):
+        paths.distance[tile, s] = np.inf
+    for j in range(count):
+        i = some[j]
+        x, y = robots[i, 0], robots[i, 1]
+        for s in range(SLOTS):
+            dx, dy = tiles.places[0, tile, s] - x, tiles.places[1, tile, s] - y
+            away2, best = dx * dx + dy * dy, paths.distance[tile, s]
+            paths.ways[2, tile, s] = i if away2 < best else paths.ways[2, tile, s]
+            paths.distance[tile, s] = away2 if away2 < best else best
+    for s in range(SLOTS):
+        paths.distance[tile, s] = np.sqrt(paths.distance[tile, s])
+        paths.ways[0, tile, s], paths.ways[1, tile, s] = paths.ways[2, tile, s], -1
+
+
+@inner_kernel
 def _by_corners(
-    tiles: Tiles, views: CornerViews, corners: Array, to: Paths, tile: int, hidden: int, paths: Paths
+    tiles: Tiles, views: CornerViews, corners: Array, to: Paths, tile: int, hidden: int, paths: TilePaths
 ) -> float:
     """Write the shortest ways to the hidden sites of a tile by a corner; return the longest of these."""
-    # a row cannot be the best for any site of its tile where another one is better for all of them
-    bound, begin = np.inf, tiles.first[tile]
+    # a row cannot be the best for any of them where another one is better for all
+    bound = np.inf
     for row in range(views.first[tile], views.first[tile + 1]):
-        bound = min(bound, to.distance[views.rows[row, 0]] + views.spans[row, 1])
+        if hidden & ~views.rows[row, 1] == 0:
+            bound = min(bound, to.distance[views.rows[row, 0]] + views.spans[row, 1])
     for row in range(views.first[tile], views.first[tile + 1]):
         k, mask = views.rows[row, 0], views.rows[row, 1] & hidden
-        if mask == 0 or to.distance[k] + views.spans[row, 0] > bound or to.distance[k] == np.inf:
+        begin, owner = to.distance[k], to.ways[k, 0]
+        if mask == 0 or begin + views.spans[row, 0] > bound or begin == np.inf:
             continue
-        for s in range(begin, tiles.first[tile + 1]):
-            if (mask >> (s - begin)) & 1:
-                dx, dy = tiles.sites[s, 0] - corners[k, 0], tiles.sites[s, 1] - corners[k, 1]
-                total = to.distance[k] + np.sqrt(dx * dx + dy * dy)
-                owner = to.ways[k, 0]
-                if total < paths.distance[s] or (total == paths.distance[s] and owner < paths.ways[s, 0]):
-                    paths.distance[s], paths.ways[s, 0], paths.ways[s, 1] = total, owner, to.ways[k, 1]
-                    paths.ways[s, 2] = k
+        for s in range(SLOTS):
+            if (mask >> s) & 1:
+                dx, dy = tiles.places[0, tile, s] - corners[k, 0], tiles.places[1, tile, s] - corners[k, 1]
+                total, best = begin + np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
+                if total < best or (total == best and owner < paths.ways[0, tile, s]):
+                    paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = total, owner, k
+    return _farthest(tile, hidden, paths)
+
+
+@inner_kernel
+def _farthest(tile: int, hidden: int, paths: TilePaths) -> float:
+    """Return the longest of the ways to the hidden sites of a tile."""
     farthest = 0.0
-    for s in range(begin, tiles.first[tile + 1]):
-        if (hidden >> (s - begin)) & 1:
-            farthest = max(farthest, paths.distance[s])
+    for s in range(SLOTS):
+        if (hidden >> s) & 1:
+            farthest = max(farthest, paths.distance[tile, s])
     return farthest
 
 
 @inner_kernel
 def _from_others(
-    walls: Walls, index: AngularWallIndex, robots: Array, x: float, y: float, some: IntArray, count: int,
-    paths: Paths, s: int,
+    walls: Walls, index: AngularWallIndex, robots: Array, i: int, tiles: Tiles, tile: int, hidden: int,
+    paths: TilePaths,
 ) -> None:  # fmt: skip
-    """Write the straight way to a site from one of `count` robots, but for the nearest, if it is shorter."""
-    for j in range(count):
-        i = some[j]
-        dx, dy = x - robots[i, 0], y - robots[i, 1]
-        away = np.sqrt(dx * dx + dy * dy)
-        if (
-            i != paths.ways[s, 3]
-            and (away < paths.distance[s] or (away == paths.distance[s] and i < paths.ways[s, 0]))
-            and sees(walls, index, i, x, y)
-        ):
-            paths.distance[s], paths.ways[s, 0], paths.ways[s, 1], paths.ways[s, 2] = away, i, -1, -1
+    """Write the straight ways from a robot to the hidden sites of a tile where they are the shortest."""
+    for s in range(SLOTS):
+        if (hidden >> s) & 1:
+            x, y = tiles.places[0, tile, s], tiles.places[1, tile, s]
+            dx, dy = x - robots[i, 0], y - robots[i, 1]
+            away, best = np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
+            if (
+                (away < best or (away == best and i < paths.ways[0, tile, s]))
+                and i != paths.ways[2, tile, s]
+                and sees(walls, index, i, x, y)
+            ):
+                paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = away, i, -1
 
 
 @inner_kernel
 def _seen_from_nearest(
-    walls: Walls, index: AngularWallIndex, tiles: Tiles, tile: int, covered: BoolArray, paths: Paths
+    walls: Walls, index: AngularWallIndex, tiles: Tiles, tile: int, covered: BoolArray, paths: TilePaths
 ) -> int:
     """Return the mask of the sites of a tile that do not see their nearest robot."""
-    mask, bit = 0, 1
-    for s in range(tiles.first[tile], tiles.first[tile + 1]):
-        if not covered[tiles.facts[s, 1]]:
-            paths.distance[s], paths.ways[s, 0] = np.inf, -1
-        elif not sees(walls, index, paths.ways[s, 0], tiles.sites[s, 0], tiles.sites[s, 1]):
-            mask |= bit
-        bit <<= 1
+    mask = 0
+    for s in range(SLOTS):
+        if not covered[tiles.facts[1, tile, s]]:
+            paths.distance[tile, s], paths.ways[0, tile, s] = np.inf, -1
+        elif tiles.facts[0, tile, s] >= 0 and not sees(
+            walls, index, paths.ways[2, tile, s], tiles.places[0, tile, s], tiles.places[1, tile, s]
+        ):
+            paths.distance[tile, s] = np.inf
+            mask |= 1 << s
     return mask
 
 
 @inner_kernel
 def _unhide(
     walls: Walls, tiles: Tiles, views: CornerViews, robots: Array, index: AngularWallIndex, lists: IntArray,
-    hidden: IntArray, to_corners: Paths, paths: Paths,
+    hidden: IntArray, to_corners: Paths, paths: TilePaths,
 ) -> None:  # fmt: skip
     """Write the ways to the sites that do not see the robot that is nearest as the crow flies."""
     for group in range(len(tiles.groups)):
         begin, end, bound = group * GROUP, min(group * GROUP + GROUP, len(tiles.boxes)), -1.0
         for tile in range(begin, end):
             if hidden[tile]:
-                first = tiles.first[tile]
-                for s in range(first, tiles.first[tile + 1]):
-                    if (hidden[tile] >> (s - first)) & 1:
-                        paths.distance[s] = np.inf
                 far = _by_corners(tiles, views, walls.corners, to_corners, tile, hidden[tile], paths)
                 bound = max(bound, far)
         if bound < 0.0:
@@ -283,40 +307,31 @@ def _unhide(
         near = _within(tiles.groups, group, robots, bound * bound, lists[0], len(robots), lists[1])
         for tile in range(begin, end):
             if hidden[tile]:
-                first, bound = tiles.first[tile], 0.0
-                for s in range(first, tiles.first[tile + 1]):
-                    if (hidden[tile] >> (s - first)) & 1:
-                        bound = max(bound, paths.distance[s])
-                count = 0
+                bound = _farthest(tile, hidden[tile], paths)
                 for j in range(near):
                     i = lists[1, j]
                     near_enough = near2(tiles.boxes, tile, robots[i, 0], robots[i, 1]) <= bound * bound
                     if near_enough and not beyond_horizon(tiles.boxes, tile, index, i):
-                        lists[2, count] = i
-                        count += 1
-                for s in range(first, tiles.first[tile + 1]):
-                    if (hidden[tile] >> (s - first)) & 1:
-                        x, y = tiles.sites[s, 0], tiles.sites[s, 1]
-                        _from_others(walls, index, robots, x, y, lists[2], count, paths, s)
+                        _from_others(walls, index, robots, i, tiles, tile, hidden[tile], paths)
 
 
 @inner_kernel
 def site_paths(
     walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, robots: Array, covered: BoolArray,
     index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
-    paths: Paths, unit: float, out_distance: Array, out_ways: IntArray,
+    paths: TilePaths, unit: float, out_distance: Array, out_ways: IntArray,
 ) -> int:  # fmt: skip
     """Write the ways of the nearest of (n, 2) robots, which stand in the components that are `covered`.
 
     Parameters
     ----------
     lists : (3, n)
-        For work, as are `queue`, (2, k + 1), `hidden`, (2, t), and the ways by tile.
+        For work, as are `queue`, (2, k + 1), `hidden`, (t,), and the ways to corners and by tile.
     unit : float
         Length of a grid step.
     out_distance : (m,)
     out_ways : (3, m)
-        As `Paths` has them, by site.
+        The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
 
     Returns
     -------
@@ -330,13 +345,13 @@ def site_paths(
         if tile % GROUP == 0:
             near = _perhaps_nearest(tiles.groups, tile // GROUP, robots, lists[0], n, lists[1])
         some = _perhaps_nearest(tiles.boxes, tile, robots, lists[1], near, lists[2])
-        for s in range(tiles.first[tile], tiles.first[tile + 1]):
-            _nearest_robot(tiles.sites[s, 0], tiles.sites[s, 1], robots, lists[2], some, paths, s)
-            i = paths.ways[s, 0]
-            index.sources[i, 2] = max(index.sources[i, 2], paths.distance[s])
+        _nearest_robots(tiles, tile, robots, lists[2], some, paths)
+        for s in range(SLOTS):
+            i = paths.ways[2, tile, s]
+            index.sources[i, 2] = max(index.sources[i, 2], paths.distance[tile, s])
     used = 0
     for i in range(n):
-        reach = index.sources[i, 2] * (1.0 + 1e-9)
+        reach = index.sources[i, 2] * (1.0 + 1e-9) if n > _FEW else np.inf
         used = enter_walls(walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
         if used < 0:
             return -1
@@ -347,9 +362,11 @@ def site_paths(
     if any_hidden:
         _paths_to_corners(walls, graph, index, robots, lists, queue, to_corners)
         _unhide(walls, tiles, views, robots, index, lists, hidden, to_corners, paths)
-    for s in range(len(paths.distance)):
-        site = tiles.facts[s, 0]
-        out_distance[site] = paths.distance[s] * unit
-        for part in range(3):
-            out_ways[part, site] = paths.ways[s, part]
+    for tile in range(count):
+        for s in range(SLOTS):
+            site, last = tiles.facts[0, tile, s], paths.ways[1, tile, s]
+            if site >= 0:
+                out_distance[site] = paths.distance[tile, s] * unit
+                out_ways[0, site], out_ways[2, site] = paths.ways[0, tile, s], last
+                out_ways[1, site] = to_corners.ways[last, 1] if last >= 0 else -1
     return used

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from robocov.cost.lattice import TILE, lattice_of
-from robocov.cost.site_paths import GROUP
+from robocov.cost.lattice import lattice_of
+from robocov.cost.site_paths import GROUP, TILE
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
@@ -31,18 +31,17 @@ def test_the_sites_are_the_free_cell_centres_row_by_row():
 @pytest.mark.parametrize("side", [1, 3, 20, 37])
 def test_tiles_are_squares_of_cells(side):
     _, sites, tiles = lattice(side)
-    number = tiles.facts[:, 0]
+    full = tiles.facts[0] >= 0
+    number, places = tiles.facts[0][full], tiles.places[:, full].T
     row, column = np.divmod(sites.cells[number], side)
     np.testing.assert_array_equal(np.sort(number), np.arange(len(sites.cells)))
     # one tile, one square
-    count = len(tiles.boxes)
-    tile = np.repeat(np.arange(count), np.diff(tiles.first))
+    tile = np.nonzero(full)[0]
     square = row // TILE * side + column // TILE
     pairs = set(zip(tile.tolist(), square.tolist(), strict=True))
-    assert len(pairs) == len(set(square.tolist())) == count
+    assert len(pairs) == len(set(square.tolist())) == len(tiles.boxes)
     for boxes in (tiles.boxes[tile], tiles.groups[tile // GROUP]):
-        assert (boxes[:, :2] <= tiles.sites).all()
-        assert (tiles.sites <= boxes[:, 2:]).all()
+        assert (boxes[:, :2] <= places).all() and (places <= boxes[:, 2:]).all()
 
 
 def test_a_lattice_without_a_free_cell_is_refused():
