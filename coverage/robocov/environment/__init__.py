@@ -77,7 +77,7 @@ class ObstaclePath:
         """Return by how much the obstacle has moved at a time, s; (2,) m."""
         line, along = self._line
         place = (time * self.speed) % along[-1]
-        return np.array([np.interp(place, along, line[:, k]) for k in (0, 1)]) - line[0]
+        return np.asarray(np.array([np.interp(place, along, line[:, k]) for k in (0, 1)]) - line[0])
 
 
 @dataclass(frozen=True)
