@@ -1,12 +1,14 @@
 """What robots see of a map: visibility polygons, exact, and the areas that a team covers.
 
-A robot's view is divided at the directions of all corners. Between two neighbouring ones the nearest wall is
-one and the same, so that one ray through the middle finds it, and the view there is the triangle of the robot
-and the two places where the wall's line meets the directions. No direction is ever shifted by a little.
+A robot's view is divided at the directions of the ends of all walls that face it. Between two neighbouring
+ones the nearest wall is one and the same, so that one ray through the middle finds it, and the view there is
+the triangle of the robot and the two places where the wall's line meets the directions. No direction is ever
+shifted by a little.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,56 +17,74 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inner_kernel
+from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle
+from robocov.geodesic.walls import Grid, walls_of
+
+_BINS = 512
+"""Angular bins of a robot's view."""
 
 _QUARTER = 128
 """Sides of a quarter of the polygon that stands for a disc of sensing: its area is 2.5e-5 too small."""
 
 
-def visibility_polygon(free: BaseGeometry, place: Array) -> BaseGeometry:
-    """Return what is seen from a place, (2,) m, within the free space: a polygon, empty from outside.
+def views(free: BaseGeometry, places: Array) -> Iterator[BaseGeometry]:
+    """Yield what is seen from each of (n, 2) places, m, within the free space, as a polygon.
 
-    Examples
-    --------
     An L of three squares of 1 m, seen from the middle of one end:
 
     >>> room = shapely.Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
-    >>> visibility_polygon(room, np.array([0.5, 1.5])).area
+    >>> round(next(views(room, np.array([[0.5, 1.5]]))).area, 9)
     2.5
     """
-    if not shapely.contains_xy(free, *place):
-        return shapely.Polygon()
-    rings = map(shapely.get_coordinates, shapely.get_rings(shapely.get_parts(free)))
-    walls = np.concatenate([np.hstack([ring[:-1] - place, np.diff(ring, axis=0)]) for ring in rings])
-    turns = np.unique(np.arctan2(walls[:, 1], walls[:, 0]))
-    begin, end = turns, np.append(turns[1:], turns[0] + 2.0 * np.pi)
-    middle, wall = (begin + end) / 2.0, np.empty(len(turns), dtype=np.int64)
-    _nearest_walls(walls, np.column_stack([np.cos(middle), np.sin(middle)]), wall)
-    seen = wall >= 0
-    corners = [_meeting(walls[wall[seen]], angles[seen]) for angles in (begin, end)]
-    view = shapely.Polygon(place + np.stack(corners, axis=1).reshape(-1, 2))
-    # it may touch itself where corners are in line
-    return view if shapely.is_valid(view) else shapely.make_valid(view)
+    low_x, low_y, high_x, high_y = free.bounds
+    grid = Grid.over(np.array([low_x, low_y]), max(high_x - low_x, high_y - low_y))
+    parts = shapely.orient_polygons(shapely.get_parts(free))
+    walls = walls_of(shapely.transform(shapely.multipolygons(parts), grid.snap))
+    # the hull of the map hides nothing, but is seen
+    walls.facts[:, 2] = 1
+    index = AngularWallIndex.room(1, _BINS, 64 * _BINS)
+    for place in grid.snap(places):
+        while (used := enter_walls(walls, index, 0, place[0], place[1], np.inf, 0)) < 0:
+            index = AngularWallIndex.room(1, _BINS, 2 * len(index.entries))
+        facing = walls.ends[np.unique(index.entries[:used, 0])].reshape(-1, 2) - place
+        turns = np.unique(np.arctan2(facing[:, 1], facing[:, 0]))
+        begin, end = turns, np.append(turns[1:], turns[0] + 2.0 * np.pi)
+        middle, wall = (begin + end) / 2.0, np.empty(len(turns), dtype=np.int64)
+        _nearest_walls(walls.ends, index, np.column_stack([np.cos(middle), np.sin(middle)]), wall)
+        seen = wall >= 0
+        begin, end, wall = begin[seen], end[seen], wall[seen]
+        first = np.flatnonzero(wall != np.roll(wall, 1))
+        last = np.roll(first, -1) - 1
+        walls_seen = walls.ends[wall[first]] - np.tile(place, 2)
+        corners = [_meeting(walls_seen, angles) for angles in (begin[first], end[last])]
+        view = shapely.Polygon(grid.metres(place + np.stack(corners, axis=1).reshape(-1, 2)))
+        # it may touch itself where corners are in line
+        yield view if shapely.is_valid(view) else shapely.make_valid(view)
 
 
 @inner_kernel
-def _nearest_walls(walls: Array, rays: Array, nearest: IntArray) -> None:
-    """Write which of (w, 4) walls, start and along, (m, 2) rays from the origin hit first, -1 for none."""
+def _nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
+    """Write which wall each of (m, 2) rays from the source hits first, -1 for none."""
     for m in range(len(rays)):
         x, y = rays[m, 0], rays[m, 1]
         least, nearest[m] = np.inf, -1
-        for k in range(len(walls)):
-            ax, ay, ux, uy = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
-            # the origin, the ray and the wall: a + s u = t (x, y)
+        entry = index.head[0, int(pseudo_angle(x, y) * (_BINS * 0.25)) & (_BINS - 1)]
+        while entry >= 0:
+            wall = index.entries[entry, 0]
+            ax, ay = ends[wall, 0] - index.sources[0, 0], ends[wall, 1] - index.sources[0, 1]
+            ux, uy = ends[wall, 2] - ends[wall, 0], ends[wall, 3] - ends[wall, 1]
+            # the source, the ray and the wall: a + s u = t (x, y)
             across = x * uy - y * ux
             if across != 0.0:
                 t, s = (ax * uy - ay * ux) / across, (ax * y - ay * x) / across
                 if 0.0 <= s <= 1.0 and 0.0 < t < least:
-                    least, nearest[m] = t, k
+                    least, nearest[m] = t, wall
+            entry = index.entries[entry, 1]
 
 
 def _meeting(walls: Array, angles: Array) -> Array:
-    """Return where rays at (m,) angles meet the lines of walls, (m, 2), within the walls."""
-    x, y, along = np.cos(angles), np.sin(angles), walls[:, 2:]
+    """Return where rays from the origin at (m,) angles meet the lines of (m, 4) walls, within the walls."""
+    x, y, along = np.cos(angles), np.sin(angles), walls[:, 2:] - walls[:, :2]
     across = x * along[:, 1] - y * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (walls[:, 0] * y - walls[:, 1] * x) / across
@@ -96,13 +116,13 @@ def covered(free: BaseGeometry, places: Array, ranges: Array) -> Covered:
     places, ranges = places[inside], ranges[inside]
     if not len(places):
         return Covered(0.0, 0.0, 0.0)
-    views = [visibility_polygon(free, place) for place in places]
-    visible = float(shapely.union_all(views).area)
+    seen = list(views(free, places))
+    visible = float(shapely.union_all(seen).area)
     if np.isinf(ranges).all():
         whole = [part for part in shapely.get_parts(free) if shapely.intersects_xy(part, *places.T).any()]
         return Covered(visible, float(sum(part.area for part in whole)), visible)
     low_x, low_y, high_x, high_y = free.bounds
     far = float(np.hypot(high_x - low_x, high_y - low_y))
     discs = shapely.buffer(shapely.points(places), np.minimum(ranges, far), quad_segs=_QUARTER)
-    sensed = float(shapely.union_all([view & disc for view, disc in zip(views, discs, strict=True)]).area)
+    sensed = float(shapely.union_all(shapely.intersection(seen, discs)).area)
     return Covered(sensed, float((shapely.union_all(discs) & free).area), visible)

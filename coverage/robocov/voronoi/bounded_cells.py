@@ -121,11 +121,7 @@ def partition(
 
 
 def _partition(
-    generators: Array,
-    region: Region,
-    neighbours: Neighbours | None,
-    warm: Mesh | None,
-    heard: Array | None,
+    generators: Array, region: Region, neighbours: Neighbours | None, warm: Mesh | None, heard: Array | None
 ) -> VoronoiPartition:
     points = np.array(generators, dtype=np.float64, order="C")
     if points.ndim != 2 or points.shape[1] != 2:
