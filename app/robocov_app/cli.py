@@ -27,11 +27,8 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 TRACEBACK = "ROBOCOV_TRACEBACK"
 """Environment variable; where it is not empty, errors are shown with all that led to them."""
 
-_KERNELS = {
-    **dict.fromkeys(("run", "compare", "sweep", "demo", "report", "paper", "bench"), ("step", "cost")),
-    **dict.fromkeys(("replay", "cost", "optimum"), ("cost",)),
-}
-"""Groups of kernels that commands compile, see `robocov.compiled`."""
+_COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "bench", "replay", "cost", "optimum"}
+"""Commands that call kernels, see `robocov.compiled`."""
 
 _LONGEST = 1000
 """Characters of an error that are told."""
@@ -99,10 +96,10 @@ def _guarded(name: str, rest: list[str]) -> int:
             from robocov_app.arguments import parsed
 
             options = parsed(module.Arguments, name, rest)
-        if name in _KERNELS:
+        if name in _COMPILING:
             from robocov_app.progress import tell_of_compiling
 
-            tell_of_compiling(*_KERNELS[name])
+            tell_of_compiling()
         status = module.command(options)
         sys.stdout.flush()
     except RobocovError as error:

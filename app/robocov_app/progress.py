@@ -53,13 +53,12 @@ def _bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda done: bar.update(task, completed=done)
 
 
-def tell_of_compiling(*groups: str) -> None:
-    """Tell when kernels are compiled for the first time; see `robocov.compiled.compile_ahead`."""
+def tell_of_compiling() -> None:
+    """Tell when kernels are compiled for the first time."""
     from robocov import compiled
 
     if _tell not in compiled.on_compile:
         compiled.on_compile.append(_tell)
-    compiled.compile_ahead(*groups)
 
 
 def _tell(_: str) -> None:

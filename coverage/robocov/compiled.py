@@ -10,7 +10,8 @@ With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 from __future__ import annotations
 
 import ctypes
-import importlib
+import gc
+import importlib.util
 import os
 import pickle
 import subprocess
@@ -42,17 +43,15 @@ _COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 _LIMIT = 1 << 28
 """Bytes of all that is kept; what was not used for the longest time goes first."""
 
-GROUPS = {"cost": "robocov.cost.coverage", "step": "robocov.simulation"}
-"""Kernels that belong together: the module whose function `example` calls them all, on something tiny."""
-
 _PATIENCE = 60.0
 """Seconds for which another process is waited for."""
+
+_EXAMPLES = ["robocov.cost.coverage", "robocov.simulation"]
+"""Modules whose function `example` calls the kernels of the coverage cost, and those of a step."""
 
 _ahead: list[str] = []
 
 _helpers: list[subprocess.Popen[bytes]] = []
-
-_example: _Example | None = None
 
 on_compile: list[Callable[[str], None]] = []
 """Called with the name of each kernel that the cache does not hold, before it is compiled."""
@@ -99,7 +98,7 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         """Return what the function returns."""
-        return self._dispatcher(*args) if _example is None else _example.call(self, self._function, args)
+        return self._dispatcher(*args)
 
     @cached_property
     def _callees(self) -> dict[str, Kernel]:
@@ -187,8 +186,7 @@ class _ForeignCall(Kernel):
 def call_c(address: int, arguments: tuple[float, ...]) -> int:
     """Call a C function by its address, also from kernels, and return the word that it returns.
 
-    Arguments are floats, and whole numbers of 64 bits, which stand for pointers as well. Kernels stay in the
-    cache, as an address is an argument of theirs and no part of them.
+    Arguments are floats, and whole numbers of 64 bits, which stand for pointers as well.
     """
     passed = [each if isinstance(each, float) else int(each) for each in arguments]
     kinds = [ctypes.c_double if isinstance(each, float) else ctypes.c_ssize_t for each in passed]
@@ -204,7 +202,7 @@ class _KernelCache:
 
     def __init__(self, name: str, identity: str) -> None:
         self._name, self._identity = name, identity
-        folder, self._lock = _cache_folder(), ExitStack()
+        folder, self._held = _cache_folder(), ExitStack()
         self._cache = None if folder is None else ArrayCache(folder, _LIMIT)
 
     def _key(self, sig: Any, codegen: Any) -> str:
@@ -217,34 +215,34 @@ class _KernelCache:
         key = self._key(sig, target_context.codegen())
         found = self._loaded(key, target_context)
         if found is None:
-            for tell in on_compile:
+            for tell in tuple(on_compile):
                 tell(self._name)
-            if self._is_kept():
-                _start_helpers()
-                found = self._awaited(key, target_context)
+            found = self._awaited(key, target_context)
+        if found is None and gc.isenabled():
+            # a tenth of the time, for next to no garbage
+            gc.disable()
+            self._held.callback(gc.enable)
         return found
-
-    def _is_kept(self) -> bool:
-        if self._cache is None:
-            return False
-        with suppress(OSError):
-            self._cache.folder.mkdir(parents=True, exist_ok=True)
-        return self._cache.folder.is_dir() and os.access(self._cache.folder, os.W_OK)
 
     def _awaited(self, key: str, target_context: Any) -> Any:
         """Return what another process that has begun to compile this is going to save, None if none has."""
-        assert self._cache is not None
+        if self._cache is None:
+            return None
+        with suppress(OSError):
+            self._cache.folder.mkdir(parents=True, exist_ok=True)
+        if not (self._cache.folder.is_dir() and os.access(self._cache.folder, os.W_OK)):
+            return None
+        _start_helper()
         until = time.monotonic() + _PATIENCE
         while time.monotonic() < until:
             try:
-                self._lock.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
+                self._held.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
             except OutputError:
                 time.sleep(0.02)
                 continue
             # it may have been saved just before
-            found = self._loaded(key, target_context)
-            if found is not None:
-                self._lock.close()
+            if found := self._loaded(key, target_context):
+                self._held.close()
             return found
         return None
 
@@ -260,11 +258,10 @@ class _KernelCache:
         return None
 
     def save_overload(self, sig: Any, result: Any) -> None:
-        """Keep what was compiled."""
         if self._cache is not None:
             code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
             self._cache.save(self._key(sig, result.codegen), {"code": code})
-        self._lock.close()
+        self._held.close()
 
 
 def _cache_folder() -> Path | None:
@@ -277,68 +274,29 @@ def _cache_folder() -> Path | None:
     return (Path(ours) if ours else platformdirs.user_cache_path("robocov", appauthor=False)) / "kernels"
 
 
-def compile_ahead(*groups: str) -> None:
-    """Say which `GROUPS` of kernels are going to be called, those first that are called last.
+def compile_kernels() -> None:
+    """Have the kernels of the coverage cost and of a step in the cache, and ready to be called here.
 
-    As soon as a kernel is not in the cache, other processes compile these, at most one a core.
+    As soon as one is missing, another process compiles those of a step, if there is a core for it.
     """
-    _ahead[:] = groups
+    _ahead[:] = _EXAMPLES[1:]
+    for module in _EXAMPLES:
+        importlib.import_module(module).example()
 
 
-def _start_helpers() -> None:
+def _start_helper() -> None:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    helpers = min(len(_ahead), cores) if cores > 1 else 0
-    path = os.pathsep.join(filter(None, sys.path))
-    for k in range(helpers):
+    path, no = os.pathsep.join(filter(None, sys.path)), subprocess.DEVNULL
+    while _ahead and cores > 1:
         # -P: what lies in the working folder is not meant
-        command = [sys.executable, "-P", "-m", "robocov.compiled", *_ahead[k::helpers]]
+        command = [sys.executable, "-P", "-c", f"from {_ahead.pop()} import example; example()"]
         with suppress(OSError):
-            _helpers.append(
-                subprocess.Popen(
-                    command,
-                    env={**os.environ, "PYTHONPATH": path},
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                )
-            )
-    _ahead.clear()
-
-
-class _Example:
-    """Calls of kernels, which run as Python meanwhile."""
-
-    def __init__(self) -> None:
-        self.calls: list[tuple[Kernel, tuple[Any, ...]]] = []
-        self._inside = False
-
-    def call(self, kernel: Kernel, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
-        """Return what the function returns; keep the call, unless another kernel's function makes it."""
-        if self._inside:
-            return function(*args)
-        self.calls.append((kernel, tuple(map(kernel._dispatcher.typeof_pyval, args))))
-        self._inside = True
-        try:
-            return function(*args)
-        finally:
-            self._inside = False
-
-
-def compile_group(name: str) -> None:
-    """Compile one of the `GROUPS`, its last kernels first: who calls them begins with the others."""
-    global _example
-    module = importlib.import_module(GROUPS[name])
-    _example = example = _Example()
-    try:
-        module.example()
-    finally:
-        _example = None
-    for kernel, kinds in reversed(example.calls):
-        kernel._dispatcher.compile(kinds)
+            env = {**os.environ, "PYTHONPATH": path}
+            _helpers.append(subprocess.Popen(command, env=env, stdin=no, stdout=no, stderr=no))
 
 
 def _described(kind: Any) -> str:
-    """Return a type of numba's in words, with the names of fields."""
+    """Return a type of numba's in words."""
     if hasattr(kind, "fields"):
         return f"{kind.fields}({', '.join(map(_described, kind.types))})"
     return repr(kind)
@@ -348,10 +306,7 @@ def _numba() -> ModuleType:
     """Return numba, imported in spite of a folder `coverage` on the path."""
     if "numba" in sys.modules:
         return sys.modules["numba"]
-    # numba takes any `coverage` for coverage.py, also our source root where it is on the path: an empty
-    # entry makes it go without
-    import importlib.util
-
+    # numba takes any `coverage` for coverage.py, also our source root on the path: an empty entry hides it
     found = None if "coverage" in sys.modules else importlib.util.find_spec("coverage")
     ours = found is not None and found.origin is None
     if ours:
@@ -362,11 +317,3 @@ def _numba() -> ModuleType:
         if ours:
             del sys.modules["coverage"]
     return numba
-
-
-if __name__ == "__main__":
-    # the module that the kernels know is another one than this, which is called otherwise
-    from robocov import compiled
-
-    for group in sys.argv[1:]:
-        compiled.compile_group(group)

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import importlib
 import os
 import subprocess
 import sys
@@ -9,7 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov.compiled import GROUPS, _KernelCache, compile_group, kernel, on_compile
+from robocov.compiled import _KernelCache, compile_kernels, kernel, on_compile
+from robocov.controllers import Rapf
+from robocov.cost import CoverageCost
+from robocov.mapfile import load_map
+from robocov.simulation import Simulation
 
 ROOT = Path(__file__).parents[2]
 
@@ -64,12 +67,12 @@ def test_of_several_processes_one_compiles(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
 
 
-@pytest.mark.parametrize("group", GROUPS)
-def test_the_example_of_a_group_stands_for_real_calls(group, monkeypatch):
-    """A process that compiles ahead runs it as Python, and notes what is called with which types."""
-    compile_group(group)
+def test_all_kernels_of_a_step_and_of_the_cost_are_there_before_a_run(monkeypatch):
+    compile_kernels()
     monkeypatch.setattr(_KernelCache, "load_overload", lambda *_: pytest.fail("another signature"))
-    importlib.import_module(GROUPS[group]).example()
+    simulation = Simulation(load_map("rooms"), Rapf(), load_map("rooms").start().sample(6))
+    simulation.step()
+    CoverageCost(simulation.environment, 16)(simulation.positions)
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):

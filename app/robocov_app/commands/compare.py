@@ -33,6 +33,7 @@ class Arguments(RunOptions):
 
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
+    from robocov.compiled import compile_kernels
     from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
@@ -72,6 +73,7 @@ def command(options: Arguments) -> int:
     starts_of(environment, options)
     check_layers(options)
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
+    compile_kernels()
     cost = built_cost(environment, options.lattice, quiet=options.json)
     runs: dict[str, Run] = {}
     parts = folder_names(names)

@@ -31,6 +31,7 @@ class Arguments(RunOptions):
 
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
+    from robocov.compiled import compile_kernels
     from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
@@ -58,6 +59,7 @@ def command(options: Arguments) -> int:
     conditions_of(options)
     starts_of(environment, options)
     check_layers(options)
+    compile_kernels()
     cost = built_cost(environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as result, Interruption() as stop:

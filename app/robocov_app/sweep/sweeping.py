@@ -10,6 +10,7 @@ from itertools import compress, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, ParameterError, RobocovError, shown
 from robocov_app.interruption import Interruption
 from robocov_app.sweep.ledger import difference_of, opened, study_bytes
@@ -138,6 +139,7 @@ def sweep(
 
         def hired() -> Crew:
             if scheduler is None:
+                compile_kernels()
                 return LocalPool(min(workers or processors(), sum(survey.todo)))
             from robocov_app.sweep.cluster import Cluster
 
