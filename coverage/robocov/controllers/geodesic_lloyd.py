@@ -19,6 +19,7 @@ from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
+from robocov.optimum import nearest_inside
 from robocov.robots import Team
 
 _SEGMENTS = 2  # edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it
@@ -125,13 +126,15 @@ class Plan:
     def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
         """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
         n = len(seen.positions)
-        places = self._inside(seen.positions)
+        places = nearest_inside(self.room, seen.positions)
         if seen.neighbours.complete:
             goals = self._goals(places, np.arange(n), exponent)
         else:
             goals = np.empty_like(places)
             for i in range(n):
-                team = np.concatenate([places[i : i + 1], self._inside(seen.neighbour_positions(i))])
+                team = np.concatenate(
+                    [places[i : i + 1], nearest_inside(self.room, seen.neighbour_positions(i))]
+                )
                 goals[i] = self._goals(team, np.zeros(1, dtype=np.intp), exponent)[0]
         way, beyond = goals.copy(), np.zeros(n)
         lines = shapely.linestrings(np.stack([places, goals], axis=1))
@@ -159,18 +162,7 @@ class Plan:
         goals = np.column_stack([np.bincount(owner, weight * part, minlength=n) for part in first.T])
         held = total > 0.0
         goals = np.where(held[:, None], goals / np.where(held, total, 1.0)[:, None], places)
-        return self._inside(np.asarray(goals[some], dtype=np.float64))
-
-    def _inside(self, places: Array) -> Array:
-        """Return the nearest places in the room."""
-        points = shapely.points(places)
-        away = np.flatnonzero(~shapely.intersects(self.room, points))
-        if not len(away):
-            return places
-        places = places.copy()
-        lines = shapely.shortest_line(self.room, points[away])
-        places[away] = shapely.get_coordinates(lines)[::2]
-        return places
+        return nearest_inside(self.room, np.asarray(goals[some], dtype=np.float64))
 
 
 def _obstacle(part: Polygon) -> PolygonObstacle:

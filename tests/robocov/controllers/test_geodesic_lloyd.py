@@ -26,6 +26,7 @@ from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
+from robocov.optimum import nearest_inside
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
@@ -43,7 +44,7 @@ def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, expon
     """The claim, for a step of robots without inertia: sum of d^s over the sites falls, or stays."""
     environment = generated_map(seed % 20, kind=kind)
     plan = Plan(environment, 0.13, 32)
-    places = plan._inside(environment.start("uniform").sample(4, seed=seed))
+    places = nearest_inside(plan.room, environment.start("uniform").sample(4, seed=seed))
     nothing = np.full((4, 2), np.nan)
     raised = []
     for _ in range(6):

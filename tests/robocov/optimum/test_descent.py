@@ -11,7 +11,7 @@ from scipy.spatial.distance import pdist
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.optimum.descent import Room, _direction, descended
+from robocov.optimum import Room, _direction, descended
 
 OFFICE = Environment(
     "office",

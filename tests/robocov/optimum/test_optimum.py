@@ -18,8 +18,7 @@ from robocov.errors import ParameterError
 from robocov.generator import generated_map
 from robocov.k_median import seeded
 from robocov.mapfile import load_map
-from robocov.optimum import optimum
-from robocov.optimum.search import _Search
+from robocov.optimum import _Search, optimum
 
 
 def room(width, height, *obstacles, name="room"):
@@ -198,7 +197,7 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
         # what is far from most is there
         return np.argsort(table.sum(axis=0))[::-1][:count]
 
-    monkeypatch.setattr("robocov.optimum.search.seeded", all_in_the_small_one)
+    monkeypatch.setattr("robocov.optimum.seeded", all_in_the_small_one)
     search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
     drawn = search.places[all_in_the_small_one(search.table, 3, None)]
     best = optimum(halves, 3, lattice=32, restarts=1)
