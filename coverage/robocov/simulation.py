@@ -283,17 +283,22 @@ class Simulation:
         """Make one control step.
 
         External forces, (n, 2) N, act as by a hand, beside the controller's; see `World.step`. A record does
-        not know of them. `forces`, (n, 2) N, are in place of the controller's, as by one who learns.
+        not know of them. `forces`, (n, 2) N, are in place of the controller's, as by one who learns; it is
+        not asked then.
 
         Raises ParameterError when one of them, or what the controller returns, is not finite and (n, 2).
         """
-        snapshot, count = self.snapshot, len(self.team)
-        decision = snapshot.decision
+        count, memory = len(self.team), self.memory
         if external_forces is not None:
             external_forces = given_forces(external_forces, count, "external_forces")
-        forces = decision.forces if forces is None else given_forces(forces, count, "forces")
-        self._world.step(forces, self.dt, external_forces, time=snapshot.seen.time)
-        self.memory, self.inbox = decision.memory, snapshot.inbox
+        if forces is None:
+            decision = self.snapshot.decision
+            forces, memory = decision.forces, decision.memory
+        else:
+            forces = given_forces(forces, count, "forces")
+        inbox = None if self._perception is None else self._observed()[1]
+        self._world.step(forces, self.dt, external_forces, time=self.time)
+        self.memory, self.inbox = memory, inbox
         self._steps += 1
         self._begin_step()
 

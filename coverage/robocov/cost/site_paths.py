@@ -316,28 +316,12 @@ def _unhide(
 
 
 @inner_kernel
-def site_paths(
+def _team_paths(
     walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, robots: Array, covered: BoolArray,
     index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
-    paths: TilePaths, unit: float, out_distance: Array, out_ways: IntArray,
+    paths: TilePaths,
 ) -> int:  # fmt: skip
-    """Write the ways of the nearest of (n, 2) robots, which stand in the components that are `covered`.
-
-    Parameters
-    ----------
-    lists : (3, n)
-        For work, as are `queue`, (2, k + 1), `hidden`, (t,), and the ways to corners and by tile.
-    unit : float
-        Length of a grid step.
-    out_distance : (m,)
-    out_ways : (3, m)
-        The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
-
-    Returns
-    -------
-    int
-        Not negative if there was room in the index.
-    """
+    """Write the ways of the nearest of (n, 2) robots; return a number that is negative without room."""
     n, count = len(robots), len(tiles.boxes)
     for i in range(n):
         lists[0, i], index.sources[i, 2] = i, 0.0
@@ -362,11 +346,47 @@ def site_paths(
     if any_hidden:
         _paths_to_corners(walls, graph, index, robots, lists, queue, to_corners)
         _unhide(walls, tiles, views, robots, index, lists, hidden, to_corners, paths)
-    for tile in range(count):
-        for s in range(SLOTS):
-            site, last = tiles.facts[0, tile, s], paths.ways[1, tile, s]
-            if site >= 0:
-                out_distance[site] = paths.distance[tile, s] * unit
-                out_ways[0, site], out_ways[2, site] = paths.ways[0, tile, s], last
-                out_ways[1, site] = to_corners.ways[last, 1] if last >= 0 else -1
+    return used
+
+
+@inner_kernel
+def site_paths(
+    walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, teams: Array, covered: BoolArray,
+    index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
+    paths: TilePaths, unit: float, distances: Array, ways: IntArray,
+) -> int:  # fmt: skip
+    """Write the ways of the nearest robots of each of some teams.
+
+    Parameters
+    ----------
+    teams : (r, n, 2)
+    covered : (r, c)
+        Which components of the free space hold robots of each.
+    lists : (3, n)
+        For work, as are `queue`, (2, k + 1), `hidden`, (t,), and the ways to corners and by tile.
+    unit : float
+        Length of a grid step.
+    distances : (r, m)
+    ways : (r, 3, m)
+        The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
+
+    Returns
+    -------
+    int
+        Not negative if there was room in the index.
+    """
+    used = 0
+    for r in range(len(teams)):
+        used = _team_paths(
+            walls, graph, tiles, views, teams[r], covered[r], index, lists, queue, hidden, to_corners, paths
+        )  # fmt: skip
+        if used < 0:
+            break
+        for tile in range(len(tiles.boxes)):
+            for s in range(SLOTS):
+                site, last = tiles.facts[0, tile, s], paths.ways[1, tile, s]
+                if site >= 0:
+                    distances[r, site] = paths.distance[tile, s] * unit
+                    ways[r, 0, site], ways[r, 2, site] = paths.ways[0, tile, s], last
+                    ways[r, 1, site] = to_corners.ways[last, 1] if last >= 0 else -1
     return used
