@@ -46,8 +46,8 @@ _LIMIT = 1 << 28
 _PATIENCE = 60.0
 """Seconds for which another process is waited for."""
 
-_EXAMPLES = ["robocov.cost.coverage", "robocov.simulation"]
-"""Modules whose function `example` calls the kernels of the coverage cost, and those of a step."""
+_EXAMPLES = ["robocov.cost.coverage", "robocov.simulation", "robocov.metrics"]
+"""Modules whose function `example` calls the kernels of the coverage cost, a step, and a summary."""
 
 _ahead: list[str] = []
 
@@ -275,9 +275,9 @@ def _cache_folder() -> Path | None:
 
 
 def compile_kernels() -> None:
-    """Have the kernels of the coverage cost and of a step in the cache, and ready to be called here.
+    """Have the kernels of a run and its summary in the cache, and ready to be called here.
 
-    As soon as one is missing, another process compiles those of a step, if there is a core for it.
+    As soon as one is missing, another process compiles all but those of the cost, if there is a core for it.
     """
     _ahead[:] = _EXAMPLES[1:]
     for module in _EXAMPLES:
@@ -287,9 +287,10 @@ def compile_kernels() -> None:
 def _start_helper() -> None:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     path, no = os.pathsep.join(filter(None, sys.path)), subprocess.DEVNULL
-    while _ahead and cores > 1:
+    if _ahead and not _helpers and cores > 1:
+        script = "; ".join(f"import {module}; {module}.example()" for module in _ahead)
         # -P: what lies in the working folder is not meant
-        command = [sys.executable, "-P", "-c", f"from {_ahead.pop()} import example; example()"]
+        command = [sys.executable, "-P", "-c", script]
         with suppress(OSError):
             env = {**os.environ, "PYTHONPATH": path}
             _helpers.append(subprocess.Popen(command, env=env, stdin=no, stdout=no, stderr=no))

@@ -12,6 +12,8 @@ from robocov.compiled import _KernelCache, compile_kernels, kernel, on_compile
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.mapfile import load_map
+from robocov.metrics import cost_history, summarise
+from robocov.record import Recorder
 from robocov.simulation import Simulation
 
 ROOT = Path(__file__).parents[2]
@@ -70,9 +72,13 @@ def test_of_several_processes_one_compiles(tmp_path):
 def test_all_kernels_of_a_step_and_of_the_cost_are_there_before_a_run(monkeypatch):
     compile_kernels()
     monkeypatch.setattr(_KernelCache, "load_overload", lambda *_: pytest.fail("another signature"))
-    simulation = Simulation(load_map("rooms"), Rapf(), load_map("rooms").start().sample(6))
-    simulation.step()
-    CoverageCost(simulation.environment, 16)(simulation.positions)
+    rooms = load_map("rooms")
+    simulation = Simulation(rooms, Rapf(), rooms.start().sample(6))
+    recorder = Recorder(rooms, simulation.team, Rapf(), simulation.dt)
+    for snapshot in simulation.snapshots(0.1):
+        recorder.add(snapshot)
+    record = recorder.record()
+    summarise(record, cost_history(record, CoverageCost(rooms, 16)))
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
