@@ -32,12 +32,8 @@ _IN_REGISTERS = sys.platform != "win32" and platform.machine() in ("x86_64", "aa
 class RangeSensor:
     """Asks a static pymunk space for what a robot would measure.
 
-    Parameters
-    ----------
-    pieces : convex polygons, (k, 2) m each
-        What `solid.solid_pieces` returns.
-    movers : tuple of Mover
-        Obstacles that move, where they are at time zero; see `show`.
+    `pieces` are convex polygons, (k, 2) m each, as of `solid.solid_pieces`; obstacles that move are where
+    they are at time zero, until they are to `show` another time.
     """
 
     def __init__(self, pieces: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
@@ -84,20 +80,10 @@ class RangeSensor:
         return distances[0], position + distances[0][:, None] * headings(rays)
 
     def scans(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
-        """Cast `rays` rays evenly round a full turn from each of some places, the first along +x.
+        """Cast `rays` rays evenly round a full turn from each place, (n, 2) m, the first along +x.
 
-        Parameters
-        ----------
-        positions : (n, 2) m
-        rays : int
-        ranges : (n,) m
-
-        Returns
-        -------
-        distances : (n, rays) m
-            The range where the ray meets nothing.
-        hit : (n, rays)
-            Whether it meets something.
+        Returns distances, (n, rays) m, the range, (n,) m, where a ray meets nothing, and whether it meets
+        something.
         """
         limit = np.minimum(ranges, _FARTHEST)
         ends = positions[:, None, :] + limit[:, None, None] * headings(rays)
@@ -118,8 +104,7 @@ class RangeSensor:
         if not _IN_REGISTERS:
             return None
         queries = map(function, ("cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"))
-        addresses = addresses_of(self._space._space, *queries)
-        point = np.array([[0.25, 0.5]])
+        addresses, point = addresses_of(self._space._space, *queries), np.array([[0.25, 0.5]])
         expected = self._space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
         _nearest(addresses, point, frozen([_FARTHEST]), np.empty(6))
         same = bool(np.isnan(point[0, 0])) if expected is None else tuple(point[0]) == expected.point

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pymunk
 from pymunk import batch
 from pymunk._chipmunk_cffi import ffi, lib
 
+from robocov.arrays import IntArray
 from robocov.compiled import call_c, kernel
-
-if TYPE_CHECKING:
-    import pymunk
-
-    from robocov.arrays import IntArray
 
 SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER, FORCES, STATES, CONTACTS = range(10)
 """Columns of `Engine.addresses`."""
@@ -40,7 +37,7 @@ class Engine:
     Attributes
     ----------
     forces : (spaces, bodies, 2) N
-        To be written with `transfer`; pymunk forgets them after each step.
+        pymunk forgets them after each step.
     robots : (spaces, n, 2) N
         Those of the robots, the same array.
     states : (spaces, bodies, 4) m and m/s
@@ -87,8 +84,7 @@ class Engine:
 
     def touching(self) -> list[int]:
         """Return the ids of the bodies in contact, in pairs, in the observed steps."""
-        count = self._touching.num
-        return list(ffi.unpack(self._touching.arr, count)) if count else []
+        return ffi.unpack(self._touching.arr, self._touching.num) if self._touching.num else []
 
 
 def function(name: str) -> Any:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
+from robocov.arrays import Array, BoolArray
+from robocov.environment import Environment, Point
 from robocov.errors import StartError
 from robocov.observation.neighbours import close_pairs
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array, BoolArray
-    from robocov.environment import Environment, Point
-    from robocov.robots import Team
+from robocov.robots import Team
 
 _GAP = 1e-3
 """Room in metres that is left beside what a robot is moved away from."""
@@ -30,10 +27,7 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
     Raises StartError when there is no room; the message names a robot.
     """
     places = np.array(positions, dtype=float)
-    room = {
-        radius: environment.free.buffer(-(radius + _GAP), join_style="round")
-        for radius in np.unique(team.radius).tolist()
-    }
+    room = {radius: _room(environment, radius) for radius in np.unique(team.radius).tolist()}
     for radius, inset in room.items():
         if inset.is_empty:
             robot = int(np.argmax(team.radius == radius)) + 1
@@ -41,20 +35,17 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
     for _ in range(_ROUNDS):
         for robot in np.flatnonzero(_wall_distance(environment, places) < team.radius).tolist():
             line = shapely.shortest_line(room[float(team.radius[robot])], shapely.Point(places[robot]))
-            places[robot] = np.asarray(line.coords)[0]
+            places[robot] = line.coords[0]
         first, second, distance = close_pairs(places, 2.0 * float(team.radius.max()))
         missing = team.radius[first] + team.radius[second] - distance
         clash = np.flatnonzero((missing > 0.0) & (first < second))
         if not len(clash):
             return places
         first, second, missing, distance = first[clash], second[clash], missing[clash], distance[clash]
+        apart = (places[second] - places[first]) / np.where(distance > 0.0, distance, 1.0)[:, None]
         # robots in one place have no direction apart: one of their own each
         angle = 2.399963 * (first + second)
-        apart = np.where(
-            (distance > 0.0)[:, None],
-            (places[second] - places[first]) / np.where(distance > 0.0, distance, 1.0)[:, None],
-            np.column_stack([np.cos(angle), np.sin(angle)]),
-        )
+        apart[distance == 0.0] = np.column_stack([np.cos(angle), np.sin(angle)])[distance == 0.0]
         step = 0.5 * (missing + _GAP)[:, None] * apart
         np.add.at(places, first, -step)
         np.add.at(places, second, step)
@@ -75,14 +66,14 @@ def nearest_free(
     apart = np.hypot(*(others - point).T)
     if _wall_distance(environment, np.array([point]))[0] >= radius and (apart >= radius + beside).all():
         return float(point[0]), float(point[1])
-    room = environment.free.buffer(-(radius + _GAP), join_style="round")
+    room = _room(environment, radius)
     if len(others):
         # a buffer's polygon is inscribed, and room is wanted all round
         reach = (radius + beside + _GAP) / np.cos(np.pi / 64)
         room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), reach, quad_segs=16)))
     if room.is_empty:
         raise StartError("there is no room for a robot there")
-    x, y = np.asarray(shapely.shortest_line(room, shapely.Point(point)).coords)[0].tolist()
+    x, y = shapely.shortest_line(room, shapely.Point(point)).coords[0]
     return x, y
 
 
@@ -99,19 +90,20 @@ def check_starts(
     wall = _wall_distance(environment, positions)
     for i in np.flatnonzero(there & (wall < team.radius - slack)).tolist():
         place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
+        wrong = f"{wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
         if wall[i] < 0.0:
-            raise StartError(
-                f"{place} is inside an obstacle or outside the boundary of map {environment.name!r}"
-            )
-        raise StartError(
-            f"{place} is {wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
-        )
+            wrong = f"inside an obstacle or outside the boundary of map {environment.name!r}"
+        raise StartError(f"{place} is {wrong}")
     first, second, distance = close_pairs(positions, 2.0 * float(team.radius.max()))
     clash = distance < team.radius[first] + team.radius[second] - slack
     for k in np.flatnonzero(clash & there[first] & there[second]).tolist():
-        raise StartError(
-            f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
-        )
+        pair = f"starts[{first[k]}] and starts[{second[k]}]"
+        raise StartError(f"{pair} are {distance[k]:.3g} m apart: the robots overlap")
+
+
+def _room(environment: Environment, radius: float) -> BaseGeometry:
+    """Return where a robot fits beside the walls."""
+    return environment.free.buffer(-(radius + _GAP), join_style="round")
 
 
 def _wall_distance(environment: Environment, places: Array) -> Array:

@@ -7,16 +7,13 @@ triangulated and the triangles are merged to larger convex pieces as long as the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, frozen
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.environment import Environment, ObstaclePath
+from robocov.environment import Environment, ObstaclePath
 
 Corner: TypeAlias = tuple[float, float]
 Loop: TypeAlias = list[Corner]
@@ -28,16 +25,16 @@ FRAME = 2.0
 def solid_pieces(environment: Environment) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that fill all that is not free.
 
-    They cover the obstacles, the region outside a non-convex boundary, and a frame of thickness
-    `FRAME` around the region; they do not overlap. Obstacles that move are not among them: see `movers`.
+    They cover the obstacles that stand still, the region outside a non-convex boundary, and a frame of
+    thickness `FRAME` around the region; they do not overlap.
     """
-    kept = vars(environment.static)
-    # as a cached property would, which an environment, that knows of no engine, cannot have
-    if "_solid_pieces" not in kept:
+    static = environment.static
+    # kept as a cached property would, which an environment, that knows of no engine, cannot have
+    pieces: tuple[Array, ...] | None = vars(static).get("_solid_pieces")
+    if pieces is None:
         low_x, low_y, high_x, high_y = environment.region.bounds
         frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
-        kept["_solid_pieces"] = convex_pieces(shapely.difference(frame, environment.static.free))
-    pieces: tuple[Array, ...] = kept["_solid_pieces"]
+        pieces = vars(static)["_solid_pieces"] = convex_pieces(shapely.difference(frame, static.free))
     return pieces
 
 
@@ -81,12 +78,11 @@ def _merged(loops: list[Loop]) -> list[Loop]:
         if first is None or second is None or first == second:
             continue
         joined = _joined(pieces[first], pieces[second], a, b)
-        if joined is None:
-            continue
-        for k, corner in enumerate(pieces[second]):
-            owner[pieces[second][k - 1], corner] = first
-        del pieces[second], owner[a, b], owner[b, a]
-        pieces[first] = joined
+        if joined is not None:
+            for k, corner in enumerate(pieces[second]):
+                owner[pieces[second][k - 1], corner] = first
+            del pieces[second], owner[a, b], owner[b, a]
+            pieces[first] = joined
     return list(pieces.values())
 
 
@@ -96,9 +92,8 @@ def _joined(first: Loop, second: Loop, a: Corner, b: Corner) -> Loop | None:
     around = first[start:] + first[:start]  # b … a
     beyond = second[other:] + second[:other]  # a … b
     joined = around + beyond[1:-1]
-    at_a, at_b = len(around) - 1, 0
-    bent = (_turn(joined[k - 1], joined[k], joined[(k + 1) % len(joined)]) for k in (at_a, at_b))
-    return joined if all(turn > 0.0 for turn in bent) else None
+    convex = _turn(around[-2], a, beyond[1]) > 0.0 and _turn(beyond[-2], b, around[1]) > 0.0
+    return joined if convex else None
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
