@@ -68,10 +68,11 @@ class RangeSensor:
         points = np.array(positions, dtype=float)
         if self._addresses is not None:
             _nearest(self._addresses, points, ranges, np.empty(6))
-            return points
-        for row, (place, reach) in enumerate(zip(points.tolist(), ranges.tolist(), strict=True)):
-            found = self._space.point_query_nearest(tuple(place), min(reach, _FARTHEST), _ALL)
-            points[row] = np.nan if found is None else found.point
+        else:
+            for row, (place, reach) in enumerate(zip(points.tolist(), ranges.tolist(), strict=True)):
+                found = self._space.point_query_nearest(tuple(place), min(reach, _FARTHEST), _ALL)
+                points[row] = np.nan if found is None else found.point
+        points.setflags(write=False)
         return points
 
     def scan(self, position: Array, rays: int, reach: float) -> tuple[Array, Array]:
@@ -96,7 +97,10 @@ class RangeSensor:
                     found = self._space.segment_query_first(tuple(start), tuple(end), 0.0, _ALL)
                     if found is not None:
                         fraction[row, ray], hit[row, ray] = found.alpha, True
-        return limit[:, None] * fraction, hit
+        distances = limit[:, None] * fraction
+        for array in (distances, hit):
+            array.setflags(write=False)
+        return distances, hit
 
     @cached_property
     def _addresses(self) -> IntArray | None:

@@ -111,22 +111,18 @@ class Simulation:
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
         each, rest = divmod(len(positions), runs)
         if runs > 1 and (rest or environment.moves or conditions is not None):
-            raise ParameterError(
-                f"runs: {runs} of {len(positions)} robots, but equal teams, no conditions and "
-                f"obstacles that stand still were wanted"
-            )
+            wanted = "equal teams, no conditions and obstacles that stand still were wanted"
+            raise ParameterError(f"runs: {runs} of {len(positions)} robots, but {wanted}")
         self._each_run = [slice(k * each, (k + 1) * each) for k in range(runs)]
         check_dt(dt)
         if isinstance(controller, type) or not isinstance(controller, Controller):
-            raise ParameterError(
-                f"controller: {shown(controller)}, but a controller, as in Rapf(), was wanted"
-            )
+            wanted = "a controller, as in Rapf(), was wanted"
+            raise ParameterError(f"controller: {shown(controller)}, but {wanted}")
         if velocities is not None:
             velocities = np.array(velocities, dtype=float)
             if velocities.shape != positions.shape or not np.isfinite(velocities).all():
-                raise StartError(
-                    f"velocities: {shown(velocities.tolist())}, but finite [x, y] for each robot were wanted"
-                )
+                wanted = "finite [x, y] for each robot were wanted"
+                raise StartError(f"velocities: {shown(velocities.tolist())}, but {wanted}")
         if conditions is not None:
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
@@ -135,10 +131,8 @@ class Simulation:
         there = None if conditions is None else conditions.working(time, len(positions))
         for run in self._each_run:
             check_starts(environment.at(time), positions[run], self.team[run], slack, there)
-        self.environment = environment
-        self.controller = controller
+        self.environment, self.controller, self.dt = environment, controller, dt
         self._built_in = type(controller) in CONTROLLERS.values()
-        self.dt = dt
         self.conditions = conditions
         walls, moving = solid_pieces(environment), movers(environment)
         changes = conditions is not None and conditions.team_changes
@@ -154,16 +148,13 @@ class Simulation:
         self._everybody = None
         if np.isinf(self.team.communication_range).all():
             self._everybody = Neighbours.beside([Neighbours(each)] * runs)
-        self._began = time
-        self._steps = 0
+        self._began, self._steps = time, 0
         self._law = self._asked(informed, controller, environment.static)
         self.memory = self._asked(self._law.begin, environment.region, self.team)
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
         if not isinstance(self._scanning, Scanning | None):
-            raise ParameterError(
-                f"controller {controller.name!r}: scanning: {shown(self._scanning)}, "
-                f"but a Scanning was wanted"
-            )
+            found = f"controller {controller.name!r}: scanning: {shown(self._scanning)}"
+            raise ParameterError(f"{found}, but a Scanning was wanted")
         self._begin_step()
 
     def __repr__(self) -> str:
@@ -199,13 +190,10 @@ class Simulation:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
             seen, inbox = self._observed()
-            decision = self._decided(seen)
-            if self._perception is None:
-                self._snapshot = Snapshot(seen, decision)
-            else:
-                working = self.working
-                decision = of_working(decision, working)
-                self._snapshot = Snapshot(seen, decision, self.positions, working, inbox)
+            self._snapshot = Snapshot(seen, self._decided(seen))
+            if self._perception is not None:
+                decision = of_working(self._snapshot.decision, self.working)
+                self._snapshot = Snapshot(seen, decision, self.positions, self.working, inbox)
         return self._snapshot
 
     def _begin_step(self) -> None:
@@ -217,43 +205,29 @@ class Simulation:
     def _observed(self) -> tuple[Observations, Inbox | None]:
         """Return what each robot knows now, and the messages that it then has."""
         if self._observation is None:
-            seen = self._sensed()
+            team, scanning, neighbours, scans = self.team, self._scanning, self._everybody, None
+            if neighbours is None:
+                ranges, runs = team.communication_range, self._each_run
+                parts = [Neighbours.within(self.positions[run], ranges[run]) for run in runs]
+                neighbours = Neighbours.beside(parts)
+            if scanning is not None and self._steps % scanning.every(self.dt) == 0:
+                scans = Scans(*self.sensor.scans(self.positions, scanning.rays, team.sensing_range))
+            seen = Observations(
+                positions=self.positions,
+                velocities=self.velocities,
+                neighbours=neighbours,
+                obstacle_points=self.sensor.nearest(self.positions, team.sensing_range),
+                region=self.environment.region,
+                time=self.time,
+                max_speeds=team.max_speed,
+                density=self.environment.density,
+                scans=scans,
+            )
             if self._perception is None:
                 self._observation = seen, None
             else:
                 self._observation = self._perception.known(seen, self.inbox, self.working)
         return self._observation
-
-    def _sensed(self) -> Observations:
-        """Return what each robot would know now if nothing went wrong."""
-        team, environment, positions = self.team, self.environment, self._world.positions
-        points = self.sensor.nearest(positions, team.sensing_range)
-        points.setflags(write=False)
-        neighbours = self._everybody
-        if neighbours is None:
-            ranges = team.communication_range
-            parts = [Neighbours.within(positions[run], ranges[run]) for run in self._each_run]
-            neighbours = Neighbours.beside(parts)
-        return Observations(
-            positions=positions,
-            velocities=self._world.velocities,
-            neighbours=neighbours,
-            obstacle_points=points,
-            region=environment.region,
-            time=self.time,
-            max_speeds=team.max_speed,
-            density=environment.density,
-            scans=None if self._scanning is None else self._scanned(positions, self._scanning),
-        )
-
-    def _scanned(self, positions: Array, scanning: Scanning) -> Scans | None:
-        """Return a scan of each robot, in the steps in which the controller wants one."""
-        if self._steps % scanning.every(self.dt):
-            return None
-        distances, hit = self.sensor.scans(positions, scanning.rays, self.team.sensing_range)
-        distances.setflags(write=False)
-        hit.setflags(write=False)
-        return Scans(distances, hit)
 
     def _decided(self, seen: Observations) -> Decision:
         count, name = len(seen.positions), self.controller.name
@@ -307,8 +281,7 @@ class Simulation:
 
         Raises StartError when a robot would start in a wall or in another robot of that run.
         """
-        rows = self._each_run[run]
-        check_starts(self.environment.at(self.time), positions, self.team[rows], 1e-6, None)
+        check_starts(self.environment.at(self.time), positions, self.team[self._each_run[run]], 1e-6)
         assert isinstance(self._world, World)
         self._world.place(run, positions)
         self._begin_step()
@@ -363,10 +336,7 @@ class Simulation:
         return twin
 
     def remembering(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
-        """Return a simulation in the same state whose controller remembers what another `memory` was.
-
-        `inbox` is the same of messages; None: as it is.
-        """
+        """Return a simulation in the same state with another `memory`, and `inbox` unless that is None."""
         twin = self.copy()
         twin.inbox = self.inbox if inbox is None else inbox
         twin.memory = deepcopy(memory)
@@ -429,10 +399,10 @@ def simulate_many(
     environment, controller, team, dt
         As `Simulation` takes them, the same for all.
     starts : sequence of (n, 2) m
-        For each run the centres of the robots at the beginning; teams may differ in size without `team`.
+        Centres of the robots at the beginning of each run; teams may differ in size without `team`.
     duration : float, s
     conditions : sequence of Conditions or None
-        Those of each run; None: ideal ones.
+        Of each run; None: ideal ones.
     start : str, seeds : sequence of int
         Where the starts came from, kept in the records.
 
