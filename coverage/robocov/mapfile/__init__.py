@@ -14,7 +14,7 @@ from robocov.errors import MapError, one_line, unknown_name
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.mapfile.density import density_document, density_from
-from robocov.mapfile.models import FORMAT, VERSION, map_schema, plain, validate, validate_density
+from robocov.mapfile.models import FORMAT, VERSION, map_schema, plain, validate
 from robocov.mapfile.rules import check_rules
 
 __all__ = [
@@ -47,21 +47,10 @@ _NOISE = 16
 
 
 def load_map(source: str | Path) -> Environment:
-    """Return the map in a file, or the bundled map of that name.
+    """Return the map in a file, or the bundled map of that name: a str without suffix and separator.
 
-    Parameters
-    ----------
-    source : str or Path
-        A path to a map JSON, or the name of a bundled map: a str without suffix and separator.
+    Raises `MapError`, one line: the file with line and column, the JSON path, the value and what was wanted.
 
-    Raises
-    ------
-    MapError
-        One line: the file with line and column, the JSON path, the value and what was wanted; for an
-        unknown name the nearest one.
-
-    Examples
-    --------
     >>> load_map("square").area
     100.0
     """
@@ -70,10 +59,7 @@ def load_map(source: str | Path) -> Environment:
 
 
 def map_file(source: str | Path) -> Path:
-    """Return the file of the map that `load_map` returns for the same source; it need not be there.
-
-    Raises `MapError` for an unknown name.
-    """
+    """Return the file of the map that `load_map` returns for the same source; it need not be there."""
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
     known = bundled_maps()
@@ -101,10 +87,7 @@ def bundled_maps() -> dict[str, Path]:
 
 
 def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
-    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures.
-
-    It raises as `load_map`.
-    """
+    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures."""
     document = parse(text, where)
     try:
         return _environment(document, one_line(where), folder)
@@ -113,22 +96,17 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
 
 
 def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
-    """Return the map in a parsed JSON `document`; messages call it `where`, and `folder` holds its pictures.
-
-    It raises as `load_map`.
-    """
+    """Return the map in a parsed JSON `document`; see `parse_map`."""
     where = one_line(where)
     require_json(document, where)
     return _environment(document, where, folder)
 
 
 def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
-    """Return the density that the JSON value at a map's ``density`` stands for.
-
-    A raster that does not say what it covers covers the bounding box of the boundary, [x, y] in m; messages
-    call the map `where`, and `folder` holds its pictures. It raises as `load_map`.
-    """
-    return density_from(validate_density(value, where), boundary, folder, where)
+    """Return the density that the JSON value at the ``density`` of a map with that boundary stands for."""
+    square = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
+    model = validate({"format": FORMAT, "version": VERSION, **square, "density": value}, where)
+    return density_from(model.density, boundary, folder, where)
 
 
 def _environment(document: object, where: str, folder: Path | None) -> Environment:
@@ -153,29 +131,26 @@ def to_json(environment: Environment) -> dict[str, Any]:
 
     Whole numbers are int, so that the text is short.
     """
-    document: dict[str, Any] = {} if environment.schema is None else {"$schema": environment.schema}
-    document |= {"format": FORMAT, "version": VERSION, "name": environment.name}
-    if environment.description:
-        document["description"] = environment.description
-    document["boundary"] = plain(environment.boundary)
-    document["obstacles"] = plain(environment.obstacles)
-    document["starts"] = {name: plain(spec) for name, spec in environment.starts.items()}
-    if environment.density is not None:
-        document["density"] = density_document(environment.density)
-    if environment.extra:
-        document["extra"] = dict(environment.extra)
-    return document
+    density = environment.density
+    return {
+        **({} if environment.schema is None else {"$schema": environment.schema}),
+        "format": FORMAT,
+        "version": VERSION,
+        "name": environment.name,
+        **({"description": environment.description} if environment.description else {}),
+        "boundary": plain(environment.boundary),
+        "obstacles": plain(environment.obstacles),
+        "starts": {name: plain(spec) for name, spec in environment.starts.items()},
+        **({} if density is None else {"density": density_document(density)}),
+        **({"extra": dict(environment.extra)} if environment.extra else {}),
+    }
 
 
 def save_map(environment: Environment, path: str | Path) -> None:
     """Write `environment` to `path`, whole or not at all.
 
-    Raises
-    ------
-    MapError
-        When the map breaks a rule, so that it could not be loaded again.
-    OutputError
-        When the file cannot be written; a file that was there before is then untouched.
+    Raises MapError when it breaks a rule and could not be loaded again, OutputError when the file
+    cannot be written.
     """
     exact = to_json(environment)
     document = _shortened(exact)

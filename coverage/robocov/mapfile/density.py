@@ -1,4 +1,4 @@
-"""The density of a map JSON: from the models to `Density` and back, with the pictures beside a map."""
+"""The density of a map JSON: from its model to `Density` and back, with the pictures beside a map."""
 
 from __future__ import annotations
 
@@ -14,19 +14,7 @@ from robocov.arrays import Array
 from robocov.density import FINEST, Density, Raster
 from robocov.environment import Ring
 from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, reason, shown_json
-from robocov.mapfile.models import (
-    LARGEST,
-    LEAST_VARIANCE,
-    LIGHTEST,
-    SMALLEST,
-    DensityModel,
-    GaussianDensityModel,
-    PeakModel,
-    PolygonDensityModel,
-    RasterDensityModel,
-    UniformDensityModel,
-    plain,
-)
+from robocov.mapfile.models import LARGEST, LIGHTEST, SMALLEST, DensityModel, Model, RasterModel, plain
 
 MOST_BYTES = 8_000_000
 """Largest picture of a density, in bytes."""
@@ -34,26 +22,23 @@ MOST_BYTES = 8_000_000
 _DIGITS = 6
 """Digits after the point of the weights that greys stand for: a map that is written again stays short."""
 
+_LEAST_VARIANCE = SMALLEST**2
+
+_BASES = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
+"""Keys of what a place counts at least, by kind."""
+
 
 def density_from(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
-    """Return the density that a model stands for.
+    """Return the density that a model stands for; a raster without an extent covers the boundary's box.
 
-    Parameters
-    ----------
-    model : DensityModel
-    boundary : ring of [x, y], m
-        A raster without an extent covers its bounding box.
-    folder : Path or None
-        Where the map is, and a picture that it names; None when it came without a file.
-    where : str
-        What messages call the map.
-
-    Raises `MapError` when a rule is broken that the model alone does not know, or a picture cannot be used.
+    `folder` is where the map is, and a picture that it names; None when it came without a file. Raises
+    `MapError` when a rule is broken that the structure does not show, or a picture cannot be used.
     """
-    found = list(_mistakes(model))
+    raster = isinstance(model, RasterModel)
+    found = list(_raster_mistakes(model) if raster else _weight_mistakes(model))
     if found:
         raise MapError.of(where, found)
-    if not isinstance(model, RasterDensityModel):
+    if not raster:
         density: Density = model.built()
         return density
     if model.rows is not None:
@@ -69,11 +54,10 @@ def density_from(model: DensityModel, boundary: Ring, folder: Path | None, where
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 
-def density_document(density: Density) -> dict[str, Any]:
+def density_document(density: Density) -> Any:
     """Return a density as a JSON document that `density_from` makes an equal one of; it names no picture."""
     if not isinstance(density, Raster):
-        document: dict[str, Any] = plain(density)
-        return document
+        return plain(density)
     return {
         "kind": "raster",
         "extent": plain(density.extent),
@@ -82,29 +66,11 @@ def density_document(density: Density) -> dict[str, Any]:
     }
 
 
-def _mistakes(model: DensityModel) -> Iterator[Mistake]:
-    """Yield what is wrong with a density that its structure does not show."""
-    at = ("density",)
-    if isinstance(model, UniformDensityModel):
-        if not model.weight > 0.0:
-            yield _nothing((*at, "weight"))
-    elif isinstance(model, GaussianDensityModel):
-        for k, peak in enumerate(model.peaks):
-            yield from _peak_mistakes(peak, (*at, "peaks", k))
-        if not model.floor and not any(peak.weight for peak in model.peaks):
-            yield _nothing(at)
-    elif isinstance(model, PolygonDensityModel):
-        if not model.background and not any(area.weight for area in model.areas):
-            yield _nothing(at)
-    else:
-        yield from _raster_mistakes(model)
-
-
 def _nothing(at: JsonPath) -> Mistake:
     return Mistake.at(at, "all places count 0, but a weight above 0 was wanted")
 
 
-def _not_one_of(model: PeakModel | RasterDensityModel, one: str, other: str) -> str | None:
+def _not_one_of(model: Model, one: str, other: str) -> str | None:
     """Return what is wrong where not exactly one of two keys is given."""
     given = [getattr(model, key) is not None for key in (one, other)]
     if sum(given) == 1:
@@ -112,41 +78,48 @@ def _not_one_of(model: PeakModel | RasterDensityModel, one: str, other: str) -> 
     return f"{'both' if all(given) else 'neither'} of {one} and {other}, but one of them was wanted"
 
 
-def _peak_mistakes(peak: PeakModel, at: JsonPath) -> Iterator[Mistake]:
-    if what := _not_one_of(peak, "sigma", "covariance"):
-        yield Mistake.at(at, what)
-    elif peak.covariance is not None:
-        (a, b), (c, d) = peak.covariance
-        # the smaller eigenvalue
-        spread = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
-        if b != c or not spread >= LEAST_VARIANCE or a * d - b * c <= 1e-9 * a * d:
-            wanted = f"a symmetric, positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
-            yield Mistake.at((*at, "covariance"), f"{shown_json(peak.covariance)}, but {wanted} was wanted")
+def _weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
+    peaks, areas = (getattr(model, key, []) for key in ("peaks", "areas"))
+    for k, peak in enumerate(peaks):
+        at: JsonPath = ("density", "peaks", k)
+        if what := _not_one_of(peak, "sigma", "covariance"):
+            yield Mistake.at(at, what)
+        elif peak.covariance is not None:
+            (a, b), (c, d) = peak.covariance
+            smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
+            if b != c or not smaller_eigenvalue >= _LEAST_VARIANCE or a * d - b * c <= 1e-9 * a * d:
+                wanted = (
+                    f"a symmetric, positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
+                )
+                yield Mistake.at(
+                    (*at, "covariance"), f"{shown_json(peak.covariance)}, but {wanted} was wanted"
+                )
+    if not getattr(model, _BASES[model.kind]) and not any(part.weight for part in (*peaks, *areas)):
+        yield _nothing(("density", "weight") if model.kind == "uniform" else ("density",))
 
 
-def _raster_mistakes(model: RasterDensityModel) -> Iterator[Mistake]:
-    at = ("density",)
+def _raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
     if what := _not_one_of(model, "rows", "picture"):
-        yield Mistake.at(at, what)
+        yield Mistake.at(("density",), what)
         return
     if model.extent is not None:
         x_min, y_min, x_max, y_max = model.extent
         sides = x_max - x_min, y_max - y_min
         if not (min(sides) >= SMALLEST and max(sides) <= LARGEST):
             wanted = f"[x_min, y_min, x_max, y_max] with sides from {SMALLEST:g} to {LARGEST:.0f} m"
-            yield Mistake.at((*at, "extent"), f"{shown_json(model.extent)}, but {wanted} was wanted")
+            yield Mistake.at(("density", "extent"), f"{shown_json(model.extent)}, but {wanted} was wanted")
     if model.rows is not None:
         for name in ("black", "white"):
             if getattr(model, name) is not None:
-                yield Mistake.at((*at, name), "is for a picture, but there are rows of numbers")
-        width = len(model.rows[0])
-        for k, row in enumerate(model.rows):
-            if len(row) != width:
-                wanted = f"{width}, as in the first row, were wanted"
-                yield Mistake.at((*at, "rows", k), f"{len(row)} numbers, but {wanted}")
+                yield Mistake.at(("density", name), "is for a picture, but there are rows of numbers")
+        widths = [len(row) for row in model.rows]
+        for k, width in enumerate(widths):
+            if width != widths[0]:
+                what = f"{width} numbers, but {widths[0]}, as in the first row, were wanted"
+                yield Mistake.at(("density", "rows", k), what)
                 return
         if not max(map(max, model.rows)) >= LIGHTEST:
-            yield _nothing((*at, "rows"))
+            yield _nothing(("density", "rows"))
 
 
 def _greys(name: str, folder: Path | None, where: str) -> Array:

@@ -1,12 +1,16 @@
-"""The map JSON, version 1, as pydantic models: its structure, its JSON Schema, its structural errors."""
+"""The map JSON, version 1, as pydantic models: its structure, its JSON Schema, its structural errors.
+
+The models of obstacles, starts and densities follow from the classes that these are read into.
+"""
 
 from __future__ import annotations
 
+from dataclasses import MISSING, fields
 from difflib import get_close_matches
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, Union, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from robocov.density import (
@@ -35,23 +39,21 @@ from robocov.files.documents import check_header, refused
 FORMAT = "robocov-map"
 VERSION = 1
 
-SLOWEST = 1e-3
-"""Smallest speed of an obstacle in m/s."""
-FASTEST = 10.0
-"""Largest speed of an obstacle in m/s."""
-SMALLEST = 1e-3
-"""Smallest size of anything in metres."""
-LARGEST = 1e4
-"""Largest size of anything in metres."""
+SLOWEST, FASTEST = 1e-3, 10.0
+"""Speeds of an obstacle in m/s."""
+SMALLEST, LARGEST = 1e-3, 1e4
+"""Sizes of anything in metres."""
 FARTHEST = 1e7
 """Largest coordinate in metres: national grids fit, and a micrometre still counts."""
-
-TINY = 1e-100
-"""Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
-
+LIGHTEST = 1e-9
+"""Weights that are smaller are read as 0: they would be when the map is written."""
 LONGEST_LABEL = 100
 """Most characters of a label."""
 
+_TINY = 1e-100
+"""Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
+_LONGEST_PATH = 500
+_MOST = 10_000
 _NAME = r"^[^\x00-\x1f\x7f]+$"
 
 
@@ -62,31 +64,21 @@ def _between(least: float, most: float, description: str | None = None) -> Any:
 Coordinate: TypeAlias = Annotated[
     float,
     _between(-FARTHEST, FARTHEST, "metres"),
-    AfterValidator(lambda value: 0.0 if -TINY < value < TINY else value),
+    AfterValidator(lambda value: 0.0 if -_TINY < value < _TINY else value),
 ]
 Size: TypeAlias = Annotated[float, _between(SMALLEST, LARGEST)]
+Speed: TypeAlias = Annotated[float, _between(SLOWEST, FASTEST)]
 Vertex: TypeAlias = Annotated[
     list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]]), AfterValidator(tuple)
 ]
 VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3), AfterValidator(tuple)]
 Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LONGEST_LABEL, pattern=_NAME)]
-
-LIGHTEST = 1e-9
-"""Weights that are smaller are read as 0: they would be when the map is written."""
-
 Entry: TypeAlias = Annotated[float, _between(0.0, HEAVIEST)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
-Variance: TypeAlias = Annotated[float, _between(-1e8, 1e8)]
-Matrix: TypeAlias = Annotated[
-    list[Annotated[list[Variance], Field(min_length=2, max_length=2)]], Field(min_length=2, max_length=2)
+Points: TypeAlias = Annotated[list[Vertex], Field(min_length=2)]
+Variances: TypeAlias = Annotated[
+    list[Annotated[float, _between(-1e8, 1e8)]], Field(min_length=2, max_length=2)
 ]
-Speed: TypeAlias = Annotated[float, _between(SLOWEST, FASTEST)]
-
-LEAST_VARIANCE = SMALLEST**2
-"""Smallest variance of a peak each way, in square metres."""
-
-_LONGEST_PATH = 500
-_MOST = 10_000
 
 
 class Model(BaseModel):
@@ -94,13 +86,13 @@ class Model(BaseModel):
 
     model_config = ConfigDict(extra="forbid", populate_by_name=False)
 
-    stands_for: ClassVar[Any]
+    stands_for: ClassVar[Any] = None
     """The class of what it describes; fields of the same name hold the same."""
 
     def built(self) -> Any:
         """Return what it describes."""
-        fields = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
-        return self.stands_for(**{key: _built(value) for key, value in fields.items()})
+        names = type(self).model_fields.keys() - {"kind"}
+        return self.stands_for(**{name: _built(getattr(self, name)) for name in names})
 
 
 def _built(value: Any) -> Any:
@@ -113,163 +105,118 @@ def _field(description: str, example: Any, default: Any = ..., **limits: Any) ->
     return Field(default, description=description, examples=[example], **limits)
 
 
-def _kind(name: str) -> Any:
-    return _field("Which kind it is; the other keys follow from it", name)
+_POINT = "a point [x, y] in metres"
+_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
+_RING = "a list of at least 3 points [x, y]"
+_LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
+_WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
+_SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
 
-
-def _name(example: str) -> Any:
-    return _field("What it is, for people", example, None)
-
-
-_PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
-_MATRIX = [[2, 0.5], [0.5, 1]]
 _CORNERS = [[1, 1], [2, 1], [2, 3]]
 _HOT_SPOT = {"center": [7.5, 3], "sigma": 1.5, "weight": 4}
-_TREASURY = {"name": "treasury", "vertices": _CORNERS, "weight": 5}
-_WALL = {"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}
-_STARTS = {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}
-_DENSITY = {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]}
 
 
-class PathModel(Model, title="path"):
-    """The path of an obstacle that moves: it is shifted as its point goes along the line, and never turns."""
+class _Key(NamedTuple):
+    """What stands at a key, and what messages say is wanted there, in its items, in their items, ..."""
 
-    stands_for = ObstaclePath
-    points: list[Vertex] = _field(
-        "The line; at time zero its point is at the first, and the obstacle where it is drawn",
-        _PATH["points"],
-        min_length=2,
-    )
-    speed: Speed = _field("Metres a second", 0.5)
-    repeat: Repeat = _field(
-        "From the last point straight to the first, or back the way it came", "back-and-forth", "loop"
-    )
+    type: Any
+    description: str
+    example: Any
+    wanted: tuple[str, ...]
 
 
-PathField: TypeAlias = Annotated[PathModel | None, _field("How it moves; without it, it stands", _PATH)]
+_KEYS = {
+    "name": _Key(Label, "What it is, for people", "desk", (_LABEL,)),
+    "center": _Key(Vertex, "The centre [x, y] in metres", [7.5, 3], (_POINT, _COORDINATE)),
+    "radius": _Key(Size, "The radius in metres", 0.5, (_SIZE,)),
+    "sigma": _Key(Size, "The standard deviation in metres, where it is round", 1.5, (_SIZE,)),
+    "covariance": _Key(
+        Annotated[list[Variances], Field(min_length=2, max_length=2)],
+        "The covariance in square metres where it is not: symmetric, positive definite",
+        [[2, 0.5], [0.5, 1]],
+        ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
+    ),
+    "vertices": _Key(
+        VertexRing,
+        "Corners in order, either way round, the first not repeated",
+        _CORNERS,
+        (_RING, _POINT, _COORDINATE),
+    ),
+    "holes": _Key(
+        list[VertexRing],
+        "Rings inside that are not part of it, such as courtyards",
+        [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]],
+        ("a list of rings", _RING, _POINT, _COORDINATE),
+    ),
+    "points": _Key(
+        Points,
+        "The line, from end to end; what moves along it is drawn at the first point, at time zero",
+        [[2, 1], [8, 1]],
+        ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
+    ),
+    "width": _Key(Size, "The width in metres", 0.1, (_SIZE,)),
+    "speed": _Key(Speed, "Metres a second", 0.5, (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",)),
+    "repeat": _Key(
+        Repeat,
+        "From the last point straight to the first, or back the way it came",
+        "back-and-forth",
+        ('"loop" or "back-and-forth"',),
+    ),
+    "positions": _Key(
+        Annotated[list[Vertex], Field(min_length=1)],
+        "One [x, y] a robot, in metres",
+        [[1, 1], [1.5, 1]],
+        ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
+    ),
+    "weight": _Key(Weight, "How much a place counts; of a peak, what it adds at its centre", 4, (_WEIGHT,)),
+    "floor": _Key(Weight, "What every place counts without the peaks", 0.2, (_WEIGHT,)),
+    "background": _Key(Weight, "What a place outside all areas counts", 1, (_WEIGHT,)),
+}
 
 
-class PolygonModel(Model, title="polygon"):
-    """A solid polygon, with holes where given."""
-
-    stands_for = PolygonObstacle
-    kind: Literal["polygon"] = _kind("polygon")
-    name: Label | None = _name("desk")
-    vertices: VertexRing = _field("Corners in order, either way round, the first not repeated", _CORNERS)
-    holes: list[VertexRing] = _field(
-        "Rings inside that are free, such as courtyards", [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]], []
-    )
-    path: PathField = None
-
-
-class CircleModel(Model, title="circle"):
-    """A round pillar."""
-
-    stands_for = CircleObstacle
-    kind: Literal["circle"] = _kind("circle")
-    name: Label | None = _name("pillar")
-    center: Vertex = _field("Its centre [x, y] in metres", [7.5, 3])
-    radius: Size = _field("Its radius in metres", 0.5)
-    path: PathField = None
+def _model(thing: Any, kind: str | None = None) -> type[Model]:
+    """Return the model of a class of such keys; those with a default may be left out."""
+    defaults = {field.name: field.default for field in fields(thing)}
+    members: dict[str, Any] = {}
+    if kind:
+        members["kind"] = Literal[kind], _field("Which kind it is; the other keys follow from it", kind)
+    for name, key in _KEYS.items():
+        if name in defaults:
+            default = ... if defaults[name] is MISSING else defaults[name]
+            content = key.type if default is not None else key.type | None
+            members[name] = content, _field(key.description, key.example, default)
+    doc = str(thing.__doc__).partition("\n")[0]
+    model = create_model(thing.__name__, __base__=Model, __doc__=doc, **members)
+    model.stands_for = thing
+    return model
 
 
-class WallModel(Model, title="wall"):
-    """A poly-line of some width, with flat ends."""
-
-    stands_for = WallObstacle
-    kind: Literal["wall"] = _kind("wall")
-    name: Label | None = _name("west wall")
-    points: list[Vertex] = _field("The middle line, from end to end", [[5, 0], [5, 2.4]], min_length=2)
-    width: Size = _field("Its width in metres", 0.1)
-    path: PathField = None
+_PARTS = {"path": _model(ObstaclePath), "peaks": _model(Gaussian), "areas": _model(WeightedArea)}
+"""Objects at these keys, or in their lists."""
 
 
-class DiscModel(Model, title="disc start"):
-    """The robots start somewhere in a disc."""
-
-    stands_for = DiscStart
-    kind: Literal["disc"] = _kind("disc")
-    center: Vertex = _field("The disc's centre [x, y] in metres", [1, 1])
-    radius: Size = _field("The disc's radius in metres", 0.8)
+def _list_of(name: str, description: str, example: object) -> _Key:
+    model: Any = _PARTS[name]
+    content = Annotated[list[model], Field(max_length=_MOST)]
+    return _Key(content, description, [example], (f"a list of at most {_MOST} {name}", "an object"))
 
 
-class UniformModel(Model, title="uniform start"):
-    """The robots start anywhere in the free space."""
-
-    stands_for = UniformStart
-    kind: Literal["uniform"] = _kind("uniform")
-
-
-class PointsModel(Model, title="points start"):
-    """The robots start at given positions."""
-
-    stands_for = PointsStart
-    kind: Literal["points"] = _kind("points")
-    positions: list[Vertex] = _field("One [x, y] a robot, in metres", [[1, 1], [1.5, 1]], min_length=1)
+_KEYS |= {
+    "path": _Key(
+        _PARTS["path"],
+        "How it moves; without it, it stands",
+        {"points": [[2, 1], [8, 1]], "speed": 0.5},
+        ("an object with points and speed",),
+    ),
+    "peaks": _list_of("peaks", "The hot spots, which add up", _HOT_SPOT),
+    "areas": _list_of("areas", "The polygons, the later ones on top", {"vertices": _CORNERS, "weight": 5}),
+}
 
 
-ObstacleModel: TypeAlias = Annotated[
-    PolygonModel | CircleModel | WallModel, Field(discriminator="kind", description="An obstacle")
-]
-StartModel: TypeAlias = Annotated[
-    DiscModel | UniformModel | PointsModel, Field(discriminator="kind", description="Where a team may start")
-]
-
-
-class UniformDensityModel(Model, title="uniform density"):
-    """Every place counts the same."""
-
-    stands_for = Uniform
-    kind: Literal["uniform"] = _kind("uniform")
-    weight: Weight = _field("What every place counts, above 0", 1, 1.0)
-
-
-class PeakModel(Model, title="peak"):
-    """A Gaussian hot spot."""
-
-    stands_for = Gaussian
-    center: Vertex = _field("Its centre [x, y] in metres", [7.5, 3])
-    sigma: Size | None = _field("Its standard deviation in metres, where it is round", 1.5, None)
-    covariance: Matrix | None = _field(
-        "Its covariance in square metres where it is not: symmetric, positive definite", _MATRIX, None
-    )
-    weight: Weight = _field("What it adds at its centre", 4)
-
-
-class GaussianDensityModel(Model, title="Gaussian density"):
-    """Gaussian hot spots over a floor."""
-
-    stands_for = Gaussians
-    kind: Literal["gaussians"] = _kind("gaussians")
-    floor: Weight = _field("What every place counts without them", 0.2, 0.0)
-    peaks: list[PeakModel] = _field("The hot spots, which add up", [_HOT_SPOT], max_length=_MOST)
-
-
-class AreaModel(Model, title="weighted area"):
-    """A polygon in which every place counts the same."""
-
-    stands_for = WeightedArea
-    name: Label | None = _name("treasury")
-    vertices: VertexRing = _field("Corners in order, either way round, the first not repeated", _CORNERS)
-    holes: list[VertexRing] = _field(
-        "Rings inside that are not part of it", [[[1.5, 1.2], [1.8, 1.2], [1.8, 1.8]]], []
-    )
-    weight: Weight = _field("What a place in it counts", 5)
-
-
-class PolygonDensityModel(Model, title="polygon density"):
-    """Polygons of constant density; where they overlap, the last one counts."""
-
-    stands_for = WeightedPolygons
-    kind: Literal["polygons"] = _kind("polygons")
-    background: Weight = _field("What a place outside them all counts", 1, 1.0)
-    areas: list[AreaModel] = _field("The polygons, the later ones on top", [_TREASURY], max_length=_MOST)
-
-
-class RasterDensityModel(Model, title="raster density"):
+class RasterModel(Model, title="raster density"):
     """A picture of the density, in rows of numbers or in a file."""
 
-    kind: Literal["raster"] = _kind("raster")
+    kind: Literal["raster"] = _field("Which kind it is; the other keys follow from it", "raster")
     extent: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = _field(
         "What it covers, [x_min, y_min, x_max, y_max] in metres; the boundary's box by default",
         [0, 0, 10, 6],
@@ -288,10 +235,27 @@ class RasterDensityModel(Model, title="raster density"):
     white: Weight | None = _field("What white counts; 1 by default", 5, None)
 
 
-DensityModel: TypeAlias = Annotated[
-    UniformDensityModel | GaussianDensityModel | PolygonDensityModel | RasterDensityModel,
-    Field(discriminator="kind", description="How much each place counts"),
-]
+_KINDS: dict[str, dict[str, Any]] = {
+    "obstacles": {"polygon": PolygonObstacle, "circle": CircleObstacle, "wall": WallObstacle},
+    "starts": {"disc": DiscStart, "uniform": UniformStart, "points": PointsStart},
+    "density": {"uniform": Uniform, "gaussians": Gaussians, "polygons": WeightedPolygons},
+}
+_CHOICES = {
+    key: {kind: _model(thing, kind) for kind, thing in things.items()} for key, things in _KINDS.items()
+}
+_CHOICES["density"]["raster"] = RasterModel
+
+_MODELS = {model.stands_for: model for model in Model.__subclasses__() if model.stands_for}
+
+
+def _one_of(key: str, description: str) -> Any:
+    models = tuple(_CHOICES[key].values())
+    return Annotated[Union[models], Field(discriminator="kind", description=description)]  # noqa: UP007
+
+
+ObstacleModel: Any = _one_of("obstacles", "An obstacle")
+StartModel: Any = _one_of("starts", "Where a team may start")
+DensityModel: Any = _one_of("density", "How much each place counts")
 
 
 class MapModel(Model, title="robocov map"):
@@ -311,18 +275,21 @@ class MapModel(Model, title="robocov map"):
         [[0, 0], [10, 0], [10, 6], [0, 6]],
     )
     obstacles: list[ObstacleModel] = _field(
-        "They may overlap, touch, and stick out of the boundary", [_WALL], []
+        "They may overlap, touch, and stick out of the boundary",
+        [{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}],
+        [],
     )
-    starts: dict[Label, StartModel] = _field("Named starts; the first is the default", _STARTS, {})
+    starts: dict[Label, StartModel] = _field(
+        "Named starts; the first is the default",
+        {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}},
+        {},
+    )
     density: DensityModel | None = _field(
-        "How much each place counts; without it every place the same", _DENSITY, None
+        "How much each place counts; without it every place the same",
+        {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]},
+        None,
     )
     extra: dict[str, Any] = _field("Free keys of yours; kept untouched", {"author": "Ada"}, {})
-
-
-_MODELS: dict[type, type[Model]] = {
-    model.stands_for: model for model in Model.__subclasses__() if hasattr(model, "stands_for")
-}
 
 
 def plain(value: Any) -> Any:
@@ -359,72 +326,25 @@ def map_schema() -> dict[str, Any]:
 def validate(document: object, where: str) -> MapModel:
     """Return `document` as a model; the `MapError` tells of structural mistakes."""
     check_header(document, where, FORMAT, VERSION)
-    return _validated(MapModel, document, where)
-
-
-def validate_density(value: object, where: str) -> DensityModel:
-    """Return the value at a map's ``density`` as a model, likewise."""
-    return _validated(_WithDensity, {"density": value}, where).density
-
-
-class _WithDensity(Model):
-    density: DensityModel
-
-
-_Kind = TypeVar("_Kind", bound=Model)
-
-
-def _validated(kind: type[_Kind], document: object, where: str) -> _Kind:
     try:
-        return kind.model_validate(document)
+        return MapModel.model_validate(document)
     except ValidationError as error:
         raise refused(error, where, _mistake) from None
 
 
-_CHOICES: dict[str, dict[str, type[Model]]] = {
-    key: {get_args(each.model_fields["kind"].annotation)[0]: each for each in get_args(get_args(union)[0])}
-    for key, union in (("obstacles", ObstacleModel), ("starts", StartModel), ("density", DensityModel))
-}
-
-_PARTS: dict[str, type[Model]] = {"path": PathModel, "peaks": PeakModel, "areas": AreaModel}
-"""Values at these keys, or in their lists."""
-
-_POINT = "a point [x, y] in metres"
-_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
-_RING = "a list of at least 3 points [x, y]"
-_LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
-_WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
-
-
 # what is wanted at some keys, in their items, in their items, ...
-_WANTED = {
-    key: words
-    for keys, words in {
-        "boundary vertices": (_RING, _POINT, _COORDINATE),
-        "holes": ("a list of rings", _RING, _POINT, _COORDINATE),
-        "points": ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
-        "positions": ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
-        "center": (_POINT, _COORDINATE),
-        "radius width sigma": (f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)",),
-        "name": (_LABEL,),
-        "description": ("a text of at most 10000 characters",),
-        "extra": ("an object",),
-        "$schema": ("a text",),
-        "obstacles": ("a list of obstacles",),
-        "path": ("an object with points and speed",),
-        "speed": (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",),
-        "repeat": ('"loop" or "back-and-forth"',),
-        "starts": ("an object of named starts",),
-        "weight floor background black white": (_WEIGHT,),
-        "peaks": (f"a list of at most {_MOST} peaks", "an object"),
-        "areas": (f"a list of at most {_MOST} areas", "an object"),
-        "covariance": ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
-        "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
-        "interpolation": ("bilinear or cells",),
-        "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
-        "picture": ("the name of a file",),
-    }.items()
-    for key in keys.split()
+_WANTED = {name: key.wanted for name, key in _KEYS.items()} | {
+    "boundary": (_RING, _POINT, _COORDINATE),
+    "description": ("a text of at most 10000 characters",),
+    "extra": ("an object",),
+    "$schema": ("a text",),
+    "obstacles": ("a list of obstacles",),
+    "starts": ("an object of named starts",),
+    "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
+    "interpolation": ("bilinear or cells",),
+    "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
+    "picture": ("the name of a file",),
+    **dict.fromkeys(("black", "white"), (_WEIGHT,)),
 }
 
 
