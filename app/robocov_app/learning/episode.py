@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array, BoolArray
     from robocov.conditions import Conditions
-    from robocov.cost import CoverageCost
+    from robocov.cost import CoverageCost, CoverageResult
     from robocov.environment import Environment
     from robocov.observation.region import Region
     from robocov.record import Record
@@ -158,10 +158,19 @@ class SharedSimulation:
         self._simulation.restart(run, positions)
         return self._simulation
 
-    def moved(self, actions: Array) -> Array:
-        """Hold the actions of all, (count n, 2); return how long each robot was in contact, s."""
+    def advance(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, Outcome]:
+        """Hold actions, (count, n, 2) N or m/s; return what came of those of some of the episodes."""
         assert self._simulation is not None
-        return held(self._task, self._simulation, actions)
+        contact = held(self._task, self._simulation, actions.reshape(-1, 2)).reshape(self._count, -1)
+        due = [run for run, episode in episodes.items() if episode.due()]
+        results: dict[int, CoverageResult] = {}
+        if due:
+            positions = self._simulation.positions.reshape(actions.shape)[due]
+            results = dict(zip(due, episodes[due[0]].cost.of_teams(positions), strict=True))
+        return {
+            run: episode.moved(contact[run], run in results, results.get(run))
+            for run, episode in episodes.items()
+        }
 
     def rows(self) -> Rows:
         """Return what each robot of all episodes is told now."""
@@ -205,10 +214,10 @@ class Episode:
         The unit of rewards.
     trail : list of (n, 2) m
         The positions at each decision so far, from the start on.
+    cost : CoverageCost
+        Of the map as it was given.
     shared : SharedSimulation or None
         In which the team is moved together with others.
-    contact : (n,) s or None
-        Of the action that `SharedSimulation.moved` has carried out, until `advance` has told of it.
 
     Raises
     ------
@@ -247,9 +256,9 @@ class Episode:
             )
         else:
             self.simulation = self.shared.begin(run, positions)
-        self.contact: Array | None = None
         self.working = self.simulation.working[self._rows]
-        self._cost = MomentaryCost(cost)
+        self.cost, self._cost = cost, MomentaryCost(cost)
+        self._all_count = conditions is None and not environment.moves
         self._counted = self._cost.counted(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
@@ -297,8 +306,7 @@ class Episode:
     def observations(self) -> Rows:
         """Return what each robot is told now, (n, size)."""
         if self.shared is not None:
-            rows: Rows = self.shared.rows()[self._rows].copy()
-            return rows
+            return self.shared.rows()[self._rows]
         return self.task.observation.rows(self.simulation.observe(), self.team, self._scans)
 
     def state(self) -> Rows:
@@ -323,47 +331,53 @@ class Episode:
         }
 
     def advance(self, actions: Array, *, last: bool = False) -> Outcome:
-        """Hold actions for the time of one decision.
-
-        Parameters
-        ----------
-        actions : (n, 2) N or m/s
-        last : bool
-            The cost is rewarded now, whatever `CoverageTask.reward_every` says.
+        """Hold actions, (n, 2) N or m/s, for the time of one decision; the last one is rewarded in any case.
 
         Raises
         ------
         ParameterError
             When they are not finite numbers of that shape; the message names the robot.
         """
-        task, contact = self.task, self.contact
-        if contact is None:
-            keep = self._moments if task.recording else None
-            contact = held(task, self.simulation, checked_actions(actions, len(self.team)), keep)
-        self.contact = None
+        keep = self._moments if self.task.recording else None
+        contact = held(self.task, self.simulation, checked_actions(actions, len(self.team)), keep)
         self.working = self.simulation.working[self._rows]
-        self.trail.append(self.positions)
         self._scans = self.simulation.observe().scans
-        gained = self._gained(last) / self.reference
-        return Outcome(np.asarray(gained - task.contact_penalty * contact), contact)
+        return self.moved(contact, last or self.due())
 
-    def _gained(self, last: bool) -> Array:
+    def due(self) -> bool:
+        """Return whether the cost is rewarded after the next action."""
+        since = self.cycle + 1 - self._rewarded
+        return since >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
+
+    def moved(self, contact: Array, rewarded: bool, result: CoverageResult | None = None) -> Outcome:
+        """Return what came of an action that has been held, with so much contact, (n,) s.
+
+        `result` is the coverage cost now, where it is known already.
+        """
+        self.trail.append(self.positions)
+        gained = self._gained(rewarded, result) / self.reference
+        return Outcome(np.asarray(gained - self.task.contact_penalty * contact), contact)
+
+    def _gained(self, rewarded: bool, result: CoverageResult | None) -> Array:
         """Return what each robot gets for what became of the cost, (n,) m, and take the new cost.
 
         Who fails changes the cost at once. That is nobody's doing: those who have counted all the time
         get what became of their own cost, as if they had been alone.
         """
-        task, now, gained = self.task, self.time, np.zeros(len(self.team))
+        task, now, since = self.task, self.time, self.cycle - self._rewarded
+        gained, stayed, before = np.zeros(len(self.team)), self._counted, self.result
         positions, earlier = self.trail[-1], self.trail[self._rewarded]
-        counted = self._cost.counted(now, positions, self.working)
-        changed = not np.array_equal(counted, self._counted)
-        since = self.cycle - self._rewarded
-        if not (last or changed or since >= task.reward_every):
+        changed = False
+        if not self._all_count:
+            counted = self._cost.counted(now, positions, self.working)
+            changed = not np.array_equal(counted, self._counted)
+            stayed, self._counted = counted & self._counted, counted
+        if not (rewarded or changed):
             return gained
-        stayed, before, after = counted & self._counted, self.result, self.result
-        self._counted, self._rewarded = counted, self.cycle
-        if counted.any():
-            after = self.result = self._cost.at(now)(positions[counted])
+        self._rewarded = self.cycle
+        if self._counted.any():
+            self.result = result or self._cost.at(now)(positions[self._counted])
+        after = self.result
         if not stayed.any():
             return gained
         if changed:
@@ -412,10 +426,14 @@ def _touching(simulation: Simulation, each: int) -> BoolArray:
     """Return which robots that work touch a wall or another robot now, (n,); there are `each` in a run."""
     positions, works, radius = simulation.positions, simulation.working, simulation.team.radius
     touching = works & ~np.isnan(simulation.sensor.nearest(positions, radius + TOUCHING)[:, 0])
-    first, second, distance = close_pairs(positions, 2.0 * float(radius.max()) + TOUCHING)
+    reach, run = 2.0 * float(radius.max()) + TOUCHING, np.arange(len(positions)) // each
+    # nobody is near those of other runs
+    apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
+    first, second, _ = close_pairs(apart, 1.001 * reach)
     if len(first):
-        met = (distance <= radius[first] + radius[second] + TOUCHING) & works[first] & works[second]
-        touching[first[met & (first // each == second // each)]] = True
+        x, y = (positions[first] - positions[second]).T
+        met = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + TOUCHING
+        touching[first[met & works[first] & works[second]]] = True
     return touching
 
 

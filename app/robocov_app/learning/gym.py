@@ -19,6 +19,7 @@ from robocov.errors import RobocovError
 from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import (
     Episode,
+    Outcome,
     Place,
     SharedSimulation,
     checked_actions,
@@ -68,6 +69,8 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         The present one; None before the first ``reset``.
     place : Place or None
         Where its team is moved together with those of other environments; see `CoverageVectorEnv`.
+    outcome : Outcome or None
+        Of the next action, where it was carried out together with others.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
         self.episode: Episode | None = None
         self.place: Place | None = None
+        self.outcome: Outcome | None = None
         n = self.task.robots
         low, high = (np.tile(row, (n, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)
@@ -129,11 +133,11 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             When the action is not finite numbers of shape (n, 2).
         """
         episode = self._present()
-        over = episode.cycle + 1 >= self.task.cycles
-        outcome = episode.advance(action, last=over)
+        outcome, self.outcome = self.outcome or episode.advance(action), None
         self._pictures.shown(episode)
-        ended = not episode.working.any()
-        return self._rows(), float(outcome.rewards.mean()), ended, over, self._info(outcome.contact)
+        ended, over = not episode.working.any(), episode.cycle >= self.task.cycles
+        reward = float(outcome.rewards.sum()) / len(episode.team)
+        return self._rows(), reward, ended, over, self._info(outcome.contact)
 
     def render(self) -> Frame | None:
         """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
@@ -149,8 +153,11 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self.episode
 
     def _rows(self) -> Rows:
-        rows = self._present().observations()
-        rows[~self._present().working] = 0.0
+        episode = self._present()
+        if episode.shared is not None:
+            return episode.observations()
+        rows = episode.observations()
+        rows[~episode.working] = 0.0
         return rows
 
     def _info(self, contact: Array) -> dict[str, Any]:
@@ -207,18 +214,16 @@ class CoverageVectorEnv(SyncVectorEnv):
         ParameterError
             When the actions are not finite numbers of shape (num_envs, n, 2).
         """
-        n, together = self.task.robots, []
-        values = np.zeros((self.num_envs, n, 2))
         begun_now = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        values, together = np.zeros((self.num_envs, self.task.robots, 2)), {}
         for run, (env, action) in enumerate(zip(self._teams, actions, strict=True)):
             if not begun_now[run]:
-                values[run] = checked_actions(action, n)
+                values[run] = checked_actions(action, self.task.robots)
                 if env.episode is not None and env.episode.shared is not None:
-                    together.append(run)
+                    together[run] = env.episode
         if self._shared is not None and together:
-            contact = self._shared.moved(values.reshape(-1, 2)).reshape(-1, n)
-            for run in together:
-                cast("Episode", self._teams[run].episode).contact = contact[run]
+            for run, outcome in self._shared.advance(values, together).items():
+                self._teams[run].outcome = outcome
         return super().step(values)
 
 
