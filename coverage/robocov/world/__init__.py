@@ -3,22 +3,21 @@
 Each step the controller's forces, the viscous term of (28) and the kinematic limits are combined into the net
 force that pymunk integrates; contacts are pymunk's.
 
-A step depends on positions and velocities alone. pymunk keeps more than that between steps (cached
-contact impulses, a pending push out of an overlap, the shape of its search tree), all of which
-matters only in contact. So a step is first made as if nothing touched; those whom pymunk reports in
-contact, and whoever they are moved against, are moved again from the same state by `ContactSolver`, in
-substeps fine enough that no robot sinks into anything by more than `MAX_PENETRATION`. That is what makes
-a copy of a running world go on identically, bit for bit, and what keeps a contact a matter of those in it.
+A step depends on positions and velocities alone, so that a copy goes on identically, bit for bit. pymunk
+keeps more (cached contact impulses, a pending push out of an overlap, the shape of its search tree), which
+matters only in contact. So a step is first made as if nothing touched; those whom pymunk reports in contact,
+and whoever they are moved against, are moved again from the same state by `ContactSolver`, in substeps fine
+enough that no robot sinks into anything by more than `MAX_PENETRATION`.
 
-Obstacles that move go their way whatever is in it. What they meet they push, and what pushes is stronger
-than any robot. Walls are stronger still: where a robot has no room left between a moving obstacle and a wall,
-it stays in front of the wall, and the obstacle goes over it; it is pushed out again, where that is nearest,
-once there is room. No robot gets into a wall or through one that way.
+Obstacles that move go their way whatever is in it, and push what they meet. Walls are stronger still: where a
+robot has no room left between a moving obstacle and a wall, it stays in front of the wall, and the obstacle
+goes over it; it is pushed out again, where that is nearest, once there is room.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TypeAlias
 
@@ -36,10 +35,8 @@ from robocov.world.solid import Mover
 
 LONGEST_SUBSTEP = 0.02
 """Longest substep in seconds."""
-
 MAX_MASS_RATIO = 1000.0
 """Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
-
 MAX_PENETRATION = 1e-3
 """Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
 
@@ -59,12 +56,9 @@ class World:
     Parameters
     ----------
     pieces : convex polygons, (k, 2) m each
-        What `solid.solid_pieces` returns.
-    team : Team
+        As of `solid.solid_pieces`.
     positions : (n, 2) m
     velocities : (n, 2) m/s, at rest by default
-    movers : tuple of Mover
-        Obstacles that move, as kinematic bodies.
     failed_robots : (w, 3) m or None
         x, y and radius of robots that have failed, and stand in the way.
     runs : int
@@ -94,16 +88,14 @@ class World:
             most = f"robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest"
             raise ParameterError(f"team.mass: {light:g} to {heavy:g} kg, but {most} were wanted")
         self.team, self._runs, self._each = team, runs, len(team) // runs
-        self._obstacles, self._movers, self.failed_robots = (
-            (pieces, movers, failed_robots),
-            movers,
-            failed_robots,
-        )
+        self._obstacles, self._movers = (pieces, movers, failed_robots), movers
+        self.failed_robots = failed_robots
         self.working: BoolArray = np.ones(len(team), dtype=bool)  # who does not is in no `World`
         state = np.zeros((2, len(team), 2))
         state[0], state[1] = positions, 0.0 if velocities is None else velocities
         self._set_state(state)
-        self._fast = self._anybody_fast()
+        self._fast = velocities is not None
+        """Whether a robot may be faster than it can be by itself."""
         self._moving = motion(movers, 0.0, 1.0)
         self._contacts: ContactSolver | None = None
         self._fastest, self._mover_speed = float(team.max_speed.max()), fastest(movers)
@@ -115,8 +107,7 @@ class World:
         rows = self._rows(run)
         state = np.array([self.positions, self.velocities])
         state[0, rows], state[1, rows] = positions, 0.0
-        self._set_state(state)
-        self._write_state(self._engine, run)
+        self._set_state(state, [run])
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
@@ -134,11 +125,13 @@ class World:
         External forces, (n, 2) N, as by a hand, know no limits; a robot that they have made faster than it
         can be by itself brakes as hard as it can.
         """
-        speed = self._fastest
+        external, push = _NONE, np.zeros(1)
         if external_forces is not None:
-            external_forces = np.array(external_forces, dtype=float)
-        if external_forces is not None or self._fast:
-            speed = max(speed, float((self._speeds() + self._gain(external_forces, dt)).max()))
+            external = np.array(external_forces, dtype=float)
+            push = np.hypot(*external.T) / self.team.mass
+        speed = self._fastest
+        if self._fast or len(external):
+            speed = max(speed, float((self._speeds() + push * dt).max()))
         # a robot must not cross a thin wall within a substep
         crossing = (speed + self._mover_speed) * dt / self._thinnest
         parts = max(math.ceil(dt / LONGEST_SUBSTEP - 1e-9), math.ceil(crossing))
@@ -146,18 +139,10 @@ class World:
             if self._movers:
                 self._moving = motion(self._movers, time + part * (dt / parts), dt / parts)
                 self._write_state(self._engine, 0)
-            self._substep(forces, dt / parts, external_forces)
+            self._substep(forces, dt / parts, external, push)
 
     def _speeds(self) -> Array:
         return np.asarray(np.hypot(self.velocities[:, 0], self.velocities[:, 1]))
-
-    def _gain(self, external_forces: Array | None, dt: float) -> Array | float:
-        """Return how much faster external forces may make each robot, m/s."""
-        return 0.0 if external_forces is None else np.hypot(*external_forces.T) / self.team.mass * dt
-
-    def _anybody_fast(self) -> bool:
-        """Whether a robot is faster than it can be by itself."""
-        return bool((self._speeds() > self.team.max_speed).any())
 
     @cached_property
     def _engine(self) -> Engine:
@@ -190,18 +175,17 @@ class World:
         state[begin:-1, :2], state[begin:-1, 2:] = self.positions[rows], self.velocities[rows]
         engine.write(STATES, run)
 
-    def _substep(self, forces: Array, dt: float, external_forces: Array | None) -> None:
-        engine, external = self._engine, _NONE
+    def _substep(self, forces: Array, dt: float, external: Array, push: Array) -> None:
+        engine, unusual = self._engine, self._fast or len(external) > 0
         if self._answered != dt:
             self._answered, self._response = dt, response(self.team, dt)
         answer, limit = self._response, self.team.max_speed
-        if self._fast:
+        if unusual:
             # who is faster than it can be by itself brakes
             limit = np.maximum(limit, self._speeds() - self.team.max_acceleration * dt)
             answer = np.column_stack([answer[:, :4], limit])
-        if external_forces is not None:
-            external = external_forces
-            limit = np.maximum(limit, self._speeds() + self._gain(external, dt))
+        if len(external):
+            limit = np.maximum(limit, self._speeds() + push * dt)
         state = np.empty((2, len(forces), 2))
         engine.robots[:] = forces.reshape(self._runs, -1, 2)
         engine.forget_contacts()
@@ -213,26 +197,23 @@ class World:
             touching.setdefault(row // self._each, []).append(row)
         for run, rows in touching.items():
             self._resolve_contacts(run, np.array(rows), state, dt, limit)
-        self._set_state(state)
-        for run in touching:
-            self._write_state(engine, run)
-        if external_forces is not None or self._fast:
-            self._fast = self._anybody_fast()
+        self._set_state(state, touching)
+        if unusual:
+            self._fast = bool((self._speeds() > self.team.max_speed).any())
 
     def _touching(self) -> list[int]:
         """Return the robots that touched something in the last free substep."""
         return sorted({self._row[body] for body in self._engine.touching() if body in self._row})
 
-    def _set_state(self, state: Array) -> None:
-        # whoever gets it, a controller or a record, must not change it
-        state.setflags(write=False)
-        self.positions, self.velocities = state[0], state[1]
+    def _set_state(self, state: Array, corrected: Iterable[int] = ()) -> None:
+        """Turn to a state, (2, n, 2), which is not that of the engine in some runs."""
+        state.setflags(write=False)  # whoever gets it, a controller or a record, must not change it
+        self.positions, self.velocities = state
+        for run in corrected:
+            self._write_state(self._engine, run)
 
     def _resolve_contacts(self, run: int, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
-        """Move robots of a run again that touch something, and with them whoever they are moved against.
-
-        `free`, (2, n, 2) m and m/s, is how all moved as if nobody touched anything, and is corrected.
-        """
+        """Correct the free motion, (2, n, 2), of who touches something, and of whoever is moved by them."""
         solver = self._contacts or ContactSolver(self.team, self._obstacles)
         self._contacts = None  # it is of no use once it was interrupted
         all_rows, net = self._rows(run), self._engine.robots[run]
@@ -278,10 +259,9 @@ class ContactSolver:
     def moved(
         self, rows: IntArray, positions: Array, velocities: Array, forces: Array, motion: Array, dt: float
     ) -> tuple[Array, Array]:
-        """Return positions and velocities, (k, 2) each, of the robots of ascending rows after `dt` seconds.
+        """Return positions and velocities, (k, 2) each, of robots of ascending rows after `dt` seconds.
 
-        Those before are given; `forces` (k, 2) N are net and constant, `motion` (m, 4) m and m/s is that of
-        the obstacles that move.
+        Net forces, (k, 2) N, are constant; `motion`, (m, 4) m and m/s, is that of the obstacles that move.
         """
         for row in rows.tolist():
             if row not in self._robots:
@@ -420,8 +400,7 @@ def _free_substep(
 
     The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
     dt; then acceleration and speed are limited, in this order. Limiting the speed cannot break the limit of
-    the acceleration: the old velocity lies within the limit, and projecting onto a disc does not move a point
-    away from a point of the disc.
+    the acceleration: projecting onto a disc moves a point no farther from the old velocity, which is in it.
     """
     each = len(answer) // len(addresses)
     begin = states.shape[1] - 1 - each

@@ -21,14 +21,8 @@ from robocov.world.solid import movers, solid_pieces
 class ChangingWorld:
     """As `World`, with a row for every robot that ever is; its arrays are read-only.
 
-    Attributes
-    ----------
-    positions : (n, 2) m
-        Of a robot that has not joined yet: where it would start, or is to join.
-    velocities : (n, 2) m/s
-        Zero of those that do not work.
-    working : (n,) bool
-        Which robots are there and have not failed.
+    The position of a robot that has not joined yet is where it would start, or is to join; those that do not
+    work have no velocity.
     """
 
     def __init__(
@@ -67,10 +61,7 @@ class ChangingWorld:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Move on by `dt` seconds, as `World.step`; then robots fail and join whose time has come.
-
-        Raises StartError when there is no room for a robot that joins.
-        """
+        """Move on as `World.step`; then robots fail and join. Raises StartError where one finds no room."""
         rows, there, time_after = self._rows, self.working | self._failed, time + dt
         self.positions, self.velocities = self.positions.copy(), np.zeros_like(self.velocities)
         if self._world is not None:

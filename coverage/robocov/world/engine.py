@@ -37,9 +37,7 @@ class Engine:
     Attributes
     ----------
     forces : (spaces, bodies, 2) N
-        pymunk forgets them after each step.
-    robots : (spaces, n, 2) N
-        Those of the robots, the same array.
+        pymunk forgets them after each step. `robots`, (spaces, n, 2), are those of the robots.
     states : (spaces, bodies, 4) m and m/s
         Positions and velocities, written or read.
     addresses : (spaces, 10)

@@ -20,9 +20,7 @@ _ROUNDS = 300
 
 
 def relocated(environment: Environment, positions: Array, team: Team) -> Array:
-    """Return places, (n, 2) m, where all robots fit, near where they are.
-
-    Who fits stays where it is, unless others that have to go somewhere push it.
+    """Return places, (n, 2) m, where all robots fit: where they are, unless they do not fit, or are pushed.
 
     Raises StartError when there is no room; the message names a robot.
     """
@@ -56,11 +54,9 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
 def nearest_free(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
-    """Return the place nearest to a point, m, where a robot fits, the others staying where they are.
+    """Return the place nearest to a point, m, where a robot fits beside others, (n, 2) m, who stay.
 
-    `others` is (n, 2) m, `radii` (n,) m or None: as the robot's.
-
-    Raises StartError when there is none.
+    Their radii, (n,) m, are by default the robot's. Raises StartError when there is none.
     """
     beside = np.full(len(others), radius) if radii is None else radii
     apart = np.hypot(*(others - point).T)
@@ -80,9 +76,9 @@ def nearest_free(
 def check_starts(
     environment: Environment, positions: Array, team: Team, slack: float, there: BoolArray | None = None
 ) -> None:
-    """Check that robots, (n, 2) m, or those that are `there`, (n,), are free but for `slack` metres.
+    """Raise StartError when a robot, (n, 2) m, is in a wall or in another one by more than `slack` metres.
 
-    Raises StartError when a robot is in a wall or in another one; the message names it.
+    Only those that are `there`, (n,), count; by default all.
     """
     there = np.ones(len(positions), dtype=bool) if there is None else there
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
