@@ -16,41 +16,19 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
+# fmt: off
+if TYPE_CHECKING:  # isort: off
     from robocov.conditions import Conditions, Failure, Join
     from robocov.controllers import (
-        CONTROLLERS,
-        Atlas,
-        AtlasShared,
-        Controller,
-        IndividualController,
-        Individually,
-        Lloyd,
-        OwnView,
-        Rapf,
-        Rpf,
-        make_controller,
+        CONTROLLERS, Atlas, AtlasShared, Controller, IndividualController, Individually, Lloyd, OwnView, Rapf,
+        Rpf, make_controller,
     )
     from robocov.controllers.gains import choice, gain
     from robocov.cost import CoverageCost, CoverageResult
     from robocov.cost.momentary_cost import MomentaryCost
-    from robocov.density import (
-        Density,
-        Gaussian,
-        Gaussians,
-        Raster,
-        Uniform,
-        WeightedArea,
-        WeightedPolygons,
-    )
+    from robocov.density import Density, Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
     from robocov.environment import (
-        CircleObstacle,
-        DiscStart,
-        Environment,
-        ObstaclePath,
-        PointsStart,
-        PolygonObstacle,
-        UniformStart,
+        CircleObstacle, DiscStart, Environment, ObstaclePath, PointsStart, PolygonObstacle, UniformStart,
         WallObstacle,
     )
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
@@ -72,6 +50,7 @@ if TYPE_CHECKING:
     from robocov.voronoi import VoronoiPartition, partition
     from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
+# fmt: on
 
 __version__ = "0.1.0"
 
@@ -113,16 +92,14 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 __all__ = [
     "CONTROLLERS", "GENERATORS", "ArrayCache", "Atlas", "AtlasShared", "CircleObstacle", "Conditions",
     "Controller", "CoverageCost", "CoverageResult", "Decision", "Density", "DiscStart", "Environment",
-    "Failure", "Gaussian", "Gaussians", "IndividualController", "Individually", "InputError", "Join",
-    "Lloyd", "MapError", "MomentaryCost", "Neighbours", "Observations", "ObstaclePath", "Optimum",
-    "OutputError", "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf",
-    "Raster", "Record", "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation",
-    "Snapshot", "StartError", "Team", "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle",
-    "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "bundled_maps", "check_map", "choice",
-    "cost_history", "gain", "generated_map", "load_map", "make_controller", "map_schema", "partition",
-    "read_results", "read_team", "run_metrics", "save_map", "settled_at",
-    "simulate_many", "summarise",
-    "weighted_partition",
+    "Failure", "Gaussian", "Gaussians", "IndividualController", "Individually", "InputError", "Join", "Lloyd",
+    "MapError", "MomentaryCost", "Neighbours", "Observations", "ObstaclePath", "Optimum", "OutputError",
+    "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf", "Raster", "Record",
+    "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation", "Snapshot", "StartError", "Team",
+    "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea", "WeightedCells",
+    "WeightedPolygons", "World", "bundled_maps", "check_map", "choice", "cost_history", "gain",
+    "generated_map", "load_map", "make_controller", "map_schema", "partition", "read_results", "read_team",
+    "run_metrics", "save_map", "settled_at", "simulate_many", "summarise", "weighted_partition",
 ]
 # fmt: on
 

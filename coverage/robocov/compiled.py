@@ -28,7 +28,7 @@ import platformdirs
 
 from robocov.errors import OutputError
 from robocov.files.array_files import ArrayCache
-from robocov.files.lock import locked
+from robocov.files.atomic import locked
 
 if TYPE_CHECKING:
     from collections.abc import Callable

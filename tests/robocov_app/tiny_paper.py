@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robocov.errors import OutputError
-from robocov.files.lock import locked
+from robocov.files.atomic import locked
 from robocov_app.interruption import Interruption
 from robocov_app.paper.beyond_plan import BeyondPlan
 from robocov_app.paper.plan import Plan

@@ -20,8 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robocov.errors import MapError, OutputError, counted, one_line
-from robocov.files.atomic import written
-from robocov.files.lock import locked
+from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
 from robocov_app.editor.document import Sketch, draft_document, sketch_of, sketch_text
 from robocov_app.editor.files import OnDisk

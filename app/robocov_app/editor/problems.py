@@ -1,6 +1,6 @@
 """What is wrong with a sketch, where, in words: for maps, and for drafts that are far from being one.
 
-The rules are those of `robocov.mapfile.models` and `robocov.mapfile.rules`, which know of places in files and
+The rules are those of `robocov.mapfile.models` and `robocov.mapfile.check`, which know of places in files and
 stop where it makes no sense to go on; here every fault has its place on the map, and the rest is still looked
 at.
 """
@@ -18,8 +18,8 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.environment import DiscStart, PointsStart, Start, in_the_way, swept_area
 from robocov.errors import MapError, StartError, counted, listed, one_line
+from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, validate
-from robocov.mapfile.rules import check_rules
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.document import BOUNDARY, Owner, Sketch, draft_document
 from robocov_app.editor.faults import label_faults, place_words, ring_faults, shape_faults, start_faults

@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
-from robocov.files.atomic import on_disk, written
-from robocov.files.lock import locked
+from robocov.files.atomic import locked, on_disk, written
 from robocov_app.sweep.performing import FIGURES, made_with
 
 if TYPE_CHECKING:

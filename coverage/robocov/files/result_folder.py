@@ -19,8 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, reason, shown
-from robocov.files.atomic import on_disk, written
-from robocov.files.lock import locked
+from robocov.files.atomic import locked, on_disk, written
 
 Kind: TypeAlias = Literal["run", "comparison", "replay"]
 

@@ -20,7 +20,7 @@ from robocov.generator.polygons import scattered
 from robocov.generator.request import AREA_TOLERANCE as AREA_TOLERANCE
 from robocov.generator.request import SIDES, Request
 from robocov.generator.rooms import building
-from robocov.mapfile.rules import check_rules
+from robocov.mapfile.check import check_rules
 
 Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
 """Returns obstacles that leave the disc of the start in the corner free; None where a draw leads nowhere."""

@@ -13,9 +13,9 @@ from robocov.environment import Environment, Ring
 from robocov.errors import MapError, one_line, unknown_name
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
+from robocov.mapfile.check import check_rules
 from robocov.mapfile.density import density_document, density_from
 from robocov.mapfile.models import FORMAT, VERSION, map_schema, plain, validate
-from robocov.mapfile.rules import check_rules
 
 __all__ = [
     "bundled_maps",

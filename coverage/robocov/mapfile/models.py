@@ -13,26 +13,9 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from robocov.density import (
-    FINEST,
-    HEAVIEST,
-    Gaussian,
-    Gaussians,
-    Interpolation,
-    Uniform,
-    WeightedArea,
-    WeightedPolygons,
-)
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    ObstaclePath,
-    PointsStart,
-    PolygonObstacle,
-    Repeat,
-    UniformStart,
-    WallObstacle,
-)
+from robocov import density, environment
+from robocov.density import FINEST, HEAVIEST, Interpolation
+from robocov.environment import Repeat
 from robocov.errors import Mistake, place, shown_json, unknown_name
 from robocov.files.documents import check_header, refused
 
@@ -191,7 +174,11 @@ def _model(thing: Any, kind: str | None = None) -> type[Model]:
     return model
 
 
-_PARTS = {"path": _model(ObstaclePath), "peaks": _model(Gaussian), "areas": _model(WeightedArea)}
+_PARTS = {
+    "path": _model(environment.ObstaclePath),
+    "peaks": _model(density.Gaussian),
+    "areas": _model(density.WeightedArea),
+}
 """Objects at these keys, or in their lists."""
 
 
@@ -236,9 +223,21 @@ class RasterModel(Model, title="raster density"):
 
 
 _KINDS: dict[str, dict[str, Any]] = {
-    "obstacles": {"polygon": PolygonObstacle, "circle": CircleObstacle, "wall": WallObstacle},
-    "starts": {"disc": DiscStart, "uniform": UniformStart, "points": PointsStart},
-    "density": {"uniform": Uniform, "gaussians": Gaussians, "polygons": WeightedPolygons},
+    "obstacles": {
+        "polygon": environment.PolygonObstacle,
+        "circle": environment.CircleObstacle,
+        "wall": environment.WallObstacle,
+    },
+    "starts": {
+        "disc": environment.DiscStart,
+        "uniform": environment.UniformStart,
+        "points": environment.PointsStart,
+    },
+    "density": {
+        "uniform": density.Uniform,
+        "gaussians": density.Gaussians,
+        "polygons": density.WeightedPolygons,
+    },
 }
 _CHOICES = {
     key: {kind: _model(thing, kind) for kind, thing in things.items()} for key, things in _KINDS.items()

@@ -59,7 +59,7 @@ def json_key(name: str) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Team:
-    """Bodies, limits and ranges of n robots, each (n,).
+    """Bodies, limits and ranges of n robots, each (n,); a ParameterError on values out of range.
 
     Attributes
     ----------
@@ -73,8 +73,6 @@ class Team:
         How far the range sensor sees obstacles, from the robot's centre.
     communication_range : m
         Two robots are neighbours when both are in range of each other. Infinite: everybody hears everybody.
-
-    Raises ParameterError on a value out of range.
     """
 
     radius: Array
@@ -113,11 +111,7 @@ class Team:
         sensing_range: float = 3.0,
         communication_range: float = np.inf,
     ) -> Team:
-        """Return a team of `n` equal robots (the paper's: 1 kg, at most 1 m/s).
-
-        >>> Team.homogeneous(6).max_speed
-        array([1., 1., 1., 1., 1., 1.])
-        """
+        """Return a team of `n` equal robots (the paper's: 1 kg, at most 1 m/s)."""
         if n < 1:
             raise ParameterError(f"robots: {shown(n)}, but a whole number of at least 1 was wanted")
         values = (radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range)
@@ -185,8 +179,6 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
     """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
 
     What a group leaves open is as in `defaults`, then `Team.homogeneous`; None is a range without limit.
-
-    Raises InputError with the file, the key, the value and what was wanted.
     """
     path = Path(path)
     where, content = one_line(path), read_bytes(path)
@@ -227,22 +219,20 @@ def _group(group: object, path: tuple[str | int, ...], values: dict[str, float |
         found = "missing" if count is None else shown(count)
         wanted = f"a whole number from 1 to {MOST_ROBOTS}"
         raise InputError(f"{place((*path, 'count'))}: {found}, but {wanted} was wanted")
-    for key in LIMITS:
-        if key in group:
-            values[key] = _value(key, group[key], (*path, key))
+    values |= {key: _value(key, group[key], place((*path, key))) for key in LIMITS if key in group}
     known = {name: np.inf if value is None else value for name, value in values.items()}
     return Team.homogeneous(count, **known)
 
 
-def _value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
+def _value(name: str, value: object, where: str) -> float | None:
     if LIMITS[name][2] and value in (None, NO_LIMIT):
         return None
     if not is_number(value):
-        raise InputError(f"{place(path)}: {shown(value)}, but a number was wanted")
+        raise InputError(f"{where}: {shown(value)}, but a number was wanted")
     try:
         Team.homogeneous(1, **{name: float(value)})
     except ParameterError as error:
-        raise InputError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+        raise InputError(f"{where}: {str(error).partition(': ')[2]}") from None
     return float(value)
 
 

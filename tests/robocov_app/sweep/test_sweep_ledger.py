@@ -271,7 +271,7 @@ def test_one_process_is_at_work_in_a_folder(tmp_path: Path) -> None:
 
 def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
     script = (
-        "import sys, time\nfrom pathlib import Path\nfrom robocov.files.lock import locked\n"
+        "import sys, time\nfrom pathlib import Path\nfrom robocov.files.atomic import locked\n"
         "with locked(Path(sys.argv[1])):\n    print('locked', flush=True)\n    time.sleep(60)\n"
     )
     command = [sys.executable, "-c", script, str(tmp_path)]
