@@ -18,8 +18,7 @@ from robocov.controllers.base import Controller
 from robocov.controllers.user_modules import fault_of
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
-from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.decisions import checked_decision, detached, given_forces
+from robocov.observation import Decision, Observations, Snapshot, checked_decision, detached, given_forces
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.scans import Scanning, Scans
 from robocov.record import ARRAYS, Record, Recorder

@@ -23,7 +23,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.compiled import inner_kernel, kernel
 from robocov.errors import ParameterError, unknown_name
 from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, derivatives
-from robocov.observation.cells import Cells
+from robocov.observation import Cells
 
 if TYPE_CHECKING:
     from robocov.density import Density

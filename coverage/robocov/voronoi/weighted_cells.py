@@ -9,29 +9,41 @@ cost sum_i int |q - p_i|² / v_i² dq is least for given cells, may then lie in 
 Source: F. Aurenhammer and H. Edelsbrunner, *An optimal algorithm for constructing the weighted Voronoi
 diagram in the plane*, Pattern Recognition 17 (1984). Here the boundary pieces of all cells are found at
 once instead, and are not linked: Green's theorem needs no order.
+
+About its generator, every boundary that a cell may have is a curve a |q|² + b q = c, and the cell lies
+where a |q|² + b q <= c: a line (a = 0), a circle around the cell (a > 0), or one around what is not the
+cell's (a < 0). With b² + 4 a c = 1 the curves behave like unit vectors: their product
+g = b b' + 2 (a c' + a' c) says how they meet, in two points where |g| < 1.
+
+A curve's point nearest to the generator, r n, and its curvature k = 2 a give it the parameter t in
+
+    q(t) = r n + (2 t m - 2 k t² n) / (1 + k² t²),      m = n turned left,
+
+which is half the tangent of half the angle on a circle, and half the distance on a line. It runs with the
+cell on its left. Every other curve's condition on q(t) is a quadratic in t, so that all the ends come from
+one square root each. Each meeting is computed once, and is the same place on both curves: they cannot
+disagree. A curve is a row: n (2), r, a, the values of t between which it is looked at, whose cell it bounds,
+and what is beyond.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import inner_kernel, kernel
+from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, shown
-from robocov.observation.cells import Cells
+from robocov.observation import Cells
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
+from robocov.voronoi import VoronoiPartition, generators_of, partition, weighted
 from robocov.voronoi.arcs import chords, moments, rings
-from robocov.voronoi.bisectors import borders
-from robocov.voronoi.bounded_cells import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh
-
-if TYPE_CHECKING:
-    from robocov.density import Density
 
 _SAGITTA = 2e-4
 """How far the outlines of cells may leave their arcs, relative to the region's diameter."""
@@ -42,12 +54,16 @@ _FINE = 2e-5
 _NOTHING = 1e-14
 """Area of a cell, relative to the region's, that is rounding."""
 
+_PARALLEL = 1e-29
+"""sin² of the angle at which two curves meet, below which rounding alone decides whether they do and where;
+they are taken to be one within the other, which moves no border by more than rounding does."""
 
-@dataclass(eq=False)
+
+@dataclass(eq=False, kw_only=True)
 class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
 
-    Where a cell is not convex, its centroid may lie outside of it.
+    Where a cell is not convex, its centroid may lie outside of it. There is no triangulation.
 
     Attributes
     ----------
@@ -56,16 +72,11 @@ class WeightedCells(Cells):
         The boundaries, relative to the generators: five numbers as in `robocov.voronoi.arcs`, whose each
         is (ascending), and what is beyond.
     region : Region
-    triangulation : None
-        `VoronoiPartition` may have one.
-    density : Density or None
     """
 
     speeds: Array
     pieces: Array
     region: Region
-    triangulation: Mesh | None = None
-    density: Density | None = None
 
     @cached_property
     def edges(self) -> CellEdges:
@@ -94,13 +105,9 @@ class WeightedCells(Cells):
         return found, np.array(owners, dtype=np.intp)
 
     @cached_property
-    def adjacency(self) -> IntArray:
-        return self.edges.adjacency()
-
-    @cached_property
     def polar_moment(self) -> Array:
         if self.density is not None and not self.density.uniform:
-            return self.density.moments(self.edges, self.generators)[:, 3]
+            return super().polar_moment
         weight = 1.0 if self.density is None else self.density.highest
         polar = moments(self.pieces, len(self.generators))[:, 3]
         return np.where(self.mass > 0.0, weight * polar, 0.0)
@@ -150,44 +157,251 @@ def weighted_partition(
     >>> bool(abs(cells.mass[0] - np.pi * 2.0**2) < 1e-12), cells.centroid[0].round(12).tolist()
     (True, [-1.0, 0.0])
     """
-    points = np.array(generators, dtype=np.float64, order="C")
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise InputError(f"generators: an array of shape {points.shape}, but (n, 2) was wanted")
+    points = generators_of(generators)
     speeds = np.array(speeds, dtype=np.float64)
     if speeds.shape != points.shape[:1] or not ((speeds > 0.0) & (speeds < np.inf)).all():
         raise InputError(f"speeds: {shown(speeds.tolist())}, but {len(points)} positive numbers were wanted")
     neighbours = Neighbours(len(points)) if neighbours is None else neighbours
     if (speeds == speeds[:1]).all():
         return partition(points, region, neighbours, warm, heard=heard, density=density)
-    cells = _cells(points, speeds, region, neighbours, heard)
-    if density is not None:
-        mass, centroid = cells.mass * density.highest, cells.centroid
-        if not density.uniform:
-            mass, centroid = density.mass_and_centroid(cells.edges, points, cells.mass, centroid)
-        cells = replace(cells, mass=mass, centroid=centroid, density=density)
-    for values in (points, speeds, cells.mass, cells.centroid):
-        values.setflags(write=False)
-    return cells
-
-
-def _cells(
-    points: Array, speeds: Array, region: Region, neighbours: Neighbours, heard: Array | None
-) -> WeightedCells:
     n = len(points)
     one, other = neighbours.pairs()
     equal = speeds[one] == speeds[other]
     places = None if heard is None else heard[equal]
     cells = partition(points, region, Neighbours.of_pairs(n, one[equal], other[equal]), heard=places)
     edges = np.column_stack([cells.edges.start, cells.edges.end, cells.edges.cell, cells.edges.beyond])
-    offsets = np.ascontiguousarray((points[other] if heard is None else heard) - points[one])
-    first, indptr = (np.searchsorted(owner, np.arange(n + 1)) for owner in (cells.edges.cell, one))
-    kind = np.empty(n, dtype=np.intp)
+    offsets = (points[other] if heard is None else heard) - points[one]
+    pairs = np.column_stack([one, other, offsets, speeds[one], speeds[other]])
+    straight = np.empty(n, dtype=bool)
     # only Python without the compiler warns of what is infinite, or nothing
     with np.errstate(all="ignore"):
-        pieces = borders(speeds, region.sides, points, indptr, other, offsets, edges, first, kind)
+        pieces = _borders(points, region.sides, pairs, edges, straight)
     sums = moments(pieces, n)
     mass = np.where(sums[:, 0] < _NOTHING * region.area, 0.0, sums[:, 0])
     centroid = points + sums[:, 1:3] / np.where(mass > 0.0, mass, np.inf)[:, None]
-    mass = np.where(kind == 0, cells.mass, mass)
-    centroid = np.where(kind[:, None] == 0, cells.centroid, centroid)
-    return WeightedCells(points, mass, centroid, speeds, pieces, region)
+    mass = np.where(straight, cells.mass, mass)
+    centroid = np.where(straight[:, None], cells.centroid, centroid)
+    speeds.setflags(write=False)
+    found = WeightedCells(points, mass, centroid, speeds=speeds, pieces=pieces, region=region)
+    return weighted(found, density)
+
+
+@kernel
+def _borders(points: Array, sides: Array, pairs: Array, edges: Array, straight: BoolArray) -> Array:
+    """Return the pieces of all boundaries: five numbers as in `arcs`, whose it is, and what is beyond.
+
+    Parameters
+    ----------
+    sides : (k, 5)
+        As `Region.sides`.
+    pairs : (m, 6)
+        Robot, neighbour, the offset to where that is known to be (m), their speeds (m/s); by robot.
+    edges : (e, 6)
+        x, y, u, v, cell and beyond of the cells among equally fast robots.
+    straight : (n,), written
+        Whether only equally fast robots bound the cell.
+    """
+    found, used, pair, edge = np.empty((len(edges) + 64, 7)), 0, 0, 0
+    for i in range(len(points)):
+        first, begin = pair, edge
+        while pair < len(pairs) and pairs[pair, 0] == i:
+            pair += 1
+        while edge < len(edges) and edges[edge, 4] == i:
+            edge += 1
+        lines, heard, bounds = edge - begin, pairs[first:pair], edges[begin:edge]
+        curves, meetings = np.empty((lines + pair - first, 8)), np.empty((0, 0, 2))
+        count = _circles(curves, heard, bounds)
+        straight[i] = count == lines or (lines == 0 and count > 0)
+        if straight[i]:
+            count = lines
+        elif count > 0:
+            _lines(curves, heard, bounds, sides, points[i, 0], points[i, 1])
+            meetings = np.empty((count, count, 2))
+            _all_meetings(curves[:count], lines, meetings)
+        for c in range(count):
+            if used + 2 * count + 2 > len(found):
+                more = np.empty((2 * (used + 2 * count + 2), 7))
+                more[: len(found)] = found
+                found = more
+            if straight[i]:
+                for k in range(4):
+                    found[used, k] = bounds[c, k]
+                found[used, 4], found[used, 5], found[used, 6] = 0.0, i, bounds[c, 5]
+                used += 1
+            else:
+                used = _parts(curves[c], meetings[c], found, used)
+    return found[:used]
+
+
+@inner_kernel
+def _circles(curves: Array, pairs: Array, edges: Array) -> int:
+    """Write the circles that may bound a cell after its lines; return the rows, -1 for a cell of nothing."""
+    count, reach = len(edges), 0.0
+    for e in range(len(edges)):
+        reach = max(reach, np.sqrt(edges[e, 0] ** 2 + edges[e, 1] ** 2))
+    for turn in range(2):
+        for k in range(len(pairs)):
+            own, other = pairs[k, 4], pairs[k, 5]
+            distance = np.sqrt(pairs[k, 2] ** 2 + pairs[k, 3] ** 2)
+            if turn == 0 and other > own:
+                if distance == 0.0:
+                    return -1
+                # the farthest place of a circle around the cell is behind the robot, seen from the faster one
+                reach = min(reach, distance * own / (other - own))
+            near = distance * (own / (own + other))
+            if turn == 1 and own != other and distance > 0.0 and near < reach:
+                curves[count, 0], curves[count, 1] = pairs[k, 2] / distance, pairs[k, 3] / distance
+                curves[count, 2] = near
+                curves[count, 3] = 0.5 * ((other - own) * (own + other) / (own * other)) / distance
+                curves[count, 4], curves[count, 5] = -np.inf, np.inf
+                curves[count, 6], curves[count, 7] = pairs[k, 0], pairs[k, 1]
+                count += 1
+    return count
+
+
+@inner_kernel
+def _lines(curves: Array, pairs: Array, edges: Array, sides: Array, px: float, py: float) -> None:
+    """Write the edges of a cell as lines between their ends.
+
+    The directions are those of the bisectors and of the region's sides: an edge may be so short that
+    rounding decides on its own.
+    """
+    for e in range(len(edges)):
+        x, y, u, v = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        middle_x, middle_y = 0.5 * (x + u), 0.5 * (y + v)
+        nx, ny, near, least = 0.0, 0.0, 0.0, np.inf
+        for k in range(len(pairs) if edges[e, 5] >= 0.0 else 0):
+            if pairs[k, 1] == edges[e, 5]:
+                distance = np.sqrt(pairs[k, 2] ** 2 + pairs[k, 3] ** 2)
+                nx, ny, near = pairs[k, 2] / distance, pairs[k, 3] / distance, 0.5 * distance
+        for s in range(len(sides) if edges[e, 5] < 0.0 else 0):
+            room = sides[s, 4] - (px * sides[s, 2] + py * sides[s, 3])
+            away = abs(middle_x * sides[s, 2] + middle_y * sides[s, 3] - room)
+            if away < least:
+                least, nx, ny = away, sides[s, 2], sides[s, 3]
+                near = nx * middle_x + ny * middle_y
+        curves[e, 0], curves[e, 1], curves[e, 2], curves[e, 3] = nx, ny, near, 0.0
+        curves[e, 4], curves[e, 5] = 0.5 * (nx * y - ny * x), 0.5 * (nx * v - ny * u)
+        curves[e, 6], curves[e, 7] = edges[e, 4], edges[e, 5]
+
+
+@inner_kernel
+def _all_meetings(curves: Array, lines: int, meetings: Array) -> None:
+    """Write where each curve enters and leaves the cell's side of each other; nan where they do not meet.
+
+    A curve of which no part is on the cell's side of another one gets an empty interval. Lines of one cell
+    are not held against each other: between their ends they are its edges.
+    """
+    count = len(curves)
+    for one in range(count):
+        meetings[one, one, 0] = meetings[one, one, 1] = np.nan
+        for other in range(one + 1, count):
+            enter, leave, apart = np.nan, np.nan, 0
+            if other >= lines:
+                enter, leave, apart = _meeting(curves[one], curves[other])
+            if apart & 1:
+                curves[one, 5] = -np.inf
+            if apart & 2:
+                curves[other, 5] = -np.inf
+            meetings[one, other, 0], meetings[one, other, 1] = enter, leave
+            # where a curve leaves the side of another one, that one enters its side: in the same place
+            meetings[other, one, 0] = _parameter(curves[other], *_place(curves[one], leave))
+            meetings[other, one, 1] = _parameter(curves[other], *_place(curves[one], enter))
+
+
+@inner_kernel
+def _meeting(one: Array, other: Array) -> tuple[float, float, int]:
+    """Return where a curve enters the cell's side of another one, where it leaves it, and who is apart.
+
+    Apart (1 for the first, 2 for the other, 3 for both) is of which no part is on the other one's side.
+    """
+    n1x, n1y, r, a1 = one[0], one[1], one[2], one[3]
+    n2x, n2y, r2, a2 = other[0], other[1], other[2], other[3]
+    # b² + 4 a c = 1, and a r² + |b| r = c
+    b1, b2 = 1.0 - 2.0 * a1 * r, 1.0 - 2.0 * a2 * r2
+    b1x, b1y, c1 = n1x * b1, n1y * b1, r * (1.0 - a1 * r)
+    b2x, b2y, c2 = n2x * b2, n2y * b2, r2 * (1.0 - a2 * r2)
+    out, left = b2x * n1x + b2y * n1y, b2y * n1x - b2x * n1y + 0.0  # no negative zero
+    k = 2.0 * a1
+    bend = 2.0 - r * k
+    # on the first curve the other one's condition is square t² + 2 left t + constant <= 0
+    square = a2 * bend * bend - k * out * bend - c2 * k * k
+    constant = a2 * r * r + r * out - c2
+    # 1 - g² as a sum of minors: where curves meet at a small angle, it would be nothing but rounding
+    turn, across = b1x * b2y - b1y * b2x, a1 * c2 - a2 * c1
+    minors = turn * turn - 4.0 * across * across
+    minors += 4.0 * (
+        (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
+    )
+    if minors > _PARALLEL:
+        large = -left - np.copysign(np.sqrt(minors), left)
+        if left >= 0.0:
+            return large / square, constant / large, 0
+        return constant / large, large / square, 0
+    # one curve is within the other (g >= 1), or neither, or both are out
+    outside = square + constant > 0.0
+    g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
+    return np.nan, np.nan, (1 if outside else 0) + (2 if outside == (g < 0.0) else 0)
+
+
+@inner_kernel
+def _parts(curve: Array, meetings: Array, found: Array, used: int) -> int:
+    """Write the parts of a curve that all others leave; return how many pieces there are then."""
+    begin, end = curve[4], curve[5]
+    for o in range(len(meetings)):
+        if meetings[o, 0] <= meetings[o, 1]:
+            begin, end = max(begin, meetings[o, 0]), min(end, meetings[o, 1])
+    # where another one leaves two parts there is a gap between them: the gaps by their begins
+    gaps = 0
+    for o in range(len(meetings)):
+        enter, leave = meetings[o, 0], meetings[o, 1]
+        if leave < enter and leave < end and enter > begin:
+            k = gaps
+            while k > 0 and meetings[k - 1, 1] > leave:
+                meetings[k, 0], meetings[k, 1] = meetings[k - 1, 0], meetings[k - 1, 1]
+                k -= 1
+            meetings[k, 0], meetings[k, 1] = enter, leave
+            gaps += 1
+    for k in range(gaps):
+        used = _piece(curve, begin, min(meetings[k, 1], end), found, used)
+        begin = max(begin, meetings[k, 0])
+    return _piece(curve, begin, end, found, used)
+
+
+@inner_kernel
+def _piece(curve: Array, begin: float, end: float, found: Array, used: int) -> int:
+    """Write a part of a curve, at most half a circle a piece: cut where t is zero."""
+    k = 2.0 * curve[3]
+    while begin < end:
+        stop = 0.0 if begin < 0.0 < end and k != 0.0 else end
+        found[used, 0], found[used, 1] = _place(curve, begin)
+        found[used, 2], found[used, 3] = _place(curve, stop)
+        found[used, 4] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * begin)
+        found[used, 5], found[used, 6] = curve[6], curve[7]
+        begin, used = stop, used + 1
+    return used
+
+
+@inner_kernel
+def _place(curve: Array, t: float) -> tuple[float, float]:
+    """Return q(t), m."""
+    k = 2.0 * curve[3]
+    if abs(k * t) <= 1.0:
+        flat = 1.0 + (k * t) ** 2
+        left, out = 2.0 * t / flat, curve[2] - 2.0 * k * t * t / flat
+    else:
+        over = 1.0 / t
+        steep = over * over + k * k
+        left, out = 2.0 * over / steep, curve[2] - 2.0 * k / steep
+    return out * curve[0] - left * curve[1], out * curve[1] + left * curve[0]
+
+
+@inner_kernel
+def _parameter(curve: Array, x: float, y: float) -> float:
+    """Return t where q(t) is nearest to a place next to the curve."""
+    k = 2.0 * curve[3]
+    out = x * curve[0] + y * curve[1] - curve[2]
+    left = y * curve[0] - x * curve[1]
+    over = 2.0 + k * out
+    t: float = left / over if over > 1.0 else -out / (k * left)
+    return t

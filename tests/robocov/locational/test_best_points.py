@@ -231,12 +231,9 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
             alone = CellEdges(
                 edges.start[own], edges.end[own], np.zeros(own.sum(), dtype=int), edges.beyond[own]
             )
+            row = slice(i, i + 1)
             one = VoronoiPartition(
-                cells.generators[i : i + 1],
-                cells.mass[i : i + 1],
-                cells.centroid[i : i + 1],
-                None,
-                lambda e=alone: e,
+                cells.generators[row], cells.mass[row], cells.centroid[row], _find_edges=lambda e=alone: e
             )
             assert best_points(one, f)[0].tobytes() == together[i].tobytes()
 
