@@ -13,13 +13,10 @@ from shapely.affinity import scale
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
-# streets of a town bend by about so much (standard deviation, radians): each is taken as often
-_TILTS = 0.0, 0.05, 0.1
+_TILTS = 0.0, 0.05, 0.1  # streets of a town bend by about so much (standard deviation, radians)
 _WIDEST = 1.2  # what the first street is wider than it must be at most, in gaps
-# what the last streets, and those along the boundary, get of the width that the first gets to spare
-_LEAST = 0.4
-# parts of the blocks that have a corner cut off, and a yard cut out of a corner
-_CHAMFERED, _NOTCHED = 0.25, 0.2
+_LEAST = 0.4  # what the last streets, and those along the boundary, get of what the first is wider
+_CHAMFERED, _NOTCHED = 0.25, 0.2  # parts of the blocks with a corner cut off, and a yard cut out of one
 _UNEVEN = 0.25  # a cut is off the even one by at most so much of one block's share
 _THIN = 0.3  # least thickness of a block, as a part of the side of a square of its area
 _HALVINGS = 16
@@ -74,22 +71,22 @@ class Trim(NamedTuple):
     after: float
     yard: bool
 
-    def applied(self, block: list[Point]) -> Polygon:
+    def applied(self, block: Cell) -> Polygon:
         """Return the polygon of an outline without what is cut off, where that is possible."""
-        at = self.corner % len(block)
-        (x, y), previous, following = block[at], block[at - 1], block[(at + 1) % len(block)]
-        first = x + (previous[0] - x) * self.before, y + (previous[1] - y) * self.before
-        last = x + (following[0] - x) * self.after, y + (following[1] - y) * self.after
-        inner = [(first[0] + last[0] - x, first[1] + last[1] - y)] if self.yard else []
-        trimmed = Polygon([*block[:at], first, *inner, last, *block[at + 1 :]])
-        return trimmed if trimmed.is_valid else Polygon(block)
+        points = np.array(block)[:, :2]
+        at = self.corner % len(points)
+        here, previous, following = points[at], points[at - 1], points[(at + 1) % len(points)]
+        first, last = here + (previous - here) * self.before, here + (following - here) * self.after
+        inner = [first + last - here] if self.yard else []
+        trimmed = Polygon([*points[:at], first, *inner, last, *points[at + 1 :]])
+        return trimmed if trimmed.is_valid else _polygon(block)
 
 
 def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return blocks between streets, the first that are cut the widest; None if they block too little.
 
-    Streets are made as wide as the blocked area allows, up to a limit; what is too much then is taken off
-    the blocks all around. The corner of the start is a square.
+    Streets are as wide as the blocked area allows, up to a limit; what is too much then is taken off the
+    blocks all around. The corner of the start is a square.
     """
     cells = town_cells(request, rng)
     if cells is None:
@@ -166,7 +163,7 @@ def _block(cell: Cell, wider: float, corner: DiscStart, trim: Trim | None) -> Po
         # it ends at the side of the square that takes the least
         sides = (low, (1.0, 0.0)), (low, (0.0, 1.0)), (high, (-1.0, 0.0)), (high, (0.0, -1.0))
         block = max((cut(block, *side) for side in sides), key=lambda part: _polygon(part).area)
-    return _polygon(block) if trim is None or not block else trim.applied([edge[:2] for edge in block])
+    return _polygon(block) if trim is None or not block else trim.applied(block)
 
 
 def _polygon(cell: Cell) -> Polygon:

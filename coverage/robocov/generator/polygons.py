@@ -25,11 +25,8 @@ _ROUND = 0.52
 
 
 def scattered(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return obstacles that keep `gap` from each other and from the boundary; None if they found no place.
-
-    Their areas differ by up to a factor of three; the largest is placed first.
-    """
-    areas = np.sort(rng.uniform(*_SPREAD, request.obstacles))[::-1]
+    """Return obstacles that keep `gap` from each other and from the boundary; None if they found no place."""
+    areas = np.sort(rng.uniform(*_SPREAD, request.obstacles))[::-1]  # the largest is placed first
     areas *= request.blocked / areas.sum()
     # a disc takes the least
     filled = float((np.pi * (np.sqrt(areas / np.pi) + request.gap / 2.0) ** 2).sum())

@@ -61,9 +61,8 @@ class Wall(NamedTuple):
 
     def part(self, begin: float, end: float, thickness: float) -> WallObstacle:
         """Return a part of the wall."""
-        upright = self.across == 0
-        ends = ((self.at, begin), (self.at, end)) if upright else ((begin, self.at), (end, self.at))
-        return WallObstacle(ends, thickness)
+        upright, flat = ((self.at, begin), (self.at, end)), ((begin, self.at), (end, self.at))
+        return WallObstacle(flat if self.across else upright, thickness)
 
 
 class Door(NamedTuple):
@@ -98,10 +97,7 @@ class FloorPlan:
 
 
 def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return walls and furniture; None if there is no room for so much of it.
-
-    Furniture stands against walls, or keeps the gap from them, as from doors and other furniture.
-    """
+    """Return walls and furniture, against walls or with gaps around it; None if there is no room for it."""
     least, most, of_small = _WALLS
     small = min(max((_SMALL - request.unit / request.gap) / (_SMALL - _SMALLEST), 0.0), 1.0)
     part = rng.uniform(least, most + (of_small - most) * small)
@@ -207,42 +203,37 @@ def _furniture(
         return None
     clear = shapely.Point(corner.center).buffer(corner.radius)
     inner = [_inner(request, box, plan.thickness) for box in plan.rooms]
-    sizes = np.array([box.sides[0] * box.sides[1] for box in inner])
+    sizes = np.array([math.prod(box.sides) for box in inner])
+    if area > _DENSEST * sizes.sum():
+        return None
     kept: list[list[Polygon]] = [[] for _ in inner]
     for door in plan.doors:
         for number in door.rooms:
             kept[number].append(door.wall.part(door.begin, door.end, plan.thickness).polygon)
-    if area > _DENSEST * sizes.sum():
-        return None
     chances = np.cumsum(sizes / sizes.sum())
     # pieces are as large as a few of them for each room must be
-    usual = area / (_PIECES * len(inner))
+    usual, missed = area / (_PIECES * len(inner)), 0
     furniture: list[Obstacle] = []
-    missed = 0
     while area > enough:
         room = int(np.searchsorted(chances / chances[-1], rng.random(), side="right"))
         wanted = min(area, usual * rng.uniform(0.5, 1.5) * max(_SHRUNK, _SHRINKING**missed))
         piece = _piece(request, inner[room], kept[room], clear, wanted, rng)
-        if piece is None:
-            missed += 1
-            if missed == _TRIES:
-                return None
-            continue
-        missed = 0
-        kept[room].append(piece.polygon)
-        furniture.append(piece)
-        area -= piece.polygon.area
+        if piece is not None:
+            kept[room].append(piece.polygon)
+            furniture.append(piece)
+            area -= piece.polygon.area
+        missed = missed + 1 if piece is None else 0
+        if missed == _TRIES:
+            return None
     return furniture
 
 
 def _inner(request: Request, room: Box, thickness: float) -> Box:
     """Return a room up to the faces of its walls; the boundary has none."""
-    bounds = (0.0, 0.0, request.width, request.height)
-    inward = (thickness / 2.0, thickness / 2.0, -thickness / 2.0, -thickness / 2.0)
-    faces = (
-        edge if edge == bound else edge + off for edge, bound, off in zip(room, bounds, inward, strict=True)
-    )
-    return Box(*(round(face, request.digits) for face in faces))
+    half, bounds = thickness / 2.0, (0.0, 0.0, request.width, request.height)
+    inward = [half * (edge != bound) for edge, bound in zip(room, bounds, strict=True)]
+    faces = np.array(room) + inward * np.array([1.0, 1.0, -1.0, -1.0])
+    return Box(*(round(face, request.digits) for face in faces.tolist()))
 
 
 def _piece(
@@ -250,7 +241,7 @@ def _piece(
 ) -> CircleObstacle | PolygonObstacle | None:
     """Return a piece of furniture of about that area at a free place of a room, None if there is none."""
     kind = str(rng.choice(["cabinet", "table", "round table"], p=[0.5, 0.3, 0.2]))
-    stretch = rng.uniform(1.6, 3.5) if kind == "cabinet" else rng.uniform(1.0, 2.0)
+    stretch = rng.uniform(*((1.6, 3.5) if kind == "cabinet" else (1.0, 2.0)))
     long, deep = math.sqrt(area * stretch), math.sqrt(area / stretch)
     size = np.array([long, deep] if rng.random() < 0.5 else [deep, long])
     if kind == "round table":
@@ -277,9 +268,7 @@ def _piece(
         good &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius
     if not good.any():
         return None
-    first = int(good.argmax())
+    (left, bottom), (right, top), (x, y) = (at[int(good.argmax())].tolist() for at in (low, high, middle))
     if radius:
-        x, y = middle[first].tolist()
         return CircleObstacle((x, y), radius, kind)
-    (left, bottom), (right, top) = low[first].tolist(), high[first].tolist()
     return PolygonObstacle(((left, bottom), (right, bottom), (right, top), (left, top)), name=kind)
