@@ -302,10 +302,9 @@ class Simulation:
         seed: int | None = None,
         on_snapshot: Callable[[Snapshot], None] | None = None,
     ) -> Record:
-        """Run for `duration` seconds and return the whole of it.
+        """Run for `duration` seconds and return the whole of it; `on_snapshot` is called for progress.
 
-        `start` and `seed` say where the starts came from, for the record; `on_snapshot` is called with every
-        snapshot, for progress.
+        `start` and `seed` say where the starts came from, for the record.
         """
         given = self.environment, self.team, self.controller, self.dt
         recorder = Recorder(*given, start=start, seed=seed, conditions=self.conditions)

@@ -78,10 +78,7 @@ def generated_map(
     Parameters
     ----------
     kind : str
-        One of `GENERATORS`. ``polygons``: obstacles that keep `gap` from each other and from the
-        boundary, convex, L-shaped or U-shaped. ``blocks``: blocks between streets, also along the boundary.
-        ``rooms``: rooms with doors, and furniture. ``mazes``: corridors of one width, on a grid.
-        ``caves``: chambers and tunnels in rock that leaves nothing free along the boundary.
+        One of `GENERATORS`.
     obstacles : int
         How many obstacles, blocks or rooms; of mazes about how many cells, of caves chambers.
     area : float

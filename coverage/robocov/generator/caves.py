@@ -24,9 +24,8 @@ from robocov.generator.request import AREA_TOLERANCE, Request
 _WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber
 # steps of the mesh: in the side of a usual chamber, at most in the longer side of the map, but at least
 _FINENESS, _MOST, _COARSEST = 12, 160, 6
-_RIM = (
-    0.012  # least thickness of rock at the boundary, in shorter sides of the map; a start's disc keeps more
-)
+# least thickness of rock at the boundary, in shorter sides of the map; a start's disc keeps more
+_RIM = 0.012
 _SHORE, _RAISED = 0.35, 3.0  # belt where rock is likelier, in sides of a usual chamber, and how much
 _HALL, _LOWERED = 0.35, 1.5  # radius around the start where it is less likely, and how much
 # walls are simplified by so much: in sides of a usual chamber, and at most in shorter sides of the map
@@ -98,9 +97,8 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
             low, high = (radius, high) if blocked(free(middle, radius)) > request.area else (low, radius)
         radius = (low + high) / 2.0
         space = free(middle, radius)
-        outline, *pillars = (
-            request.ring(shapely.get_coordinates(ring)[:-1]) for ring in (space.exterior, *space.interiors)
-        )
+        rings = space.exterior, *space.interiors
+        outline, *pillars = (request.ring(shapely.get_coordinates(ring)[:-1]) for ring in rings)
         space = Polygon(outline, pillars)
         if abs(blocked(space) - request.area) > _CLOSE * AREA_TOLERANCE:
             return None
@@ -118,13 +116,8 @@ def random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Arr
     """Return a field of mean 0 and variance 1 that varies over the length of a usual chamber.
 
     It is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis, *Simulation of
-    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
-
-    Returns
-    -------
-    points : (rows, columns, 2) m
-        The mesh, up to the edges of the map.
-    values : (rows, columns)
+    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991), on the points,
+    (rows, columns, 2) m, of a mesh up to the edges of the map.
     """
     sides = request.width, request.height
     step = max(request.unit / _FINENESS, min(max(sides) / _MOST, request.unit / _COARSEST))
@@ -148,22 +141,22 @@ def below(points: Array, values: Array) -> BaseGeometry:
     inner = values[1:-1, 1:-1]
     values = np.maximum(values, 1.0)
     values[1:-1, 1:-1] = inner
+
+    def crossed(start: tuple[slice, slice], end: tuple[slice, slice]) -> Array:
+        """Return where edges of the mesh cross the level 0, (..., 2) m, nan where they do not."""
+        here, there = values[start], values[end]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.where((here < 0.0) != (there < 0.0), here / (here - there), np.nan)
+        return np.asarray(points[start] + (points[end] - points[start]) * part[..., None])
+
     # the edges from each point to the right, upwards, and to the point above the right one
-    right = _crossed(points[:, :-1], points[:, 1:], values[:, :-1], values[:, 1:])
-    up = _crossed(points[:-1], points[1:], values[:-1], values[1:])
-    aslant = _crossed(points[:-1, :-1], points[1:, 1:], values[:-1, :-1], values[1:, 1:])
+    right, up = crossed(np.s_[:, :-1], np.s_[:, 1:]), crossed(np.s_[:-1, :], np.s_[1:, :])
+    aslant = crossed(np.s_[:-1, :-1], np.s_[1:, 1:])
     triangles = ((right[:-1], up[:, 1:], aslant), (aslant, right[1:], up[:, :-1]))
     edges = np.concatenate([np.stack(three, axis=2).reshape(-1, 3, 2) for three in triangles])
     # a contour that enters a triangle leaves it
     segments = edges[~np.isnan(edges[..., 0])].reshape(-1, 2, 2)
     return shapely.build_area(shapely.multilinestrings(shapely.linestrings(segments)))
-
-
-def _crossed(start: Array, end: Array, here: Array, there: Array) -> Array:
-    """Return where edges cross the level 0, (..., 2) m, nan where they do not."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where((here < 0.0) != (there < 0.0), here / (here - there), np.nan)
-    return np.asarray(start + (end - start) * part[..., None])
 
 
 def tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
@@ -189,16 +182,12 @@ def through(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
     """Return a line through a window between two parts of a core, or its middle where there are no two."""
     one, other = np.array(gap.between)
     middle = (one + other) / 2.0
-    across = (other - one) / np.hypot(*(other - one))
+    across = (other - one) / np.hypot(*(other - one)) * (1.5 * radius)
     along = np.array([-across[1], across[0]])
-    reach = 1.5 * radius
-    ends = []
-    for side in (along, -along):
-        # the half of a square before the window
-        corners = [middle + across * reach, middle - across * reach]
-        corners += [corners[1] + side * reach, corners[0] + side * reach]
-        near = core.intersection(Polygon(corners))
-        if near.is_empty:
-            return Point(middle)
-        ends.append(shapely.shortest_line(Point(middle), near).coords[-1])
-    return LineString([ends[0], middle, ends[1]])
+    left, right = middle + across, middle - across
+    # what is in the halves of a square on either side of the window
+    near = [core.intersection(Polygon([left, right, right + side, left + side])) for side in (along, -along)]
+    if any(part.is_empty for part in near):
+        return Point(middle)
+    begin, end = (shapely.shortest_line(Point(middle), part).coords[-1] for part in near)
+    return LineString([begin, middle, end])

@@ -11,6 +11,7 @@ cross, upwards (0) and to the right (1).
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterator
@@ -38,9 +39,9 @@ _CLOSE = 0.8  # part of the tolerance of the blocked area that is made use of
 def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return walls between corridors of one width; None if they are narrower than the gap.
 
-    The number of cells is the nearest to what was asked for that a grid of nearly square ones has. Walls
-    are as thick as the blocked area wants. What is still too much of it, as thicknesses are whole
-    centimetres, goes by opening some more. No wall stands in the disc of the start.
+    A grid of nearly square cells has about as many as were asked for. Walls are as thick as the blocked area
+    wants; what is still too much of it, as thicknesses are whole centimetres, goes by opening some more. No
+    wall stands in the disc of the start.
     """
     shape = _shape(request)
     walls = inner_walls(shape) & ~tree_passages(shape, rng)
@@ -115,22 +116,21 @@ def inner_walls(shape: Cell) -> BoolArray:
 def tree_passages(shape: Cell, rng: np.random.Generator) -> BoolArray:
     """Return where walls are missing so that there is one way from each cell to each other."""
     newest = rng.uniform(*_NEWEST)
-    first = (int(rng.integers(shape[0])), int(rng.integers(shape[1])))
-    growing, reached, passages = [first], {first}, np.zeros_like(inner_walls(shape))
+    growing = [(int(rng.integers(shape[0])), int(rng.integers(shape[1])))]
+    unreached = {*itertools.product(range(shape[0]), range(shape[1]))} - {*growing}
+    passages = np.zeros_like(inner_walls(shape))
     while growing:
         at = len(growing) - 1 if rng.random() < newest else int(rng.integers(len(growing)))
         column, row = growing[at]
         around = (column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)
-        fresh = [
-            (c, r) for c, r in around if 0 <= c < shape[0] and 0 <= r < shape[1] and (c, r) not in reached
-        ]
-        if not fresh:
+        fresh = [cell for cell in around if cell in unreached]
+        if fresh:
+            cell = fresh[int(rng.integers(len(fresh)))]
+            passages[(*max(growing[at], cell), int(column == cell[0]))] = True
+            unreached.remove(cell)
+            growing.append(cell)
+        else:
             growing.pop(at)
-            continue
-        cell = fresh[int(rng.integers(len(fresh)))]
-        passages[(*max(growing[at], cell), int(column == cell[0]))] = True
-        reached.add(cell)
-        growing.append(cell)
     return passages
 
 
@@ -170,24 +170,23 @@ def trails(walls: BoolArray) -> Iterator[list[Post]]:
         arms[other].add(one)
     done: set[tuple[Post, Post]] = set()
 
-    def onward(before: Post, here: Post) -> Post | None:
-        straight = (2 * here[0] - before[0], 2 * here[1] - before[1])
-        others = arms[here] - {before}
-        if straight in others:
-            return straight
-        return next(iter(others)) if len(others) == 1 else None
+    def straight(before: Post, here: Post) -> Post:
+        return 2 * here[0] - before[0], 2 * here[1] - before[1]
 
-    for begin in sorted(arms):
-        for step in sorted(arms[begin]):
-            if onward(step, begin) is not None or (begin, step) in done:
-                continue
-            trail, before, here = [begin], begin, step
-            while True:
+    def onward(before: Post, here: Post) -> Post | None:
+        others = arms[here] - {before}
+        if straight(before, here) in others:
+            return straight(before, here)
+        return others.pop() if len(others) == 1 else None
+
+    for begin, step in sorted((one, other) for one in arms for other in arms[one]):
+        if onward(step, begin) is None and (begin, step) not in done:
+            trail, before = [begin], begin
+            here: Post | None = step
+            while here is not None:
                 done |= {(before, here), (here, before)}
                 following = onward(before, here)
-                if following is None:
-                    break
-                if following != (2 * here[0] - before[0], 2 * here[1] - before[1]):
+                if following != straight(before, here):
                     trail.append(here)
                 before, here = here, following
-            yield [*trail, here]
+            yield trail
