@@ -15,21 +15,8 @@ from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.density import density_document, density_from
-from robocov.mapfile.models import FORMAT, VERSION, map_schema, plain, validate
-
-__all__ = [
-    "bundled_maps",
-    "density_of",
-    "dump_document",
-    "dump_map",
-    "from_json",
-    "load_map",
-    "map_file",
-    "map_schema",
-    "parse_map",
-    "save_map",
-    "to_json",
-]
+from robocov.mapfile.models import FORMAT, VERSION, plain, validate
+from robocov.mapfile.models import map_schema as map_schema
 
 _LINE = 100
 """Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
@@ -127,10 +114,7 @@ def _environment(document: object, where: str, folder: Path | None) -> Environme
 
 
 def to_json(environment: Environment) -> dict[str, Any]:
-    """Return `environment` as a JSON document that `from_json` turns into an equal one.
-
-    Whole numbers are int, so that the text is short.
-    """
+    """Return `environment` as a JSON document that `from_json` turns into an equal one."""
     density = environment.density
     return {
         **({} if environment.schema is None else {"$schema": environment.schema}),
@@ -147,11 +131,7 @@ def to_json(environment: Environment) -> dict[str, Any]:
 
 
 def save_map(environment: Environment, path: str | Path) -> None:
-    """Write `environment` to `path`, whole or not at all.
-
-    Raises MapError when it breaks a rule and could not be loaded again, OutputError when the file
-    cannot be written.
-    """
+    """Write `environment` to `path`, whole or not at all; raise MapError when it breaks a rule."""
     exact = to_json(environment)
     document = _shortened(exact)
     if document == exact and environment.density is None:
@@ -162,15 +142,14 @@ def save_map(environment: Environment, path: str | Path) -> None:
     else:
         from_json(document, str(path))
     with written(Path(path)) as part:
-        part.write_bytes(_dumped(document).encode())
+        part.write_bytes(dump_document(document).encode())
 
 
 def dump_map(environment: Environment) -> str:
     """Return the text of a map file: keys in a fixed order, one list of vertices on a line.
 
-    Numbers are the shortest that stand for the same place. What is the result of a sum, as
-    0.30000000000000004, is written as the decimal that it misses by rounding errors alone, 0.3. What was
-    written by hand stays as it is.
+    What is the result of a sum, as 0.30000000000000004, is written as the decimal that it misses by rounding
+    errors alone, 0.3. What was written by hand stays as it is.
     """
     return dump_document(to_json(environment))
 
@@ -178,10 +157,9 @@ def dump_map(environment: Environment) -> str:
 def dump_document(document: dict[str, Any]) -> str:
     """Return the text of a map file with this document, which may be a draft that no map can be made of.
 
-    How it is broken into lines does not depend on the lengths of its numbers: in the next version of a
-    file, a vertex that has moved changes one line.
+    Line breaks do not depend on the lengths of numbers: a vertex that has moved changes one line of the file.
     """
-    return _dumped(_shortened(document))
+    return _text(_shortened(document), "", 0, expanded=True) + "\n"
 
 
 def _shortened(document: dict[str, Any]) -> dict[str, Any]:
@@ -199,10 +177,6 @@ def _short(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _short(item) for key, item in value.items()}
     return value
-
-
-def _dumped(document: dict[str, Any]) -> str:
-    return _text(document, "", 0, expanded=True) + "\n"
 
 
 def _text(value: Any, indent: str, used: int, *, expanded: bool = False) -> str:

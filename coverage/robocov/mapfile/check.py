@@ -26,7 +26,7 @@ from robocov.environment import (
     swept_area,
 )
 from robocov.environment.passages import Gap, narrowest_gap
-from robocov.errors import JsonPath, MapError, Mistake, StartError, listed, place
+from robocov.errors import JsonPath, MapError, Mistake, StartError, counted, listed, place
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 
@@ -40,15 +40,11 @@ MANY_VERTICES = 5000
 """Of a map with more vertices it is said that it takes time."""
 
 _COST_SECONDS = 6.1e-8
-"""What `robocov.cost.CoverageCost` takes to begin, by the square of the vertices: measured on 1,250 and 2,500
-desks in a hall, 1.5 and 6 s."""
+"""What `robocov.cost.CoverageCost` takes to begin, by the square of the vertices, as measured."""
 
 
 def check_rules(environment: Environment, where: str) -> None:
-    """Check that `environment`, which messages call `where`, can be simulated.
-
-    Raises `MapError`: one line with the first broken rule, and how many more there are.
-    """
+    """Raise `MapError` unless `environment`, which messages call `where`, can be simulated."""
     found = list(_ring_mistakes(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
         at = ("obstacles", k)
@@ -70,26 +66,18 @@ def check_rules(environment: Environment, where: str) -> None:
 def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     """Yield what is wrong with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
-    extent = points.max(axis=0) - points.min(axis=0)
+    extent = np.ptp(points, axis=0)
+    flat = _FLAT * float(extent.max()) ** 2
     count = len(set(map(tuple, ring)))
     if count < 3:
-        what = f"{count} different point{'s' if count > 1 else ''}, but at least 3 were wanted"
-        yield Mistake.at(at, what)
-        return
-    if extent.max() > LARGEST:
+        yield Mistake.at(at, f"{counted(count, 'different point')}, but at least 3 were wanted")
+    elif extent.max() > LARGEST:
         yield _too_large(at, extent)
-        return
-    if extent.min() < SMALLEST:
+    elif extent.min() < SMALLEST:
         yield Mistake.at(at, f"{_size(extent)}, but at least {SMALLEST * 1000:g} mm each way was wanted")
-        return
-    polygon = Polygon(points)
-    flat = _FLAT * float(extent.max()) ** 2
-    if polygon.is_valid and polygon.area > flat:
-        return
     # a ring that crosses itself may have no area either
-    if shapely.convex_hull(polygon).area <= flat:
-        what = f"area {polygon.area:g} m², but points that are not on one line were wanted"
-        yield Mistake.at(at, what)
+    elif shapely.convex_hull(polygon := Polygon(points)).area <= flat:
+        yield Mistake.at(at, f"area {polygon.area:g} m², but points that are not on one line were wanted")
     elif not polygon.is_valid:
         yield _crossing(at, points, polygon)
 
@@ -127,11 +115,8 @@ def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
     apart = (k for k in nearest if (k - nearest[0]) % len(points) not in (0, 1, len(points) - 1))
     other = next((k for k in apart if distance[k] <= 1e-6), nearest[1])
     first, second = sorted((nearest[0], other))
-    return Mistake.at(
-        (*at, first),
-        f"the edge from here meets the edge from {place((*at, second))} near "
-        f"[{spot[0]:g}, {spot[1]:g}], but a ring that does not meet itself was wanted",
-    )
+    found = f"the edge from here meets the edge from {place((*at, second))} near [{spot[0]:g}, {spot[1]:g}]"
+    return Mistake.at((*at, first), f"{found}, but a ring that does not meet itself was wanted")
 
 
 def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Mistake]:
@@ -147,8 +132,7 @@ def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> It
     for k, hole in enumerate(shape.holes):
         path = (*at, "holes", k)
         if not shell.covers(Polygon(hole)):
-            what = f"sticks out of {place((*at, 'vertices'))}, but a hole inside was wanted"
-            yield Mistake.at(path, what)
+            yield Mistake.at(path, f"sticks out of {place((*at, 'vertices'))}, but a hole inside was wanted")
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
             yield Mistake.at(path, "meets the outline or another hole, but a hole apart from them was wanted")
         else:
@@ -162,8 +146,7 @@ def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
         yield Mistake.at(("boundary",), what)
         return
     if environment.free.is_empty:
-        what = "no free space is left inside the boundary, but some was wanted"
-        yield Mistake.at(("obstacles",), what)
+        yield Mistake.at(("obstacles",), "no free space is left inside the boundary, but some was wanted")
         return
     density = environment.density
     # integrals take a second to load what they need
@@ -180,12 +163,9 @@ def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
     if isinstance(spec, PointsStart):
         points = np.asarray(spec.positions, dtype=float)
         inside = shapely.contains_properly(environment.free, shapely.points(points))
-        for k in np.flatnonzero(~inside):
-            yield Mistake.at(
-                (*at, "positions", int(k)),
-                f"[{points[k, 0]:g}, {points[k, 1]:g}] is inside an obstacle or outside the boundary, but a "
-                f"free place was wanted",
-            )
+        for k in np.flatnonzero(~inside).tolist():
+            found = f"[{points[k, 0]:g}, {points[k, 1]:g}] is inside an obstacle or outside the boundary"
+            yield Mistake.at((*at, "positions", k), f"{found}, but a free place was wanted")
         if len(np.unique(points, axis=0)) < len(points):
             what = "one place is given twice, but one place a robot was wanted"
             yield Mistake.at((*at, "positions"), what)
@@ -231,7 +211,6 @@ class MapReport:
 
     Attributes
     ----------
-    name : str
     area, free_area : float, m²
         Inside the boundary, and of that outside every obstacle.
     vertices, obstacles : int
@@ -240,13 +219,10 @@ class MapReport:
         Areas of the connected parts of the free space, the largest first.
     narrowest_gap : Gap or None
         None where the free space has no passage, as in a convex room.
-    starts : tuple of StartReport
     warnings : tuple of str
         What may be a mistake, one line each.
-    density : str or None
-        Its kind, None where there is none; with bounds of its values, `density_range`, and
-    mean_density : float
-        its mean over the free space.
+    density, density_range, mean_density : str or None, ...
+        Its kind, the bounds of its values, and its mean over the free space.
     """
 
     name: str
@@ -289,20 +265,7 @@ class MapReport:
 
 
 def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapReport:
-    """Measure a valid map, and warn of what may be a mistake.
-
-    Parameters
-    ----------
-    environment : Environment
-    radius : float, m
-        Radius of a robot, for the capacity of the starts and the warning of gaps.
-
-    Examples
-    --------
-    >>> from robocov.mapfile import load_map
-    >>> check_map(load_map("square")).components
-    (100.0,)
-    """
+    """Measure a valid map, and warn of what may be a mistake with robots of a radius, m."""
     gap = narrowest_gap(environment.free)
     vertices = vertex_count(environment)
     warnings = [many_vertices(vertices)] if vertices > MANY_VERTICES else []
@@ -310,10 +273,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
     warnings += _room_warnings(environment, radius)
     if gap is not None and gap.width < 2 * radius:
         (a, b), (c, d) = gap.between
-        warnings.append(
-            f"the gap between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}] is {gap.width:.3g} m wide: "
-            f"a robot of radius {radius:g} m does not pass"
-        )
+        found = f"the gap between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}] is {gap.width:.3g} m wide"
+        warnings.append(f"{found}: a robot of radius {radius:g} m does not pass")
     warnings += _start_warnings(environment, radius)
     density = environment.density
     return MapReport(
@@ -341,10 +302,8 @@ def many_vertices(count: int) -> str:
     """Return what it means that a map has more than `MANY_VERTICES`."""
     minutes = _COST_SECONDS * count * count / 60
     time = f"{60 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"
-    return (
-        f"{count} vertices are many: before a run the exact distances among them take about {time}, four "
-        "times as long for twice as many"
-    )
+    takes = f"before a run the exact distances among them take about {time}"
+    return f"{count} vertices are many: {takes}, four times as long for twice as many"
 
 
 def _rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
@@ -403,8 +362,8 @@ def _room_warnings(environment: Environment, radius: float) -> Iterator[str]:
         spot = part.representative_point()
         yield f"sealed room of {part.area:.3g} m² around [{spot.x:.4g}, {spot.y:.4g}]"
     if slivers:
-        plural = "s" if len(slivers) > 1 else ""
-        yield f"{len(slivers)} sealed pocket{plural} smaller than a robot, {sum(slivers):.2g} m² together"
+        pockets = counted(len(slivers), "sealed pocket")
+        yield f"{pockets} smaller than a robot, {sum(slivers):.2g} m² together"
 
 
 def _start_warnings(environment: Environment, radius: float) -> Iterator[str]:

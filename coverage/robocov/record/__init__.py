@@ -262,7 +262,7 @@ class Record(Drawable):
         environment = from_json(run.map, f"{path}: map")
         conditions = None
         try:
-            team = Team.from_dict(run.team.model_dump())
+            team = Team.from_dict(run.team)
             if run.conditions is not None:
                 conditions = Conditions.from_dict(run.conditions.model_dump())
                 conditions.check_team(len(team))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import Field, ValidationInfo, WrapValidator, create_model
-from pydantic_core import PydanticCustomError
+from pydantic import Field, create_model
 
-from robocov.conditions import LIMITS as CONDITION_LIMITS
+from robocov.conditions import LIMITS
 from robocov.files.documents import Document, read_document, wanted
-from robocov.robots import LIMITS, MOST_ROBOTS, json_key
+from robocov.robots import MOST_ROBOTS
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
@@ -18,36 +17,6 @@ Number: TypeAlias = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted("the numb
 Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
 Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
-
-
-def _number(low: float, high: float, *, null: bool) -> tuple[Any, str]:
-    """Return the type of a number, and what messages say was wanted."""
-    number: Any = Annotated[float, Field(ge=low, le=high)]
-    return number | None if null else number, f"a number from {low:g} to {high:g}{' or null' if null else ''}"
-
-
-def _for_each_robot(low: float, high: float, *, null: bool) -> Any:
-    """Return the type of a value that all robots share, or of a list with one for each."""
-    number, words = _number(low, high, null=null)
-
-    def checked(value: Any, handler: Any, info: ValidationInfo) -> Any:
-        robots = info.data.get("robots")
-        try:
-            if not isinstance(value, list) or robots in (None, len(value)):
-                return handler(value)
-        except ValueError:
-            pass
-        raise PydanticCustomError("wanted", f"{words}, or one for each of {robots} robots,")
-
-    either: Any = number | list[number]  # type: ignore[valid-type]
-    return Annotated[either, WrapValidator(checked)]
-
-
-_robots = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted(f"a whole number from 1 to {MOST_ROBOTS}")]
-_of_teams: dict[str, Any] = {
-    json_key(name): (_for_each_robot(low, high, null=null), ...) for name, (low, high, null) in LIMITS.items()
-}
-_Team: Any = create_model("_Team", __base__=Document, robots=(_robots, ...), **_of_teams)
 
 
 class _Failure(Document):
@@ -59,10 +28,15 @@ class _Join(_Failure):
     place_m: Point | None
 
 
+def _number(low: float, high: float, *, null: bool) -> Any:
+    """Return what a field of a model is for a number in a range, or null."""
+    words = wanted(f"a number from {low:g} to {high:g}{' or null' if null else ''}")
+    number: Any = Annotated[float, Field(ge=low, le=high)]
+    return Annotated[number | None if null else number, words], ...
+
+
 _of_conditions: dict[str, Any] = {
-    key: (Annotated[number, wanted(words)], ...)
-    for name, (low, high, _, key) in CONDITION_LIMITS.items()
-    for number, words in [_number(low, high, null=name == "message_rate")]
+    key: _number(low, high, null=name == "message_rate") for name, (low, high, _, key) in LIMITS.items()
 } | {"failures": (list[_Failure], ...), "joins": (list[_Join], ...), "seed": (Seed, ...)}
 _Conditions: Any = create_model("_Conditions", __base__=Document, **_of_conditions)
 
@@ -97,7 +71,7 @@ class RunDocument(Document):
 
     map: dict[str, Any]
     controller: _Controller
-    team: _Team
+    team: dict[str, Any]
     start: Annotated[str | None, wanted("the name of a start, or null,")]
     starts_m: list[Point] = Field([])
     seed: Annotated[Seed | None, wanted("a whole number from 0, or null,")]

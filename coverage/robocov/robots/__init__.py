@@ -31,6 +31,7 @@ from robocov.errors import (
     one_line,
     place,
     shown,
+    shown_json,
     unknown_name,
 )
 from robocov.files.strictjson import parse, read_bytes
@@ -48,6 +49,9 @@ LIMITS: dict[str, tuple[float, float, bool]] = {
     "sensing_range": (0.0, 1e5, True),
     "communication_range": (0.0, 1e5, True),
 }
+MOST_ROBOTS = 10_000
+NO_LIMIT = "null"
+"""Stands for a range without limit where there is no null."""
 UNITS = dict(zip(LIMITS, ("m", "kg", "m/s", "m/s²", "N s/m", "m", "m"), strict=True))
 _KEY_UNITS = {"m": "m", "kg": "kg", "m/s": "m_per_s", "m/s²": "m_per_s2", "N s/m": "n_s_per_m"}
 
@@ -156,23 +160,25 @@ class Team:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Team:
-        """Return the team that `to_dict` wrote; raise ParameterError when a value is missing or no number."""
-        try:
-            n = int(plain["robots"])
-            arrays = []
-            for field in fields(cls):
-                value = plain[json_key(field.name)]
-                column = value if isinstance(value, list) else [value] * n
-                arrays.append(np.array([np.inf if x is None else float(x) for x in column]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise ParameterError(f"team: cannot be read ({error!r})") from error
-        return cls(*arrays)
+        """Return the team that `to_dict` wrote; raise ParameterError, with the key, on anything else."""
+        n = plain.get("robots")
+        if not is_number(n, int) or not 1 <= n <= MOST_ROBOTS:
+            raise _unusable(plain, "robots", f"a whole number from 1 to {MOST_ROBOTS}")
+        columns = []
+        for name, (low, high, null) in LIMITS.items():
+            value = plain.get(json_key(name), "missing")
+            column = value if isinstance(value, list) else [value] * n
+            good = [(null and x is None) or (is_number(x) and low <= x <= high) for x in column]
+            if len(good) != n or not all(good):
+                wanted = f"a number from {low:g} to {high:g}{' or null' if null else ''}"
+                raise _unusable(plain, json_key(name), f"{wanted}, or one for each of {n} robots,")
+            columns.append(np.array([np.inf if x is None else x for x in column], dtype=float))
+        return cls(*columns)
 
 
-MOST_ROBOTS = 10_000
-
-NO_LIMIT = "null"
-"""Stands for a range without limit where there is no null."""
+def _unusable(plain: Mapping[str, Any], key: str, wanted: str) -> ParameterError:
+    found = shown_json(plain[key]) if key in plain else "missing"
+    return ParameterError(f"team.{key}: {found}, but {wanted} was wanted")
 
 
 def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = None) -> Team:
