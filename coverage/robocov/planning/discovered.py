@@ -2,7 +2,8 @@
 
 A cell is *unknown* until a ray has passed it (then it is *free*) or ended in it (then it is a *wall*). The
 ends of neighbouring rays that are closer together than `BRIDGE` belong to one surface: what lies between
-them is *presumed* to be wall, until a ray passes there. Unknown cells count as free wherever somebody plans.
+them is *presumed* to be wall, until a ray passes there. Ways may lead through unknown cells; how much these
+count is said by their `openness`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,18 @@ passages that a robot should find; a door seen from afar would be closed else.""
 _STRIDE = 0.7  # a ray is looked at after every so many cells
 _INTO = 0.25  # the obstacle is so many cells behind the end of a ray, which may be on the border of two cells
 _CORE = 0.3  # a ray that passes the middle of a presumed cell, to so much of its side, shows that it is free
+
+PRIOR = 0.8
+"""Openness of what is far from all that is known."""
+
+LONG = 30.0
+"""So many blocks away is far."""
+
+BLOCKS = 1000
+"""Blocks that a map is divided into, at most."""
+
+_OVER = 1.9  # relaxation factor; the best for walks that end after `LONG` blocks
+_SWEEPS, _EXACT = 1000, 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,19 +179,92 @@ def _enter_scan(
             state[r, c] = WALL
 
 
-@kernel
 def dilate(blocked: BoolArray, reach: float) -> BoolArray:
     """Return the cells whose middle is at most `reach` sides from that of a blocked, or outer, cell."""
-    rows, columns = blocked.shape
     margin = int(reach)
-    result = blocked.copy()
-    for r in range(-margin, rows + margin):
-        for c in range(-margin, columns + margin):
-            if 0 <= r < rows and 0 <= c < columns and not blocked[r, c]:
+    padded, result = np.pad(blocked, margin, constant_values=True), np.zeros_like(blocked)
+    row, column = np.mgrid[-margin : margin + 1, -margin : margin + 1]
+    for up, right in np.argwhere(row**2 + column**2 <= reach * reach).tolist():
+        result |= padded[up : up + len(blocked), right : right + blocked.shape[1]]
+    return result
+
+
+def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS) -> Array:
+    """Return how likely each unknown cell is free, from 0 to 1; 0 for all other cells, (rows, columns).
+
+    The openness u of an unknown cell is the chance that a random walk among unknown cells, which begins
+    there, comes to a free cell before it comes to a wall:
+
+        Laplace(u) = 0,   u = 1 at free cells,   u = 0 at walls,   no flow through the border of the region.
+
+    The inside of an obstacle has only walls around it; what lies in the shadow of one is open to where the
+    shadow begins; the rock around a cave, though it is one patch with all that is unknown, is closed a few
+    cells behind its walls. Where walks are very long they end by themselves, in `PRIOR`: of what is far from
+    all that is known, nothing is known but how much of a usual region is free.
+
+    It is solved on square blocks of cells, at most `blocks`: a block is one unknown, joined to its neighbours
+    by as many cells as meet. The state is that of a `DiscoveredMap`; cells `outside` of the region do not
+    count at all.
+
+    >>> state = np.array([[3, 3, 3, 3], [3, 0, 1, 1], [3, 3, 3, 3]], dtype=np.uint8)
+    >>> openness(state, np.zeros((3, 4), dtype=bool)).round(2)[1]
+    array([0.  , 0.25, 0.  , 0.  ])
+    """
+    rows, columns = state.shape
+    side = 1
+    while -(-rows // side) * -(-columns // side) > blocks:
+        side += 1
+    return _relaxed(np.where(outside, 255, state).astype(np.uint8), side)
+
+
+@kernel
+def _relaxed(state: NDArray[np.uint8], side: int) -> Array:
+    """Solve Laplace's equation on blocks by successive over-relaxation; 255 marks cells that do not count."""
+    rows, columns = state.shape
+    high, wide = -(-rows // side), -(-columns // side)
+    # of each block: unknown cells, those beside that are free, walls, or unknown in the next blocks
+    count, open_to, closed_to = np.zeros((high, wide)), np.zeros((high, wide)), np.zeros((high, wide))
+    above, right = np.zeros((high + 1, wide + 1)), np.zeros((high + 1, wide + 1))
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] != UNKNOWN:
                 continue
-            for up in range(-margin, margin + 1):
-                for right in range(-margin, margin + 1):
-                    inside = 0 <= r + up < rows and 0 <= c + right < columns
-                    if inside and up * up + right * right <= reach * reach:
-                        result[r + up, c + right] = True
+            i, j = r // side, c // side
+            count[i, j] += 1.0
+            for a, b in ((r + 1, c), (r, c + 1), (r - 1, c), (r, c - 1)):
+                if not (0 <= a < rows and 0 <= b < columns) or state[a, b] == 255:
+                    continue
+                if state[a, b] == FREE:
+                    open_to[i, j] += 1.0
+                elif state[a, b] != UNKNOWN:
+                    closed_to[i, j] += 1.0
+                elif a // side > i:
+                    above[i, j] += 1.0
+                elif b // side > j:
+                    right[i, j] += 1.0
+    u = np.full((high + 1, wide + 1), PRIOR)
+    for _ in range(_SWEEPS):
+        change = 0.0
+        for i in range(high):
+            for j in range(wide):
+                if count[i, j] == 0.0:
+                    continue
+                # the middles of two blocks are one side apart, a block's border is half a side from its own
+                lost = count[i, j] / (side * LONG**2)
+                flow = 2.0 * open_to[i, j] + lost * PRIOR
+                links = 2.0 * (open_to[i, j] + closed_to[i, j]) + lost
+                # row and column -1 are the spare ones, without links
+                flow += above[i, j] * u[i + 1, j] + above[i - 1, j] * u[i - 1, j]
+                flow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
+                links += above[i, j] + above[i - 1, j] + right[i, j] + right[i, j - 1]
+                step = _OVER * (flow / links - u[i, j])
+                u[i, j] += step
+                change = max(change, abs(step))
+        if change < _EXACT:
+            break
+    result = np.zeros((rows, columns))
+    for r in range(rows):
+        for c in range(columns):
+            if state[r, c] == UNKNOWN:
+                result[r, c] = min(max(u[r // side, c // side], 0.0), 1.0)
     return result

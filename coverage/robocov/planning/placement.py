@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,8 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import kernel
 from robocov.k_median import improved, moved
-from robocov.planning.discovered import FREE, UNKNOWN
-from robocov.planning.openness import BLOCKS, openness
+from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, openness
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,12 +46,9 @@ class CoverageDemand:
     density: Density | None = None
     sure: bool = False
 
-    def __deepcopy__(self, memo: object) -> CoverageDemand:
-        return self
-
     @cached_property
     def _state(self) -> NDArray[np.uint8]:
-        return np.ascontiguousarray(self.window.cut(self.known.state, np.uint8(UNKNOWN)))
+        return self.window.cut(self.known.state, np.uint8(UNKNOWN))
 
     @cached_property
     def _outside(self) -> BoolArray:
@@ -61,8 +56,7 @@ class CoverageDemand:
 
     @cached_property
     def _openness(self) -> Array:
-        blocks = min(BLOCKS, self.window.rows * self.window.columns)
-        return openness(self._state, self._outside, blocks)
+        return openness(self._state, self._outside, min(BLOCKS, self.window.rows * self.window.columns))
 
     @cached_property
     def weights(self) -> Array:
@@ -73,9 +67,7 @@ class CoverageDemand:
         blocks = worth.reshape(window.rows, window.stride, window.columns, window.stride)
         weights = blocks.sum(axis=(1, 3)).ravel()
         if self.density is not None and not self.density.uniform:
-            row, column = np.mgrid[: window.rows, : window.columns] * window.stride + window.stride // 2
-            places = self.known.raster.middles(row.ravel() + window.row, column.ravel() + window.column)
-            weights = weights * self.density.value(places)
+            weights = weights * self.density.value(window.nodes(self.known.raster))
         return np.asarray(weights)
 
     def viewpoint(
@@ -91,48 +83,28 @@ class CoverageDemand:
         of all nodes from where it is (`home`). It cannot be in `tight` cells, (h, w); from the `former`
         places it has looked already. None: no stake is above the `least`, in cells times metres.
         """
-        window, raster = self.window, self.known.raster
+        stride, columns, raster = self.window.stride, self.window.columns, self.known.raster
         patch, _ = ndimage.label((self._state == UNKNOWN) & ~self._outside)
         row, column = patch.nonzero()
-        node = row // window.stride * window.columns + column // window.stride
-        hoped = mine[node] * self._openness[row, column]
-        stake = np.asarray(np.bincount(patch[row, column], hoped, minlength=1), dtype=np.float64)
-        first = np.array(raster.origin) + (np.array([window.column, window.row]) + 0.5) * raster.cell
-        looked = (np.array(former).reshape(-1, 2) - first) / raster.cell
-        near = _SEEN_ENOUGH / raster.cell
-        at, along = _best_view(self._state, tight, patch, stake, home, window.stride, least, looked, near)
-        return None if at < 0 else first + np.array([along, at]) * raster.cell
-
-
-@kernel
-def _best_view(
-    state: NDArray[np.uint8],
-    tight: BoolArray,
-    patch: NDArray[Any],
-    stake: Array,
-    home: Array,
-    stride: int,
-    least: float,
-    looked: Array,
-    near: float,
-) -> tuple[int, int]:
-    """Return the free cell beside a patch with the highest stake by the way; -1 for none."""
-    rows, columns = state.shape
-    best, row, column = 0.0, -1, -1
-    for r in range(rows):
-        for c in range(columns):
-            if patch[r, c] == 0 or stake[patch[r, c]] <= least:
-                continue
-            for a, b in ((r, c + 1), (r + 1, c), (r, c - 1), (r - 1, c)):
-                if not (0 <= a < rows and 0 <= b < columns) or state[a, b] != FREE or tight[a, b]:
-                    continue
-                worth = stake[patch[r, c]] / (1.0 + home[a // stride * (columns // stride) + b // stride])
-                for x, y in looked:
-                    if (x - b) ** 2 + (y - a) ** 2 < near * near:
-                        worth = 0.0
-                if worth > best:
-                    best, row, column = worth, a, b
-    return row, column
+        hoped = mine[row // stride * columns + column // stride] * self._openness[row, column]
+        stake = np.bincount(patch[row, column], hoped, minlength=1)[patch]
+        usable = np.pad((self._state == FREE) & ~tight, 1)
+        row, column = np.nonzero(ndimage.binary_dilation(usable)[1:-1, 1:-1] & (stake > least))
+        if not len(row):
+            return None
+        # the cells right of, above, left of and below those of the patch
+        a, b = row[:, None] + [0, 1, 0, -1], column[:, None] + [1, 0, -1, 0]
+        node = np.clip(a // stride * columns + b // stride, 0, len(home) - 1)
+        worth = usable[a + 1, b + 1] * stake[row, column][:, None] / (1.0 + home[node])
+        first = (
+            np.array(raster.origin) + (np.array([self.window.column, self.window.row]) + 0.5) * raster.cell
+        )
+        for x, y in (np.array(former).reshape(-1, 2) - first) / raster.cell:
+            worth[(x - b) ** 2 + (y - a) ** 2 < (_SEEN_ENOUGH / raster.cell) ** 2] = 0.0
+        best = worth.argmax()
+        return (
+            first + np.array([b.flat[best], a.flat[best]]) * raster.cell if worth.flat[best] > 0.0 else None
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +114,6 @@ class Table:
     ways: GridPlanner
     sources: IntArray  # (c,)
     distance: Array  # (c, m) m
-
-    def __deepcopy__(self, memo: object) -> Table:
-        return self
 
     @classmethod
     def of(cls, ways: GridPlanner) -> Table:
@@ -168,21 +137,12 @@ def team_places(
 ) -> Array:
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
-    From `begin` on, Lloyd's iteration in turn with interchange (`k_median.improved`); where all others are
-    fixed, who plans then goes to the best place of its own cell. Who goes to which of the places is such that
-    the sum of the squared ways is least: then the choice stays the same while the robots are on their way,
-    and their ways do not cross.
-
-    Parameters
-    ----------
-    table : Table
-    weights : (m,)
-    now, begin : (k, 2) m
-        Where the robots are, and where the plan begins: the former one. The first robot plans.
-    fixed : (k,)
-        Who stays where `begin` says; never the first.
-    threshold, nearby : float
-        Parts of the cost that a relocation must save, and one in the own cell.
+    From `begin` (k, 2) m on, the former plan, Lloyd's iteration in turn with interchange
+    (`k_median.improved`). The robots are at `now`; the first one plans. Those that are `fixed`, (k,), never
+    the first, stay where `begin` says; where all others are, who plans then goes to the best place of its own
+    cell. What a relocation must save is the part `threshold` of the cost, one in the own cell the part
+    `nearby`. Who goes to which of the places is such that the sum of the squared ways is least: then the
+    choice stays the same while the robots are on their way, and their ways do not cross.
     """
     ways = table.ways
     home = ways.standing(now[0])

@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.discovered import dilate
 
 if TYPE_CHECKING:
@@ -30,32 +30,18 @@ Cell = TypeVar("Cell", bound=np.generic)
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half the directions; the others are their opposites."""
 
-_NEAREST = 12
-"""So many nodes are tried for the first, and the last, of a route."""
-
-_FINE = 0.5
-"""A straight line is looked at after every so many cells."""
+_NEAREST = 12  # so many nodes are tried for the first, and the last, of a route
+_FINE = 0.5  # a straight line is looked at after every so many cells
 
 
-@dataclass(frozen=True)
-class Window:
-    """The part of a raster that carries nodes, one for each block of cells.
+class Window(NamedTuple):
+    """The part of a raster that carries nodes, one for each square block of cells."""
 
-    Attributes
-    ----------
-    row, column : int
-        The first of its cells.
-    rows, columns : int
-        Of nodes.
-    stride : int
-        Cells along the side of a block.
-    """
-
-    row: int
+    row: int  # the first of its cells
     column: int
-    rows: int
+    rows: int  # of nodes
     columns: int
-    stride: int
+    stride: int  # cells along the side of a block
 
     @classmethod
     def around(cls, raster: Raster, middle: Array, reach: float, most: int) -> Window:
@@ -84,6 +70,11 @@ class Window:
             return part
         return np.pad(part, ((0, missing[0]), (0, missing[1])), constant_values=fill)
 
+    def nodes(self, raster: Raster) -> Array:
+        """Return the places of the nodes, (m, 2) m, row by row."""
+        row, column = np.mgrid[: self.rows, : self.columns].reshape(2, -1) * self.stride + self.stride // 2
+        return raster.middles(row + self.row, column + self.column)
+
 
 def _stepped(middle: int, half: int, most: int) -> tuple[int, int]:
     step = max(1, half // 4)
@@ -94,26 +85,13 @@ def _stepped(middle: int, half: int, most: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class GridPlanner:
-    """Distances and routes among the blocked cells of a window.
-
-    Attributes
-    ----------
-    raster : Raster
-    window : Window
-    blocked : (h, w)
-        The window's cells that are walls.
-    clearance : float, m
-        How far ways keep from walls, but for the last step to a node.
-    """
+    """Distances and routes among the blocked cells of a window."""
 
     raster: Raster
     window: Window
-    blocked: BoolArray
-    clearance: float
+    blocked: BoolArray  # (h, w), the window's cells that are walls
+    clearance: float  # how far ways keep from walls, but for the last step to a node, m
     _known: dict[int, Array] = field(default_factory=dict)
-
-    def __deepcopy__(self, memo: object) -> GridPlanner:
-        return self
 
     @property
     def spacing(self) -> float:
@@ -123,28 +101,51 @@ class GridPlanner:
     @cached_property
     def nodes(self) -> Array:
         """Places of the nodes, (m, 2) m, row by row."""
-        window, half = self.window, self.window.stride // 2
-        row = window.row + half + window.stride * np.arange(window.rows)
-        column = window.column + half + window.stride * np.arange(window.columns)
-        return self.raster.middles(*(part.ravel() for part in np.meshgrid(row, column, indexing="ij")))
+        return self.window.nodes(self.raster)
 
     @cached_property
     def tight(self) -> BoolArray:
         """The cells that are too close to walls, (h, w)."""
-        return dilate(np.ascontiguousarray(self.blocked), self.clearance / self.raster.cell)
+        return dilate(self.blocked, self.clearance / self.raster.cell)
 
     @cached_property
     def roomy(self) -> BoolArray:
         """The nodes that keep the clearance, (m,)."""
-        return self._at_nodes(~self.tight)
-
-    def _at_nodes(self, cells: BoolArray) -> BoolArray:
         half, stride = self.window.stride // 2, self.window.stride
-        return np.asarray(cells[half::stride, half::stride].ravel())
+        return np.asarray(~self.tight[half::stride, half::stride].ravel())
 
     @cached_property
     def _graph(self) -> csr_array:
-        return _joined(self.window, self.blocked, self.tight, self.spacing)
+        """The graph of the nodes, its edges as long as they are.
+
+        Nodes in tight cells are the ends of ways and nothing more: no way leads on from there, be it through
+        a hole in a wall that has not been seen as a whole.
+        """
+        _, _, rows, columns, stride = self.window
+        number = np.arange(rows * columns).reshape(rows, columns)
+        cells = self.tight + np.uint8(2) * self.blocked
+        begins, ends, lengths = [], [], []
+        for down, right in _MOVES:
+            # nodes from which the move stays in the window, and all cells that it crosses
+            high, wide, low = max(0, rows - down), max(0, columns - abs(right)), max(0, -right)
+            met = np.zeros((high, wide), dtype=np.uint8)
+            for row, column in _crossed(down, right, stride):
+                top, left = stride // 2 + row, stride // 2 + low * stride + column
+                met |= cells[top : top + high * stride : stride, left : left + wide * stride : stride]
+            end = number[:high, low : low + wide].ravel()
+            other = end + down * columns + right
+            way = (met & 1 == 0).ravel()
+            last = (met & 2 == 0).ravel() & ~way
+            onto, back = (
+                last & self.roomy[end] & ~self.roomy[other],
+                last & self.roomy[other] & ~self.roomy[end],
+            )
+            begins += [end[way | onto], other[way | back]]
+            ends += [other[way | onto], end[way | back]]
+            joined = np.count_nonzero(way | onto) + np.count_nonzero(way | back)
+            lengths.append(np.full(joined, math.hypot(down, right) * self.spacing))
+        edges = np.concatenate(begins), np.concatenate(ends)
+        return csr_array((np.concatenate(lengths), edges), shape=(number.size, number.size))
 
     def cells(self, points: Array) -> tuple[IntArray, IntArray]:
         """Return row and column, in the window, of the cells of (..., 2) points, the nearest for others."""
@@ -164,13 +165,12 @@ class GridPlanner:
         asked = [node for node in nodes if node not in self._known]
         found = dict(self._known)
         if asked:
-            tables = dijkstra(self._graph, directed=True, indices=np.array(asked), limit=limit)
-            found.update(zip(asked, tables, strict=True))
+            found.update(zip(asked, dijkstra(self._graph, indices=asked, limit=limit), strict=True))
         return [found[node] for node in nodes]
 
     def table(self, nodes: IntArray) -> Array:
         """Return the distances from some nodes to all, (k, m) m."""
-        return np.asarray(dijkstra(self._graph, directed=True, indices=nodes))
+        return np.asarray(dijkstra(self._graph, indices=nodes))
 
     def from_places(self, places: Array) -> Array:
         """Return the distances of all nodes from the nearest of (k, 2) places, (m,) m; without any, infinite.
@@ -195,7 +195,7 @@ class GridPlanner:
         parts = np.concatenate(lengths), np.concatenate(ends), begins
         joined = csr_array(parts, shape=(size + len(counts),) * 2)
         new = np.arange(size, size + len(counts))
-        return np.asarray(dijkstra(joined, directed=True, indices=new, min_only=True))[:size]
+        return np.asarray(dijkstra(joined, indices=new, min_only=True))[:size]
 
     def nearest(self, place: Array) -> int:
         """Return the roomy node nearest to a place; -1 for none."""
@@ -214,8 +214,7 @@ class GridPlanner:
         away = ((self.nodes - place) ** 2).sum(axis=1)
         away[~among] = np.inf
         few = min(_NEAREST, len(away) - 1)
-        near = np.argpartition(away, few)[: few + 1]
-        near = np.sort(near)
+        near = np.sort(np.argpartition(away, few)[: few + 1])
         near = near[np.argsort(away[near], kind="stable")]
         return np.asarray(near[np.isfinite(away[near])][:_NEAREST])
 
@@ -228,7 +227,7 @@ class GridPlanner:
         along = ends - place
         length = np.sqrt((along**2).sum(axis=1))
         steps = math.ceil(float(length.max(initial=0.0)) / (_FINE * self.raster.cell)) + 1
-        part = _parts(steps)
+        part = np.linspace(0.0, 1.0, steps + 1)
         met = cells[self.cells(place + along[:, None, :] * part[:, None])]
         if skip > 0.0:
             met &= length[:, None] * part > skip
@@ -245,12 +244,8 @@ class GridPlanner:
         begin = self._entrance(place)
         if begin < 0:
             return np.array(place[None])
-        distance, before = (
-            part[0]
-            for part in dijkstra(
-                self._graph, directed=True, indices=np.array([begin]), return_predecessors=True
-            )
-        )
+        tables = dijkstra(self._graph, indices=[begin], return_predecessors=True)
+        distance, before = tables[0][0], tables[1][0]
         near = self._closest(goal, np.isfinite(distance) & self.roomy)
         if not len(near):
             return np.array(place[None])
@@ -283,66 +278,9 @@ class GridPlanner:
         return np.array(kept)
 
 
-@lru_cache(maxsize=1024)
-def _parts(steps: int) -> Array:
-    return frozen(np.linspace(0.0, 1.0, steps + 1))
-
-
-@lru_cache(maxsize=256)
-def _edges(rows: int, columns: int) -> tuple[IntArray, IntArray, Array, IntArray]:
-    """Return the ends, lengths in strides and moves of all edges of an empty lattice."""
-    number = np.arange(rows * columns).reshape(rows, columns)
-    ends, others = [], []
-    for down, right in _MOVES:
-        ends.append(number[: max(0, rows - down), max(0, -right) : max(0, columns - max(0, right))].ravel())
-        others.append(number[down:, max(0, right) : max(0, columns + min(0, right))].ravel())
-    counts = [len(each) for each in ends]
-    length = np.repeat([math.hypot(*move) for move in _MOVES], counts)
-    move = np.repeat(np.arange(len(_MOVES)), counts)
-    return np.concatenate(ends), np.concatenate(others), length, move
-
-
-@lru_cache(maxsize=64)
-def _crossed(stride: int) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Return the cells, from that of a node, that the line to its neighbour crosses, for each move."""
-    lines = []
-    for down, right in _MOVES:
-        part = np.linspace(0.0, 1.0, 2 * max(abs(down), abs(right)) * stride + 1)
-        row, column = np.rint(part * down * stride).astype(int), np.rint(part * right * stride).astype(int)
-        lines.append(tuple(dict.fromkeys(zip(row.tolist(), column.tolist(), strict=True))))
-    return tuple(lines)
-
-
-def _joined(window: Window, blocked: BoolArray, tight: BoolArray, spacing: float) -> csr_array:
-    """Return the graph of the nodes, its edges as long as they are.
-
-    Those in tight cells are the ends of ways and nothing more: no way leads on from there, be it through a
-    hole in a wall that has not been seen as a whole.
-    """
-    end, other, length, move = _edges(window.rows, window.columns)
-    half, stride = window.stride // 2, window.stride
-    roomy = ~tight[half::stride, half::stride].ravel()
-    both = tight.astype(np.uint8) | np.where(blocked, np.uint8(2), np.uint8(0))
-    met = _met(window, both)[move, end]
-    way = met & 1 == 0
-    last = (met & 2 == 0) & ~way
-    onto, back = last & roomy[end] & ~roomy[other], last & roomy[other] & ~roomy[end]
-    begins = np.concatenate([end[way], other[way], end[onto], other[back]])
-    ends = np.concatenate([other[way], end[way], other[onto], end[back]])
-    lengths = np.concatenate([length[way], length[way], length[onto], length[back]]) * spacing
-    size = window.rows * window.columns
-    return csr_array((lengths, (begins, ends)), shape=(size, size))
-
-
-def _met(window: Window, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return for each move from each node what it meets, (moves, m): the bits of all cells on its line."""
-    stride, half = window.stride, window.stride // 2
-    margin = 2 * stride
-    padded = np.pad(cells, margin, constant_values=255)
-    high, wide = window.rows * stride, window.columns * stride
-    met = np.zeros((len(_MOVES), window.rows, window.columns), dtype=np.uint8)
-    for k, line in enumerate(_crossed(stride)):
-        for down, right in line:
-            row, column = margin + half + down, margin + half + right
-            met[k] |= padded[row : row + high - half : stride, column : column + wide - half : stride]
-    return met.reshape(len(_MOVES), -1)
+@lru_cache(maxsize=512)
+def _crossed(down: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
+    """Return the cells, from that of a node, that the line to its neighbour crosses."""
+    part = np.linspace(0.0, 1.0, 2 * max(down, abs(right)) * stride + 1)
+    row, column = np.rint(part * down * stride).astype(int), np.rint(part * right * stride).astype(int)
+    return tuple(dict.fromkeys(zip(row.tolist(), column.tolist(), strict=True)))

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.planning.discovered import FREE, UNKNOWN, WALL
-from robocov.planning.openness import LONG, PRIOR, openness
+from robocov.planning.discovered import FREE, LONG, PRIOR, UNKNOWN, WALL, openness
 
 
 def inside(state: np.ndarray) -> np.ndarray:
