@@ -60,7 +60,7 @@ def test_teams_have_robots_and_one_value_for_each() -> None:
     ones = np.ones(2)
     with pytest.raises(ParameterError, match=r"team.mass: \(3,\) values"):
         Team(ones, np.ones(3), ones, ones, ones, ones, ones)
-    with pytest.raises(ParameterError, match="team.radius_m: missing, but a number"):
+    with pytest.raises(ParameterError, match=r"team.radius_m: missing, but a number"):
         Team.from_dict({"robots": 2})
 
 
