@@ -58,10 +58,13 @@ VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3), AfterValida
 Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LONGEST_LABEL, pattern=_NAME)]
 Entry: TypeAlias = Annotated[float, _between(0.0, HEAVIEST)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
-Points: TypeAlias = Annotated[list[Vertex], Field(min_length=2)]
-Variances: TypeAlias = Annotated[
-    list[Annotated[float, _between(-1e8, 1e8)]], Field(min_length=2, max_length=2)
-]
+Line: TypeAlias = Annotated[list[Vertex], Field(min_length=2)]
+Places: TypeAlias = Annotated[list[Vertex], Field(min_length=1)]
+Row: TypeAlias = Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]
+Extent: TypeAlias = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
+Variance: TypeAlias = Annotated[float, _between(-1e8, 1e8)]
+Variances: TypeAlias = Annotated[list[Variance], Field(min_length=2, max_length=2)]
+Matrix: TypeAlias = Annotated[list[Variances], Field(min_length=2, max_length=2)]
 
 
 class Model(BaseModel):
@@ -88,14 +91,21 @@ def _field(description: str, example: Any, default: Any = ..., **limits: Any) ->
     return Field(default, description=description, examples=[example], **limits)
 
 
-_POINT = "a point [x, y] in metres"
-_COORDINATE = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)"
-_RING = "a list of at least 3 points [x, y]"
 _LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
 _WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
 _SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
+_SPEED = f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)"
+_REPEAT = '"loop" or "back-and-forth"'
+# and what is wanted in it, in that, ...
+_POINT = ("a point [x, y] in metres", f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m)")
+_RING = ("a list of at least 3 points [x, y]", *_POINT)
+_LINE = ("a list of at least 2 points [x, y]", *_POINT)
+_PLACES = ("a list of at least 1 point [x, y]", *_POINT)
+_MATRIX = ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)")
 
 _CORNERS = [[1, 1], [2, 1], [2, 3]]
+_YARDS = [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]
+_PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
 _HOT_SPOT = {"center": [7.5, 3], "sigma": 1.5, "weight": 4}
 
 
@@ -110,47 +120,19 @@ class _Key(NamedTuple):
 
 _KEYS = {
     "name": _Key(Label, "What it is, for people", "desk", (_LABEL,)),
-    "center": _Key(Vertex, "The centre [x, y] in metres", [7.5, 3], (_POINT, _COORDINATE)),
+    "center": _Key(Vertex, "The centre [x, y] in metres", [7.5, 3], _POINT),
     "radius": _Key(Size, "The radius in metres", 0.5, (_SIZE,)),
     "sigma": _Key(Size, "The standard deviation in metres, where it is round", 1.5, (_SIZE,)),
-    "covariance": _Key(
-        Annotated[list[Variances], Field(min_length=2, max_length=2)],
-        "The covariance in square metres where it is not: symmetric, positive definite",
-        [[2, 0.5], [0.5, 1]],
-        ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)"),
-    ),
-    "vertices": _Key(
-        VertexRing,
-        "Corners in order, either way round, the first not repeated",
-        _CORNERS,
-        (_RING, _POINT, _COORDINATE),
-    ),
+    "covariance": _Key(Matrix, "The covariance in m², where it is not", [[2, 0.5], [0.5, 1]], _MATRIX),
+    "vertices": _Key(VertexRing, "Corners in order, either way, the first not repeated", _CORNERS, _RING),
     "holes": _Key(
-        list[VertexRing],
-        "Rings inside that are not part of it, such as courtyards",
-        [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]],
-        ("a list of rings", _RING, _POINT, _COORDINATE),
+        list[VertexRing], "Rings inside that are not part of it", _YARDS, ("a list of rings", *_RING)
     ),
-    "points": _Key(
-        Points,
-        "The line, from end to end; what moves along it is drawn at the first point, at time zero",
-        [[2, 1], [8, 1]],
-        ("a list of at least 2 points [x, y]", _POINT, _COORDINATE),
-    ),
+    "points": _Key(Line, "The line, from end to end; a path's begins where the obstacle is", _CORNERS, _LINE),
     "width": _Key(Size, "The width in metres", 0.1, (_SIZE,)),
-    "speed": _Key(Speed, "Metres a second", 0.5, (f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)",)),
-    "repeat": _Key(
-        Repeat,
-        "From the last point straight to the first, or back the way it came",
-        "back-and-forth",
-        ('"loop" or "back-and-forth"',),
-    ),
-    "positions": _Key(
-        Annotated[list[Vertex], Field(min_length=1)],
-        "One [x, y] a robot, in metres",
-        [[1, 1], [1.5, 1]],
-        ("a list of at least 1 point [x, y]", _POINT, _COORDINATE),
-    ),
+    "speed": _Key(Speed, "Metres a second", 0.5, (_SPEED,)),
+    "repeat": _Key(Repeat, "From the end straight to the first point, or back", "loop", (_REPEAT,)),
+    "positions": _Key(Places, "One [x, y] a robot, in metres", [[1, 1], [1.5, 1]], _PLACES),
     "weight": _Key(Weight, "How much a place counts; of a peak, what it adds at its centre", 4, (_WEIGHT,)),
     "floor": _Key(Weight, "What every place counts without the peaks", 0.2, (_WEIGHT,)),
     "background": _Key(Weight, "What a place outside all areas counts", 1, (_WEIGHT,)),
@@ -190,10 +172,7 @@ def _list_of(name: str, description: str, example: object) -> _Key:
 
 _KEYS |= {
     "path": _Key(
-        _PARTS["path"],
-        "How it moves; without it, it stands",
-        {"points": [[2, 1], [8, 1]], "speed": 0.5},
-        ("an object with points and speed",),
+        _PARTS["path"], "How it moves; without, it stands", _PATH, ("an object with points and speed",)
     ),
     "peaks": _list_of("peaks", "The hot spots, which add up", _HOT_SPOT),
     "areas": _list_of("areas", "The polygons, the later ones on top", {"vertices": _CORNERS, "weight": 5}),
@@ -204,16 +183,16 @@ class RasterModel(Model, title="raster density"):
     """A picture of the density, in rows of numbers or in a file."""
 
     kind: Literal["raster"] = _field("Which kind it is; the other keys follow from it", "raster")
-    extent: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = _field(
-        "What it covers, [x_min, y_min, x_max, y_max] in metres; the boundary's box by default",
+    extent: Extent | None = _field(
+        "What it covers, [x_min, y_min, x_max, y_max] in m; the boundary's box by default",
         [0, 0, 10, 6],
         None,
     )
     interpolation: Interpolation = _field(
         "bilinear between the cells' middles, or constant in each of the cells", "bilinear", "bilinear"
     )
-    rows: list[Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]] | None = _field(
-        "Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None, min_length=1, max_length=FINEST
+    rows: Annotated[list[Row], Field(min_length=1, max_length=FINEST)] | None = _field(
+        "Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None
     )
     picture: Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_PATH)] | None = _field(
         "In place of rows, a grey PNG or PGM, relative to the map and in its folder", "density.png", None
@@ -333,13 +312,13 @@ def validate(document: object, where: str) -> MapModel:
 
 # what is wanted at some keys, in their items, in their items, ...
 _WANTED = {name: key.wanted for name, key in _KEYS.items()} | {
-    "boundary": (_RING, _POINT, _COORDINATE),
+    "boundary": _RING,
     "description": ("a text of at most 10000 characters",),
     "extra": ("an object",),
     "$schema": ("a text",),
     "obstacles": ("a list of obstacles",),
     "starts": ("an object of named starts",),
-    "extent": ("[x_min, y_min, x_max, y_max] in metres", _COORDINATE),
+    "extent": ("[x_min, y_min, x_max, y_max] in metres", _POINT[1]),
     "interpolation": ("bilinear or cells",),
     "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
     "picture": ("the name of a file",),
