@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from robocov.arrays.grouping import ranges
+from robocov.arrays import ranges
 from robocov.errors import ParameterError, counted
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.importers.limits import MAX_CELLS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.arrays.grouping import ranges
+from robocov.arrays import ranges
 from robocov.environment import SAGITTA
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov.arrays.grouping import beginnings, ranges, sizes
+from robocov.arrays import beginnings, ranges
 from robocov_app.importers.tracing import NECK
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Outline:
     @property
     def size(self) -> IntArray:
         """Vertices of each ring, (r,)."""
-        return sizes(self.begin, len(self.points))
+        return np.diff(self.begin, append=len(self.points))
 
     @property
     def ring(self) -> IntArray:
@@ -187,7 +187,7 @@ def _kept(path: _Path, most: Array) -> tuple[IntArray, IntArray]:
     stays |= changes
     stays[after[changes]] = True
     # each ring from its first vertex that stays, round to that one again
-    count = sizes(begin, len(allowed))
+    count = np.diff(begin, append=len(allowed))
     first = np.minimum.reduceat(np.where(stays, index, len(index)), begin)
     ring = np.arange(len(begin)).repeat(count + 1)
     step = ranges(np.zeros_like(count), count + 1)
@@ -248,7 +248,7 @@ def _fitted(path: _Path, kept: IntArray, drawing: Drawing) -> Drawing:
 
 def _stairs(path: _Path, kept: IntArray, drawing: Drawing) -> tuple[BoolArray, Array, Array]:
     """Return which sides stand for stairs, and the lines of these: a point and a direction, (m, 2) each."""
-    count = sizes(path.begin, len(path.points))
+    count = np.diff(path.begin, append=len(path.points))
     ring = np.searchsorted(drawing.begin, np.arange(len(kept)), side="right") - 1
     # what lies between each vertex that stays and the next one, round the ring
     length = (kept[neighbours(drawing.begin, len(kept))[0]] - kept) % count[ring] - 1
@@ -329,7 +329,7 @@ def balanced(outline: Outline, drawing: Drawing, tolerance: Array) -> Drawing:
     normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
     distance = np.where(some, (was - now) / np.maximum(np.add.reduceat(length, begin), 1e-300), 0.0)
     allowed = tolerance[drawing.source.astype(np.intp)] / 2
-    ring = np.arange(len(begin)).repeat(sizes(begin, len(points)))
+    ring = np.arange(len(begin)).repeat(np.diff(begin, append=len(points)))
     distance = np.clip(distance[ring], -allowed, allowed)
     both = normal + normal[before]
     # a corner moves further than its sides, a sharp one up to twice as far
@@ -341,7 +341,7 @@ def ring_areas(points: Array, begin: IntArray) -> Array:
     """Return the signed area of each ring, (r,) m²: positive counter-clockwise."""
     if not len(points):
         return np.zeros(len(begin))
-    size = sizes(begin, len(points))
+    size = np.diff(begin, append=len(points))
     local = points - points[np.minimum(begin, len(points) - 1)].repeat(size, axis=0)
     ahead = local[neighbours(begin, len(points))[0]]
     double = np.append(np.cumsum(local[:, 0] * ahead[:, 1] - local[:, 1] * ahead[:, 0]), 0.0)
@@ -356,7 +356,7 @@ def neighbours(begin: IntArray, total: int) -> tuple[IntArray, IntArray]:
     (array([1, 2, 0, 4, 3]), array([2, 0, 1, 4, 3]))
     """
     after = np.arange(1, total + 1)
-    after[begin + sizes(begin, total) - 1] = begin
+    after[begin + np.diff(begin, append=total) - 1] = begin
     before = np.empty_like(after)
     before[after] = np.arange(total)
     return after, before
@@ -386,7 +386,7 @@ def _without_stairs(outline: Outline, tolerance: Array, fixed: BoolArray) -> _Pa
 
 def _extremes(points: Array, begin: IntArray) -> BoolArray:
     """Return which vertices stay whatever the tolerance: in each ring two that are far from each other."""
-    size = sizes(begin, len(points))
+    size = np.diff(begin, append=len(points))
     ring = np.arange(len(begin)).repeat(size)
     middle = np.add.reduceat(points, begin, axis=0) / size[:, None]
     stays = np.zeros(len(points), dtype=bool)

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays.grouping import ranges
+from robocov.arrays import ranges
 
 if TYPE_CHECKING:
     from shapely import Polygon

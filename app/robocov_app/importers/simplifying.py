@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays.grouping import beginnings
+from robocov.arrays import beginnings
 from robocov.errors import counted
 from robocov_app.importers.outline import (
     Drawing,

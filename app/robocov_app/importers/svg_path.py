@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.arrays.grouping import ranges
+from robocov.arrays import ranges
 from robocov_app.importers.curves import arcs, beziers
 from robocov_app.importers.svg_numbers import NUMBER, number
 

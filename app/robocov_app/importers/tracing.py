@@ -14,7 +14,7 @@ import shapely
 from scipy import ndimage
 from shapely import MultiPolygon
 
-from robocov.arrays.grouping import ranges, sizes
+from robocov.arrays import ranges
 from robocov_app.importers.limits import require_vertices
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
     # the rings of a part come together; the first of them has its lowest corner: it is the outer one
     ring_part = part[order[begin]]
     rank = np.argsort(ring_part, kind="stable")
-    length = sizes(begin, len(order))[rank]
+    length = np.diff(begin, append=len(order))[rank]
     vertex = order[ranges(begin[rank], length)]
     ring = np.arange(len(rank)).repeat(length)
     points, ring = points[vertex].reshape(-1, 2), ring.repeat(2)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.arrays.grouping import weighted_mean
+from robocov.arrays import Array, BoolArray, IntArray, frozen, weighted_mean
 from robocov.cost.lattice import Number, Sites, lattice_of
 from robocov.cost.site_paths import CornerViews, Paths, TilePaths, corner_views, site_paths
 from robocov.density.base import means_over_squares

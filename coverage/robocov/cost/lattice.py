@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray, frozen
-from robocov.arrays.grouping import beginnings
+from robocov.arrays import Array, IntArray, beginnings, frozen
 from robocov.cost.site_paths import GROUP, SLOTS, TILE, Tiles
 from robocov.errors import ParameterError
 from robocov.geodesic.walls import along_z_curve, box_tree

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.arrays.grouping import beginnings, ranges, sizes
+from robocov.arrays import beginnings, ranges
 
 numbers = st.lists(st.integers(0, 4), min_size=1, max_size=30)
 
@@ -13,7 +13,7 @@ numbers = st.lists(st.integers(0, 4), min_size=1, max_size=30)
 def test_groups_of_equal_values(values):
     values = np.array(values)
     begin = beginnings(values)
-    np.testing.assert_array_equal(values[begin].repeat(sizes(begin, len(values))), values)
+    np.testing.assert_array_equal(values[begin].repeat(np.diff(begin, append=len(values))), values)
     assert (np.diff(values[begin]) != 0).all()
 
 
