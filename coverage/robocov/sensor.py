@@ -22,9 +22,7 @@ from robocov.world.solid import Mover
 
 _FARTHEST = 1e6
 """An unlimited range, in metres, as the engine's bounding boxes can hold it."""
-
 _ALL = pymunk.ShapeFilter()
-
 _IN_REGISTERS = sys.platform != "win32" and platform.machine() in ("x86_64", "aarch64", "arm64")
 """Whether C takes a vector as two floats and a filter as two words, as kernels call it."""
 

@@ -31,10 +31,8 @@ from robocov.world.solid import movers, solid_pieces
 
 DEFAULT_DT = 1 / 60
 """Control period in seconds where nothing else is said."""
-
 _LARGEST_TEAM = 15
 """From 16 robots on cells come off a triangulation, and a step of one team alone is as quick."""
-
 _AT_ONCE = 64
 """Runs that are moved on together."""
 
@@ -44,15 +42,12 @@ class Simulation:
 
     Parameters
     ----------
-    environment : Environment
-    controller : Controller
-    starts : (n, 2) m
-        Centres of the robots at the beginning.
+    starts, velocities : (n, 2) m, (n, 2) m/s
+        Centres of the robots at the beginning, and how they move; by default they are at rest.
     team : Team
         By default `Team.homogeneous(n)`.
     dt : float, s
         Control period. The physics takes substeps where it needs them.
-    velocities : (n, 2) m/s, at rest by default
     time : float, s
         At the beginning.
     conditions : Conditions or None
@@ -61,14 +56,8 @@ class Simulation:
         So many runs at once, of equal teams, with one row for each robot of the first, of the second, and so
         on. Robots of different runs know nothing of each other. See `simulate_many`.
 
-    Attributes
-    ----------
-    sensor : RangeSensor
-        For ray scans of the present.
-    memory : object
-        What the controller remembers.
-    inbox : Inbox or None
-        The messages that the robots have; None where they know the others as they are.
+    `memory` is what the controller remembers, `inbox` the messages that the robots have, None where they know
+    the others as they are.
 
     Raises StartError when a robot would start in a wall or in another robot, ParameterError when dt is out of
     range, or team and starts differ in size.
@@ -355,8 +344,7 @@ class Simulation:
         What the controller remembers is kept as long as neither it nor the number of robots changes; the
         messages that robots have, as long as neither that number nor the conditions do.
 
-        Raises StartError when a robot is in a wall or in another robot by more than what touching robots sink
-        in, ParameterError when sizes differ.
+        Raises StartError and ParameterError as `Simulation`; robots may touch.
         """
         twin = Simulation(
             self.environment if environment is None else environment,
@@ -396,11 +384,9 @@ def simulate_many(
     ----------
     environment, controller, team, dt
         As `Simulation` takes them, the same for all.
-    starts : sequence of (n, 2) m
-        Centres of the robots at the beginning of each run; teams may differ in size without `team`.
+    starts, conditions : sequences of (n, 2) m, and of Conditions or None
+        Of each run; teams may differ in size without `team`.
     duration : float, s
-    conditions : sequence of Conditions or None
-        Of each run; None: ideal ones.
     start : str, seeds : sequence of int
         Where the starts came from, kept in the records.
 

@@ -21,10 +21,8 @@ from robocov.errors import ParameterError, checked, is_number, shown
 
 LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
 """The independent streams of random numbers of a run."""
-
 SOON = 1e-9
 """Seconds by which two moments may differ and still be one: what sums of steps miss."""
-
 _LONGEST = 1e6
 
 LIMITS: dict[str, tuple[float, float, str, str]] = {
@@ -73,44 +71,29 @@ class Conditions:
     Communication is ideal, as without conditions, unless there is loss, delay, a message rate or position
     noise. A robot that fails is then forgotten at once, else after `forget_after`.
 
-    Attributes
-    ----------
-    loss : float
-        Packet loss: the probability with which a message does not reach a receiver.
-    delay : float, s
-        Latency of messages.
-    message_rate : float, Hz, or None
-        How often all robots broadcast their positions; None: at every control step. Who is out of range at
-        that moment does not get the message.
-    forget_after : float, s
-        Timeout after which a robot that has not been heard of is taken to be gone. Until then it is taken to
-        be where its last message said.
-    position_noise : float, m
-        Localization noise, sigma in x and in y, white over the control steps. A robot acts on the noisy
-        position and broadcasts it; the physics goes on from the true one.
-    sensing_noise : float, m
-        Range noise of the sensor, sigma.
-    failure_rate : float, 1/s
-        Of each robot, while it works: lifetimes are exponentially distributed.
-    failures : tuple of Failure
-        At most one a robot; also given as ``(robot, time)``.
-    joins : tuple of Join
-        At most one a robot; also given as ``(robot, time)`` or ``(robot, time, place)``.
-    seed : int
-        Of all random numbers in this.
-
     Raises ParameterError on a value out of range; the message names it.
     """
 
     loss: float = 0.0
+    """Packet loss: the probability with which a message does not reach a receiver."""
     delay: float = 0.0
+    """Latency of messages, s."""
     message_rate: float | None = None
+    """How often all robots broadcast their positions to who is in range, Hz; None: at every control step."""
     forget_after: float = 3.0
+    """Timeout, s, after which a robot that has not been heard of is taken to be gone, no more to be where its
+    last message said."""
     position_noise: float = 0.0
+    """Localization noise, sigma in x and in y, m, white over the control steps. A robot acts on the noisy
+    position and broadcasts it; the physics goes on from the true one."""
     sensing_noise: float = 0.0
+    """Range noise of the sensor, sigma, m."""
     failure_rate: float = 0.0
+    """Failures per second of each robot, while it works: lifetimes are exponentially distributed."""
     failures: tuple[Failure, ...] = ()
+    """At most one a robot; also given as ``(robot, time)``."""
     joins: tuple[Join, ...] = ()
+    """At most one a robot; also given as ``(robot, time)`` or ``(robot, time, place)``."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -124,17 +107,13 @@ class Conditions:
         if not is_number(self.seed, Integral) or self.seed < 0:
             raise ParameterError(f"conditions.seed: {shown(self.seed)}, but a whole number from 0 was wanted")
         if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
-            raise ParameterError(
-                f"conditions.forget_after: {self.forget_after:g} s, but at least the "
-                f"{1.0 / self.message_rate:g} s between two messages was wanted"
-            )
+            wanted = f"at least the {1.0 / self.message_rate:g} s between two messages was wanted"
+            raise ParameterError(f"conditions.forget_after: {self.forget_after:g} s, but {wanted}")
         fails = {each.robot: each.time for each in self.failures}
         for k, join in enumerate(self.joins):
             if fails.get(join.robot, math.inf) <= join.time:
-                raise ParameterError(
-                    f"conditions.joins[{k}]: robot {join.robot} joins at {join.time:g} s, but it has failed "
-                    f"at {fails[join.robot]:g} s"
-                )
+                joins = f"conditions.joins[{k}]: robot {join.robot} joins at {join.time:g} s"
+                raise ParameterError(f"{joins}, but it has failed at {fails[join.robot]:g} s")
 
     @property
     def ideal(self) -> bool:

@@ -8,32 +8,23 @@ as 1, 2, 3* (SC 2011), over as many counters at once as are asked for; numpy's m
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
 
-Words: TypeAlias = NDArray[np.uint64]
-"""Words of 32 bits."""
-
-_ROUNDS = 10
-_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
-_WEYL = (0x9E3779B9, 0xBB67AE85)
-_LOW = np.uint64(0xFFFFFFFF)
-_HALF = np.uint64(32)
+_LOW = 0xFFFFFFFF
 
 
-def philox(counter: Words, key: tuple[int, int]) -> Words:
-    """Return Philox-4x32-10 of counters, (4, ...), under a key of two words, (4, ...)."""
-    a, b, c, d = np.asarray(counter, dtype=np.uint64)
+def philox(counter: NDArray[np.uint64], key: tuple[int, int]) -> NDArray[np.uint64]:
+    """Return Philox-4x32-10 of counters, (4, ...), under a key: words of 32 bits, (4, ...)."""
+    a, b, c, d = counter
     first, second = key
-    for _ in range(_ROUNDS):
-        left, right = a * _MULTIPLIERS[0], c * _MULTIPLIERS[1]
-        a, c = (right >> _HALF) ^ b ^ np.uint64(first), (left >> _HALF) ^ d ^ np.uint64(second)
+    for _ in range(10):
+        left, right = a * 0xD2511F53, c * 0xCD9E8D57
+        a, c = (right >> 32) ^ b ^ first, (left >> 32) ^ d ^ second
         b, d = right & _LOW, left & _LOW
-        first, second = (first + _WEYL[0]) & 0xFFFFFFFF, (second + _WEYL[1]) & 0xFFFFFFFF
+        first, second = (first + 0x9E3779B9) & _LOW, (second + 0xBB67AE85) & _LOW
     return np.stack([a, b, c, d])
 
 

@@ -24,17 +24,12 @@ from robocov.robots import Team
 
 NEVER = -1
 """The step at which something has not happened."""
-
 NEAREST = 1e-3
 """The shortest distance in metres that a noisy range sensor measures."""
 
 
 class Perception:
-    """Turns what is there into what the robots know.
-
-    Row i of what they know still belongs to robot i: messages are what i received, and noise is drawn for
-    i, by the step and its row alone.
-    """
+    """Turns what is there into what the robots know: row i still belongs to robot i alone."""
 
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
         self._conditions, self._dt = conditions, dt
@@ -51,11 +46,7 @@ class Perception:
     def known(
         self, seen: Observations, inbox: Inbox | None, working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
-        """Return what the robots know that work, (n,) bool, and what they have heard by then.
-
-        `seen` is the truth: where the robots are, who is in range, what the sensor ought to measure; `inbox`
-        is as after the step before.
-        """
+        """Return what the robots that work, (n,) bool, know of what is `seen` in truth, and their inbox."""
         step, truth = round(seen.time / self._dt), seen.positions
         positions = self._estimated(step, truth)
         points = self._sensed(step, seen, positions)
@@ -129,24 +120,16 @@ class Broadcast(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inbox:
-    """What has arrived, and what is on its way; never changed, only replaced.
-
-    Attributes
-    ----------
-    sent : (n, n) int
-        The step at which the newest message that row's robot has of column's was sent, `NEVER` if none.
-    arrived : (n, n) int
-        The step at which it arrived.
-    places : (n, n, 2) m
-        What it said.
-    on_the_way : tuple of Broadcast
-        In the order in which they arrive.
-    """
+    """What has arrived, and what is on its way; never changed, only replaced."""
 
     sent: IntArray
+    """The step at which the newest message that row's robot has of column's was sent, or `NEVER`, (n, n)."""
     arrived: IntArray
+    """The step at which it arrived, (n, n)."""
     places: Array
+    """What it said, (n, n, 2) m."""
     on_the_way: tuple[Broadcast, ...] = ()
+    """In the order in which they arrive."""
 
     @classmethod
     def empty(cls, count: int) -> Inbox:

@@ -14,7 +14,6 @@ from robocov.compiled import call_c, kernel
 
 SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER, FORCES, STATES, CONTACTS = range(10)
 """Columns of `Engine.addresses`."""
-
 _FUNCTIONS = (
     *("cpSpaceStep", "cpSpaceEachBody"),
     *("pmSpaceBodySetIteratorFuncBatched", "pmSpaceBodyGetIteratorFuncBatched"),

@@ -12,11 +12,8 @@ from robocov.errors import StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
 
-_GAP = 1e-3
-"""Room in metres that is left beside what a robot is moved away from."""
-
-_ROUNDS = 300
-"""After so many the robots that push each other are taken to have no room."""
+_GAP = 1e-3  # room in metres that is left beside what a robot is moved away from
+_ROUNDS = 300  # after so many the robots that push each other are taken to have no room
 
 
 def relocated(environment: Environment, positions: Array, team: Team) -> Array:
