@@ -21,10 +21,8 @@ from typing import Any, NamedTuple, TypeAlias, TypeGuard
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
-
 MOST_LISTED = 20
 """Mistakes of one document that are told of: to find the line of each takes as long as reading the file."""
-
 _LONGEST_NAME = 60
 """Characters of a known name, or of a key, that are told."""
 

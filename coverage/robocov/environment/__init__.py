@@ -28,21 +28,16 @@ from robocov.robots import DEFAULT_RADIUS
 Key = TypeVar("Key")
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]
-
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 """What happens at the end of a path: straight to its beginning, or back the way it came."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
-
 GRID = 1e-6
 """Derived geometry is computed on a grid of one micrometre, so that unions and differences are
 robust: what touches to within rounding touches exactly, and no sliver survives."""
-
 SAGITTA = 1e-3
 """Largest distance in metres between a circle and the polygon that stands for it."""
-
 START_GAP = 0.02
 """Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""
-
 _LEAST_OVERLAP = 1e-6
 """Area in m² from which an obstacle is in the way: what is less is rounding, of obstacles that touch."""
 

@@ -23,13 +23,10 @@ from robocov.robots import DEFAULT_RADIUS
 
 NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
-
 _CRACK = 2 * SAGITTA
 """Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
-
 _CHUNK = 256
 """Corners that are looked at together, so that memory stays bounded."""
-
 _DIGITS = 6
 """Results are rounded to the grid of the derived geometry, a micrometre."""
 

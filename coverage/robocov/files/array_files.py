@@ -24,25 +24,19 @@ from robocov.files.atomic import written
 
 MOST_BYTES = 2_000_000_000
 """Bytes that the arrays of one file may take: about the largest run that can be asked for."""
-
 _MOST_SQUEEZED = 100
 """Bytes of arrays that one byte of a file may stand for, where they are more than `_MODEST`."""
 _MODEST = 256_000_000
-
 _LARGEST_READ = 1 << 20
 """Bytes that are read in one go: the directory of a file of arrays is short."""
-
 _BROKEN = (
     *(ValueError, EOFError, OSError, MemoryError, NotImplementedError, RuntimeError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
 )
 """Errors that zipfile, zlib and numpy raise on a damaged file."""
-
 _SUFFIX, _FORMAT = ".robocov", b"robocov arrays 1\n"
-
 _DIGEST = 16
 """Bytes of the check sum that stands before the data of a cached file."""
-
 _STALE = 24 * 3600.0
 """Seconds after which a half-written file has no writer any more."""
 

@@ -19,7 +19,6 @@ _KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-
 _LONGEST_SUFFIX = 16
 """Characters; what is longer is no suffix that a writer goes by."""
 

@@ -20,7 +20,6 @@ class Document(BaseModel):
 
 
 Kind = TypeVar("Kind", bound=Document)
-
 _WANTED = {
     "string_type": "a text",
     "bool_type": "true or false",

@@ -22,28 +22,20 @@ from robocov.errors import InputError, OutputError, reason, shown
 from robocov.files.atomic import locked, on_disk, written
 
 Kind: TypeAlias = Literal["run", "comparison", "replay"]
-
 REPORT = "report.html"
 """A page about the result, which goes with it."""
-
 _MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
 _STAGING, _LOCK = ".robocov-new", ".robocov.lock"
-
 _HEAD = {"format": "robocov-folder", "version": 1}
-
 _PICTURES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
-
 _FILES: dict[Kind, tuple[str, ...]] = {
     "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_PICTURES),
     "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_PICTURES),
     "replay": ("replay.json", "run.mp4", "comparison.mp4"),
 }
 """Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
-
 _NAMES = {_MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
-
 _FRAME = re.compile(r"\d{6}\.png")
-
 _BEGINNINGS = {
     **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
     "metrics.csv": re.compile(rb"time_s,sensed_area_m2,"),

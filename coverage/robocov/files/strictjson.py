@@ -18,16 +18,12 @@ from typing import Any
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown
 
 MAX_BYTES = 50_000_000
-
 MAX_DEPTH = 32
 """Deepest nesting of lists and objects; a map's own needs 6."""
-
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
-
 _MOST_BITS = 1023
 """Of a whole number that a float can stand for."""
-
 _SPACE = re.compile(r"[ \t\n\r]*")
 _BREAK = re.compile(r"\r\n|\r|\n")
 _BRACKET = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)

@@ -20,15 +20,11 @@ from robocov.mapfile.models import map_schema as map_schema
 
 _LINE = 100
 """Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
-
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-
 _MEASURED = ("boundary", "obstacles", "starts", "density")
 """Keys of numbers that `dump_map` writes short."""
-
 _DIGITS = 9
 """Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
-
 _NOISE = 16
 """Largest rounding error of a few sums and a rotation, in units of the last place (of 1 m at least)."""
 

@@ -32,13 +32,10 @@ from robocov.robots import DEFAULT_RADIUS
 
 _FLAT = 1e-9
 """A ring whose area is below this part of its bounding box squared is a line."""
-
 _SAME_PLACE = 1e-6
 """Vertices closer than this, in metres, are one vertex given twice."""
-
 MANY_VERTICES = 5000
 """Of a map with more vertices it is said that it takes time."""
-
 _COST_SECONDS = 6.1e-8
 """What `robocov.cost.CoverageCost` takes to begin, by the square of the vertices, as measured."""
 

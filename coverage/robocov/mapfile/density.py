@@ -18,12 +18,9 @@ from robocov.mapfile.models import LARGEST, LIGHTEST, SMALLEST, DensityModel, Mo
 
 MOST_BYTES = 8_000_000
 """Largest picture of a density, in bytes."""
-
 _DIGITS = 6
 """Digits after the point of the weights that greys stand for: a map that is written again stays short."""
-
 _LEAST_VARIANCE = SMALLEST**2
-
 _BASES = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
 """Keys of what a place counts at least, by kind."""
 

@@ -21,7 +21,6 @@ from robocov.files.documents import check_header, refused
 
 FORMAT = "robocov-map"
 VERSION = 1
-
 SLOWEST, FASTEST = 1e-3, 10.0
 """Speeds of an obstacle in m/s."""
 SMALLEST, LARGEST = 1e-3, 1e4
@@ -32,7 +31,6 @@ LIGHTEST = 1e-9
 """Weights that are smaller are read as 0: they would be when the map is written."""
 LONGEST_LABEL = 100
 """Most characters of a label."""
-
 _TINY = 1e-100
 """Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
 _LONGEST_PATH = 500
@@ -102,7 +100,6 @@ _RING = ("a list of at least 3 points [x, y]", *_POINT)
 _LINE = ("a list of at least 2 points [x, y]", *_POINT)
 _PLACES = ("a list of at least 1 point [x, y]", *_POINT)
 _MATRIX = ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)")
-
 _CORNERS = [[1, 1], [2, 1], [2, 3]]
 _YARDS = [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]
 _PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
@@ -222,7 +219,6 @@ _CHOICES = {
     key: {kind: _model(thing, kind) for kind, thing in things.items()} for key, things in _KINDS.items()
 }
 _CHOICES["density"]["raster"] = RasterModel
-
 _MODELS = {model.stands_for: model for model in Model.__subclasses__() if model.stands_for}
 
 

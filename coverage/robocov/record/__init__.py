@@ -19,7 +19,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import gain_values, short_name
 from robocov.drawing import Drawable
 from robocov.environment import Environment
-from robocov.errors import InputError, OutputError, ParameterError, counted, shown
+from robocov.errors import InputError, OutputError, ParameterError, counted, reason, shown
 from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
@@ -45,9 +45,7 @@ _COLUMNS = {
     "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
 }
 """Names of the columns of data frames."""
-
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
-
 _LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
 """Largest numbers in the arrays that are finite throughout, s, m, m/s and N."""
 
@@ -227,29 +225,23 @@ class Record(Drawable):
     def save(
         self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> None:
-        """Write ``record.npz`` and ``run.json`` to a folder, made where missing; each whole or not at all.
-
-        Raises OutputError when they cannot be written.
-        """
+        """Write ``record.npz`` and ``run.json`` to a folder, made where missing; each whole or not at all."""
         folder = Path(folder)
         settle(folder)
-        arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from error
+            raise OutputError(f"{folder}: cannot be made: {reason(error)}") from error
         with written(folder / "record.npz") as part, part.open("wb") as file:
-            np.savez(file, **arrays)  # compressing gains 10 % and takes 20 times as long
+            # compressing gains 10 % and takes 20 times as long
+            np.savez(file, **{name: getattr(self, name) for name in ARRAYS})
         with written(folder / "run.json") as part:
             text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
             part.write_text(text + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, folder: Path | str) -> Record:
-        """Return the record that `save` wrote to `folder`; the controller is not loaded, only named.
-
-        Raises InputError when the folder holds no run, or one that cannot be read.
-        """
+        """Return the record that `save` wrote to `folder`; the controller is not loaded, only named."""
         from robocov.record.run_document import read_run
 
         folder = Path(folder)
@@ -285,10 +277,9 @@ class Record(Drawable):
 
 @dataclass(eq=False)
 class Recorder:
-    """Collects snapshots into a `Record`; what was collected can be had at any time.
+    """Collects snapshots into a `Record`; raises ParameterError where a gain cannot be recorded.
 
-    `name` is the controller's where it is not its own, as in ``mine.py:MyController``. Raises ParameterError
-    where a gain of the controller cannot be recorded.
+    `name` is the controller's where it is not its own, as in ``mine.py:MyController``.
     """
 
     environment: Environment
@@ -322,18 +313,9 @@ class Recorder:
         """Return what was collected so far."""
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(ARRAYS)
         arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(ARRAYS, columns, strict=True)}
-        return Record(
-            environment=self.environment,
-            team=self.team,
-            controller=str(self.name),
-            label=self.controller.label,
-            gains=self._gains,
-            start=self.start,
-            seed=self.seed,
-            dt=self.dt,
-            conditions=self.conditions,
-            **arrays,
-        )
+        law = str(self.name), self.controller.label, self._gains
+        origin = self.start, self.seed, self.dt
+        return Record(self.environment, self.team, *law, *origin, conditions=self.conditions, **arrays)
 
 
 def nearest_moments(time: Array, rate: float) -> IntArray:

@@ -38,7 +38,6 @@ from robocov.files.strictjson import parse, read_bytes
 
 DEFAULT_RADIUS = 0.1
 """Radius of a robot in metres where nothing else is said."""
-
 LIMITS: dict[str, tuple[float, float, bool]] = {
     # smallest, largest, whether it may be infinite
     "radius": (1e-3, 1e3, False),
