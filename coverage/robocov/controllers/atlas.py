@@ -177,11 +177,8 @@ class Atlas(Law):
         """Return the forces that lead each robot on its way."""
         states, scans = list(memory.states), seen.scans
         if scans is not None:
-            maps = [
-                state.known.scanned(seen.positions[i], scans.distances[i], scans.hit[i])
-                for i, state in enumerate(states)
-            ]
-            maps = self._exchanged(maps, seen)
+            each = zip(states, seen.positions, scans.distances, scans.hit, strict=True)
+            maps = self._exchanged([state.known.scanned(*scan) for state, *scan in each], seen)
             states = [replace(state, known=known) for state, known in zip(states, maps, strict=True)]
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
@@ -226,28 +223,27 @@ class Atlas(Law):
         before = state
         state = replace(state, due=due, tracker=tracker, since=since, quiet=quiet)
         situation, group = np.vstack([place, at]), np.concatenate([[i], others])
-        same = before.idle and before.planned is before.known and before.quiet == quiet
-        if same and before.ways is not None and before.ways.window == window:
-            assert before.group is not None and before.situation is not None
-            same = np.array_equal(before.group, group)
-            if same and np.abs(situation - before.situation).max() < _HARDLY * spacing:
+        ways, same_window = state.ways, state.ways is not None and state.ways.window == window
+        same = same_window and before.idle and before.planned is before.known and before.quiet == quiet
+        if same and before.group is not None and np.array_equal(before.group, group):
+            assert before.situation is not None
+            if np.abs(situation - before.situation).max() < _HARDLY * spacing:
                 return state, None
         state = replace(state, planned=state.known, situation=situation, group=group)
-        state, ways = self._mapped(state, window, float(team.radius[i]) + self.clearance)
+        blocked = window.cut(state.known.blocked, True)
+        if ways is None or not same_window or not np.array_equal(ways.blocked, blocked):
+            ways = GridPlanner(raster, window, blocked, float(team.radius[i]) + self.clearance)
+            # nodes of another window have other numbers
+            state = replace(state, ways=ways, table=None, node=state.node if same_window else -1)
         demand = CoverageDemand(state.known, window, seen.density)
         settling = 2.0 ** min((seen.time - since) / self.settling, 60.0)
         if crowd:
             begin = ways.standing(place) if state.node < 0 else state.node
         else:
             together = seen.time - since <= _TOGETHER * seen.region.diameter / fastest
-            threshold = min(1.0, self.threshold * settling)
-            if not together:
-                # from now on each decides for itself alone, and nobody goes elsewhere while others do
-                threshold = threshold if quiet else 1.0
-                still[:] = True
-            nearby = min(1.0, self.nearby * settling)
-            # who is there already does not leave for what may not be there
-            state, places = self._plan_for_all(state, seen, still, threshold, nearby, sure=not together)
+            # afterwards each decides for itself alone
+            still = still if together else np.ones_like(still)
+            state, places = self._plan_for_all(state, seen, still, settling, together)
             begin = ways.nearest(places[0])
             at = np.where(still[:, None], at, places[1:])
         if begin < 0:
@@ -255,40 +251,26 @@ class Atlas(Law):
         former = np.full(2, np.nan) if state.own is None else state.own
         rest, steps = min(1.0, self.rest * settling), 3 if crowd else 6
         own = own_place(ways, demand.weights, at, begin, former, rest, steps)
-        state = replace(state, own=own.goal, node=own.node)
-        return self._looking(state, ways, demand, own, place, period)
-
-    def _mapped(
-        self, state: PlannerState, window: Window, clearance: float
-    ) -> tuple[PlannerState, GridPlanner]:
-        """Return a state with the ways of the present map; where no wall is new these are the former ones."""
-        ways, blocked = state.ways, window.cut(state.known.blocked, True)
-        # nodes of another window have other numbers
-        node = state.node if ways is not None and ways.window == window else -1
-        if ways is None or ways.window != window or not np.array_equal(ways.blocked, blocked):
-            ways = GridPlanner(state.known.raster, window, blocked, clearance)
-            state = replace(state, ways=ways, table=None, node=node)
-        return state, ways
+        return self._looking(replace(state, own=own.goal, node=own.node), demand, own, place, period)
 
     def _plan_for_all(
-        self,
-        state: PlannerState,
-        seen: Observations,
-        still: BoolArray,
-        threshold: float,
-        nearby: float,
-        *,
-        sure: bool,
+        self, state: PlannerState, seen: Observations, still: BoolArray, settling: float, together: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
-        known, ways, situation, group = state.known, state.ways, state.situation, state.group
+        known, ways, situation, group, table = (
+            state.known,
+            state.ways,
+            state.situation,
+            state.group,
+            state.table,
+        )
         assert ways is not None and situation is not None and group is not None
-        table = state.table
         if table is None:
             window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
             blocked = window.cut(known.blocked, True)
             table = Table.of(GridPlanner(known.raster, window, blocked, ways.clearance))
-        weights = CoverageDemand(known, table.ways.window, seen.density, sure).weights
+        # who is there already does not leave for what may not be there
+        weights = CoverageDemand(known, table.ways.window, seen.density, sure=not together).weights
         fixed = np.concatenate([[False], still])
         begin = situation.copy()
         if state.places is not None:
@@ -296,20 +278,19 @@ class Atlas(Law):
             _, here, there = np.intersect1d(group, robots, return_indices=True)
             free = ~fixed[here]
             begin[here[free]] = places[there[free]]
+        # who decides alone goes nowhere else while others do
+        threshold = min(1.0, self.threshold * settling) if together or state.quiet else 1.0
+        nearby = min(1.0, self.nearby * settling)
         places = team_places(table, weights, situation, begin, fixed, threshold, nearby)
         return replace(state, table=table, places=np.column_stack([group, places])), places
 
     def _looking(
-        self,
-        state: PlannerState,
-        ways: GridPlanner,
-        demand: CoverageDemand,
-        own: OwnPlace,
-        place: Array,
-        period: float,
+        self, state: PlannerState, demand: CoverageDemand, own: OwnPlace, place: Array, period: float
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
-        former, look, node = state.former, None, ways.standing(place)
+        ways, former, look = state.ways, state.former, None
+        assert ways is not None
+        node = ways.standing(place)
         if state.look is not None and math.dist(state.look, place) < _ARRIVED:
             former = (*former, state.look)
         if state.look is None and math.dist(own.goal, place) > _ARRIVED:

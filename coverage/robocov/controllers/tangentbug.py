@@ -127,54 +127,43 @@ class TangentBug(Law):
         return TangentBugMemory(team)
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
-        cells = cells_seen(seen, self.cells, memory.triangulation)
-        bugs, met = memory.bugs, memory.met
-        returns = last_returns(seen, memory.returns)
+        team, cells = memory.team, cells_seen(seen, self.cells, memory.triangulation)
+        goals, returns, met = cells.centroid, last_returns(seen, memory.returns), memory.met
         points = with_nearest(seen, returns)
-        if not bugs or seen.scans is not None or returns is None:
+        bugs = memory.bugs or tuple(Bug(Mode.GOAL, 1, position) for position in seen.positions)
+        if not memory.bugs or seen.scans is not None or returns is None:
             met = tuple(_remembered(near, met[i : i + 1]) for i, near in enumerate(points))
-            bugs = self._bugs(seen, memory, cells.centroid, points, met)
+            each = zip(bugs, range(len(bugs)), goals, points, met, strict=True)
+            bugs = tuple(self._after_look(seen, team, *bug) for bug in each)
         # until the next scan, who has its centroid in view follows it
         direct = np.array([bug.aim is None and not bug.passing for bug in bugs])
-        way = np.where(direct[:, None], cells.centroid, np.array([bug.way for bug in bugs]))
         passing = np.array([bug.passing for bug in bugs])
-        wanted = self._wanted(seen, memory.team, way, passing, points)
-        forces = drive(wanted, seen, memory.team, self.response_time)
-        kept = [own if bug.aim is None else bug.aim for bug, own in zip(bugs, cells.centroid, strict=True)]
-        memory = TangentBugMemory(memory.team, returns, cells.triangulation, bugs, met)
-        return Decision(forces, np.array(kept), {"attraction": forces}, cells, memory)
-
-    def _wanted(self, seen: Observations, team: Team, way: Array, passing: Array, points: Array) -> Array:
-        """Return the velocities towards the next way-points, slowed before what is close, (n, 2) m/s."""
-        offset = way - seen.positions
+        offset = np.where(direct[:, None], goals, np.array([bug.way for bug in bugs])) - seen.positions
+        # towards the next way-points, slowed before what is close
         distance = np.hypot(*offset.T)
         speed = np.where(passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
-        speed = np.minimum(speed, distance / self.response_time)
-        wanted = approach(offset, math.inf, speed)
+        wanted = approach(offset, math.inf, np.minimum(speed, distance / self.response_time))
         keep = team.radius + 0.5 * self.clearance
-        return avoid(wanted, seen, team, points, keep, keep + float(team.radius.max()), _EAGERNESS, 0.5)
+        apart = keep + float(team.radius.max())
+        wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, 0.5)
+        forces = drive(wanted, seen, team, self.response_time)
+        kept = [own if bug.aim is None else bug.aim for bug, own in zip(bugs, goals, strict=True)]
+        memory = TangentBugMemory(team, returns, cells.triangulation, bugs, met)
+        return Decision(forces, np.array(kept), {"attraction": forces}, cells, memory)
 
-    def _bugs(
-        self,
-        seen: Observations,
-        memory: TangentBugMemory,
-        goals: Array,
-        points: Array,
-        met: tuple[ComplexArray, ...],
-    ) -> tuple[Bug, ...]:
-        team, directions = memory.team, np.array(headings(self.scanning.rays))
-        found = []
-        for i, position in enumerate(seen.positions):
-            bug = memory.bugs[i] if memory.bugs else Bug(Mode.GOAL, 1, position)
-            bug = bug.before(position, goals[i], self.moved)
-            goal = (goals[i] if bug.aim is None else bug.aim) - position
-            reach = min(float(team.sensing_range[i]), seen.region.diameter)
-            keep = float(team.radius[i]) + self.clearance
-            near = points[i] - position
-            free = free_distances(near, directions, keep, reach)
-            walls = (np.column_stack([met[i].real, met[i].imag]) + 0.5) * _GRAIN - position
-            found.append(Look(self, position, goal, near, walls, directions, free, keep, reach).next(bug))
-        return tuple(found)
+    def _after_look(
+        self, seen: Observations, team: Team, bug: Bug, i: int, goal: Array, points: Array, met: ComplexArray
+    ) -> Bug:
+        """Return what robot i does from now on."""
+        position, directions = seen.positions[i], headings(self.scanning.rays)
+        bug = bug.before(position, goal, self.moved)
+        goal = (goal if bug.aim is None else bug.aim) - position
+        reach = min(float(team.sensing_range[i]), seen.region.diameter)
+        keep = float(team.radius[i]) + self.clearance
+        points = points - position
+        free = free_distances(points, directions, keep, reach)
+        walls = (np.column_stack([met.real, met.imag]) + 0.5) * _GRAIN - position
+        return Look(self, position, goal, points, walls, directions, free, keep, reach).next(bug)
 
 
 def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
@@ -236,30 +225,23 @@ class Look:
     def _ends(self, towards: Array) -> dict[int, Gap]:
         """Return the ends of the contour that blocks the view in a direction, by the turn to them."""
         first, at = int((self.directions * towards).sum(axis=1).argmax()), self._towards(towards)
-        found = {}
-        for turn in (1, -1):
-            end = end_of_contour(self.free, self.directions, first, turn, at, self.law.jump, self.reach)
-            if end is not None:
-                found[turn] = end
-        return found
+        known = at, self.law.jump, self.reach
+        ends = {turn: end_of_contour(self.free, self.directions, first, turn, *known) for turn in (1, -1)}
+        return {turn: end for turn, end in ends.items() if end is not None}
 
     def _to_goal(self, bug: Bug) -> Bug:
         ends = self._ends(self.goal)
-        distance, left = (
-            _length(self.goal),
-            {turn: math.dist(self.goal, end.point) for turn, end in ends.items()},
-        )
+        left = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
         by_way_of = {turn: _length(end.point) + left[turn] for turn, end in ends.items()}
         if bug.turn in ends:
             # of two that are about as good, the one that it was going to
             by_way_of[bug.turn] -= _BETTER
         distance = _length(self.goal)
         nearer = [turn for turn in ends if left[turn] < distance]
+        turn = min(nearer or ends, key=by_way_of.__getitem__, default=bug.turn)
         if nearer:
-            turn = min(nearer, key=lambda turn: by_way_of[turn])
             way = self.position + ends[turn].point
             return self._off(replace(bug, turn=turn), Mode.GOAL, way, passing=True)
-        turn = min(ends, key=lambda turn: by_way_of[turn], default=bug.turn)
         here, goal = frozen(self.position), frozen(self.position + self.goal)
         tries = bug.tries + (bug.aim is None)
         patience = np.inf if self.law.detour is None else self.law.detour * distance * _WANES**tries
@@ -302,13 +284,12 @@ class Look:
 
     def _best(self, bug: Bug, ends: dict[int, Gap]) -> Array:
         """Return the point of the boundary followed, and in view, that is nearest to the goal, (2,) m."""
-        seen = np.ones(len(self.free), dtype=bool)
+        rays = np.arange(len(self.free))
         if len(ends) == 2:
             # from the one end round to the other
-            span = (ends[1].ray - ends[-1].ray - 1) % len(seen)
-            seen[:] = False
-            seen[(ends[-1].ray + 1 + np.arange(span)) % len(seen)] = True
-        places = self.free[seen, None] * self.directions[seen]
+            first = ends[-1].ray + 1
+            rays = np.sort((first + np.arange((ends[1].ray - first) % len(rays))) % len(rays))
+        places = self.free[rays, None] * self.directions[rays]
         known = np.zeros(2) if bug.best is None else bug.best - self.position
         places = np.vstack([known, places])
         return frozen(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
