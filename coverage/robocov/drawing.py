@@ -38,8 +38,7 @@ class DrawingBackend(Protocol):
 class Drawable:
     """A thing that backends draw; notebooks show it where the backend has an HTML page or a PNG of it."""
 
-    _drawn_as: ClassVar[str]
-    """In the names of the backend's functions."""
+    _drawn_as: ClassVar[str]  # in the names of the backend's functions
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
         """Plot it on axes, or on a page with a title, a scale bar or a legend; return the axes.

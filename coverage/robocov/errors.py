@@ -23,8 +23,8 @@ JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
 MOST_LISTED = 20
 """Mistakes of one document that are told of: to find the line of each takes as long as reading the file."""
-_LONGEST_NAME = 60
-"""Characters of a known name, or of a key, that are told."""
+_LONGEST = 60
+"""Characters of a value or a name that are told."""
 
 
 class RobocovError(Exception):
@@ -61,12 +61,15 @@ class Mistake(NamedTuple):
 class MapError(InputError):
     """A map cannot be used; the message names the file, the place in it, the value and what was wanted.
 
-    `mistakes` are at places in the file, which messages call `where`; there are `unlisted` ones beside these.
+    `mistakes` are at places in the file, which messages call `where`, the first at `line` and `column`; there
+    are `unlisted` ones beside these.
     """
 
     mistakes: tuple[Mistake, ...] = ()
     unlisted: int = 0
     where: str = ""
+    line: int | None = None
+    column: int | None = None
 
     @classmethod
     def of(cls, where: str, mistakes: Sequence[Mistake], unlisted: int = 0) -> MapError:
@@ -75,17 +78,8 @@ class MapError(InputError):
         error = cls(f"{mistakes[0].told(where)}{f' (and {others} more)' if others else ''}")
         error.mistakes, error.where = tuple(mistakes[:MOST_LISTED]), where
         error.unlisted = others + 1 - len(error.mistakes)
+        error.line, error.column = mistakes[0].line, mistakes[0].column
         return error
-
-    @property
-    def line(self) -> int | None:
-        """Line of the first mistake."""
-        return self.mistakes[0].line if self.mistakes else None
-
-    @property
-    def column(self) -> int | None:
-        """Column of the first mistake."""
-        return self.mistakes[0].column if self.mistakes else None
 
 
 class StartError(InputError):
@@ -100,14 +94,14 @@ class OutputError(RobocovError):
     """A result cannot be written: no permission, no space, a folder that is in use."""
 
 
-def shown(value: object, limit: int = 60) -> str:
-    """Return `value` as it is quoted in messages: its repr on one line, cut to `limit` characters."""
-    return _cut(" ".join(repr(value).split()), limit)
+def shown(value: object) -> str:
+    """Return `value` as it is quoted in messages: its repr on one line, cut where it is long."""
+    return _cut(" ".join(repr(value).split()))
 
 
-def shown_json(value: object, limit: int = 60) -> str:
+def shown_json(value: object) -> str:
     """Return `value` as it is quoted in messages about JSON."""
-    return _cut(json.dumps(value, default=repr), limit)
+    return _cut(json.dumps(value, default=repr))
 
 
 def one_line(text: object) -> str:
@@ -123,21 +117,16 @@ def reason(error: Exception) -> str:
 def place(path: Sequence[str | int]) -> str:
     """Return `path` as messages show it; very long keys are cut.
 
-    >>> place(("obstacles", 2, "vertices", 0))
-    'obstacles[2].vertices[0]'
-    >>> place(("starts", "the lobby", "radius"))
-    'starts["the lobby"].radius'
+    >>> place(("obstacles", 2, "the lobby", "radius"))
+    'obstacles[2]["the lobby"].radius'
     """
     text = ""
     for step in path:
-        if isinstance(step, int):
-            text += f"[{step}]"
-            continue
-        step = _cut(step, _LONGEST_NAME)
-        if step.replace("-", "_").replace("$", "_").isidentifier():
-            text += f".{step}" if text else step
+        name = step if isinstance(step, int) else _cut(step)
+        if isinstance(name, str) and name.replace("-", "_").replace("$", "_").isidentifier():
+            text += f".{name}" if text else name
         else:
-            text += f"[{json.dumps(step)}]"
+            text += f"[{json.dumps(name)}]"
     return text
 
 
@@ -157,11 +146,7 @@ def checked(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return the first three of some names, and how many more there are.
-
-    >>> listed(["a", "b"]), listed(["a", "b", "c", "d"])
-    ('a, b', 'a, b, c and 1 more')
-    """
+    """Return the first three of some names, and how many more there are: a, b, c and 1 more."""
     more = len(names) - 3
     return ", ".join(names[:3]) + (f" and {more} more" if more > 0 else "")
 
@@ -180,9 +165,9 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    known_names = ", ".join(_cut(one_line(each), _LONGEST_NAME) for each in names)
+    known_names = ", ".join(_cut(one_line(each)) for each in names)
     return f"unknown {kind} {shown(name)}{hint} (known: {known_names})"
 
 
-def _cut(text: str, limit: int) -> str:
-    return text if len(text) <= limit else f"{text[: limit - 3]}..."
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."

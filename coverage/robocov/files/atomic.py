@@ -38,8 +38,7 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
     try:
         yield part
         if durable:
-            with part.open("rb") as file:
-                os.fsync(file.fileno())
+            _on_disk(part)
         with suppress(FileNotFoundError):
             part.chmod(stat.S_IMODE(real.stat().st_mode))
         part.replace(real)

@@ -12,6 +12,7 @@ import re
 from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason,
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 32
 """Deepest nesting of lists and objects; a map's own needs 6."""
+_TOO_DEEP = f"nested too deeply, but at most {MAX_DEPTH} levels were wanted"
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
 _MOST_BITS = 1023
@@ -46,10 +48,7 @@ class _Object(dict[str, Any]):
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of the file at `path`.
-
-    Raises `MapError` when there is no such file, it cannot be read, or it is larger than `MAX_BYTES`.
-    """
+    """Return the content of a file; raise `MapError` when it cannot be read, or larger than `MAX_BYTES`."""
     where = one_line(path)
     try:
         with path.open("rb") as file:
@@ -81,8 +80,8 @@ def parse(text: str | bytes, where: str) -> Any:
         at, what = _syntax(text, error)
         raise MapError.of(where, [_placed(Mistake((), what), text, at)]) from None
     except RecursionError:
-        too_deep = Mistake((), _too_deep(""))
-        raise MapError.of(where, [_placed(too_deep, text, depth_offset(text, MAX_DEPTH))]) from None
+        too_deep = _placed(Mistake((), _TOO_DEEP), text, depth_offset(text, MAX_DEPTH))
+        raise MapError.of(where, [too_deep]) from None
     try:
         require_json(value, where)
     except MapError as error:
@@ -116,7 +115,7 @@ def _first_mistake(value: Any, path: JsonPath) -> Mistake | None:
         what = _wrong(value)
         return None if what is None else Mistake.at(path, what)
     if len(path) >= MAX_DEPTH:
-        return Mistake(path, _too_deep(place(path[:4]) + "...: "))
+        return Mistake(path, f"{place(path[:4])}...: {_TOO_DEEP}")
     if isinstance(value, dict):
         for key in value:
             if not isinstance(key, str) or not _is_text(key):
@@ -156,23 +155,20 @@ def offset_of(text: str, path: Sequence[str | int], *, at_key: bool = False) -> 
     """
     key_at = at = _after_space(text, 0)
     for step in path:
-        holder, found = at, False
-        if text[holder] == ("{" if isinstance(step, str) else "["):
-            for key, begin, value_at in _members(text, holder):
-                if key == step:
-                    key_at, at, found = begin, value_at, True
-                    if isinstance(step, int):
-                        break
+        found = [places for key, *places in _members(text, at) if key == step] if text[at] in "{[" else []
         if not found:
-            return holder
+            return at
+        key_at, at = found[-1]
     return key_at if at_key else at
 
 
 def _members(text: str, at: int) -> Iterator[tuple[str | int, int, int]]:
     """Yield key or index of each member of an object or list, and where its key and its value begin."""
-    named, index = text[at] == "{", 0
+    named = text[at] == "{"
     at = _after_space(text, at + 1)
-    while text[at] not in "]}":
+    for index in count():
+        if text[at] in "]}":
+            return
         key: str | int = index
         begin = at
         if named:
@@ -182,7 +178,6 @@ def _members(text: str, at: int) -> Iterator[tuple[str | int, int, int]]:
         at = _after_space(text, _skipping.raw_decode(text, at)[1])
         if text[at] == ",":
             at = _after_space(text, at + 1)
-        index += 1
 
 
 def line_and_column(text: str, offset: int) -> tuple[int, int]:
@@ -218,10 +213,6 @@ def _require_size(content: str | bytes, where: str) -> None:
         raise MapError(f"{where}: larger than {MAX_BYTES // 1_000_000} MB, but a smaller file was wanted")
 
 
-def _too_deep(prefix: str) -> str:
-    return f"{prefix}nested too deeply, but at most {MAX_DEPTH} levels were wanted"
-
-
 def _decoded(text: str | bytes, where: str) -> str:
     if isinstance(text, str):
         return text
@@ -230,8 +221,7 @@ def _decoded(text: str | bytes, where: str) -> str:
         return body.decode("utf-8")
     except UnicodeDecodeError as error:
         before = body[: error.start].decode("utf-8")
-        offset = error.start + len(text) - len(body)
-        found = f"byte 0x{body[error.start]:02x} at offset {offset}"
+        found = f"byte 0x{body[error.start]:02x} at offset {error.start + len(text) - len(body)}"
         what = f"{found}: not UTF-8, but JSON in UTF-8 was wanted"
         raise MapError.of(where, [_placed(Mistake((), what), before, len(before))]) from None
 
