@@ -314,7 +314,7 @@ class Arena:
         for k, (at, radius) in enumerate(zip(places.tolist(), radii.tolist(), strict=True)):
             fill = theme.robots[k % len(theme.robots)]
             size = round(2 * min(radius, 400.0)) / 2
-            text = str(k + 1) if sprites.number_size(size, str(k + 1)) > 7.5 * scale else ""
+            text = str(k + 1) if sprites.number_size(size, min(len(str(k + 1)), 4)) > 7.5 * scale else ""
             canvas.stamp(
                 partial(sprites.disc, size, fill, theme.robot_ring, min(1.4 * scale, 0.3 * size), edge, text),
                 at,

@@ -37,7 +37,7 @@ class Centroids(Layer):
         there = np.isfinite(away)
         arm = rounded(0.5 * mark_size(centers[there], 5.0 * canvas.scale, 11.0 * canvas.scale))
         seen = centers[there & (away > drawn_radii(canvas, scene))]
-        canvas.stamps([sign(canvas, arm)] * len(seen), seen)
+        canvas.stamps([sign(canvas, arm)], seen)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         known, _ = _shown(scene)
@@ -59,7 +59,7 @@ class Goals(Layer):
         there = np.isfinite(goals).all(axis=1)
         for center, goal in zip(centers[there].tolist(), goals[there].tolist(), strict=True):
             canvas.dashes(center, goal, canvas.theme.faint)
-        canvas.stamps([_times(canvas)] * len(goals), goals)
+        canvas.stamps([_times(canvas)], goals)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         known = scene.snapshot is not None and scene.snapshot.decision.goals is not None

@@ -66,18 +66,35 @@ class Canvas:
         for ring in clipped_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
-    def polygons(self, corners: Array, ends: Sequence[int], fills: Sequence[Colour]) -> None:
-        """Fill many polygons, one after the other in (k, 2) px corners, each up to one of the `ends`."""
+    def polygons(
+        self, corners: Array, ends: Sequence[int], fills: Sequence[Colour | None], edge: Colour | None = None
+    ) -> None:
+        """Fill many polygons, one after the other in (k, 2) px corners, each up to one of the `ends`.
+
+        With an `edge`, they get thin outlines that are not smooth either.
+        """
         begin = 0
         if len(corners) and np.abs(corners).max() > FAR:
             for end, fill in zip(ends, fills, strict=True):
-                self.polygon(corners[begin:end], fill)
+                if fill is not None:
+                    self.polygon(corners[begin:end], fill)
+                if edge is not None:
+                    self.outline(corners[begin:end], edge, self.width(1.0))
                 begin = end
             return
-        points, draw = np.rint(corners).tolist(), pygame.draw.polygon
+        surface, points, draw, width = (
+            self.surface,
+            np.rint(corners).tolist(),
+            pygame.draw.polygon,
+            self.width(1.0),
+        )
         for end, fill in zip(ends, fills, strict=True):
             if end - begin > 2:
-                draw(self.surface, fill, points[begin:end])
+                ring = points[begin:end]
+                if fill is not None:
+                    draw(surface, fill, ring)
+                if edge is not None:
+                    draw(surface, edge, ring, width)
             begin = end
 
     def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
@@ -157,11 +174,16 @@ class Canvas:
         """Put a sprite where it belongs to a quarter of a pixel."""
         self.stamps([sprite], np.array([center], dtype=float))
 
-    def stamps(self, many: Sequence[Sprite], centers: Array) -> None:
-        """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other."""
-        self.surface.fblits(self.placed(many, centers), pygame.BLEND_PREMULTIPLIED)
+    def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:
+        """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other.
 
-    def placed(self, many: Sequence[Sprite], centers: Array) -> list[tuple[pygame.Surface, tuple[int, int]]]:
+        `which` of them belongs where, (n,); the first everywhere where it is None.
+        """
+        self.surface.fblits(self.placed(some, centers, which), pygame.BLEND_PREMULTIPLIED)
+
+    def placed(
+        self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None
+    ) -> list[tuple[pygame.Surface, tuple[int, int]]]:
         """Return the pictures of sprites that are to be put at (n, 2) px, and their corners."""
         near = np.flatnonzero(
             ((centers > -500) & (centers < np.add(self.surface.get_size(), 500))).all(axis=1)
@@ -169,10 +191,17 @@ class Canvas:
         # as for lines, whole numbers are the middles of pixels
         quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
         places, shifts = np.divmod(quarters, sprites.FINE)
+        rows = shifts[:, 0] + sprites.FINE * shifts[:, 1]
+        if which is not None:
+            rows = rows + sprites.FINE**2 * which[near]
+        known: dict[int, tuple[pygame.Surface, int]] = {}
         pictures = []
-        for k, (x, y), shift in zip(near.tolist(), places.tolist(), shifts.tolist(), strict=True):
-            picture = many[k](tuple(shift))
-            half = picture.get_width() // 2
+        for row, (x, y) in zip(rows.tolist(), places.tolist(), strict=True):
+            if row not in known:
+                sprite, shift = divmod(row, sprites.FINE**2)
+                picture = some[sprite]((shift % sprites.FINE, shift // sprites.FINE))
+                known[row] = picture, picture.get_width() // 2
+            picture, half = known[row]
             pictures.append((picture, (x - half, y - half)))
         return pictures
 

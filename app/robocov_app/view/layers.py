@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pygame
@@ -22,7 +22,7 @@ from robocov_app.view.camera import Camera, round_length
 from robocov_app.view.canvas import Canvas, Sprite
 from robocov_app.view.scene import Scene
 from robocov_app.view.spacing import fitted_radii, mark_size
-from robocov_app.view.theme import mix
+from robocov_app.view.theme import Colour, mix
 
 READABLE = 9.0
 """Radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it."""
@@ -35,6 +35,9 @@ SMALLEST = 2.4
 
 GRID_GAP = 34.0
 """Least distance between the lines of the grid in pixels at scale 1."""
+
+NARROW = 20.0
+"""Width of cells in pixels at scale 1 below which edges between them are not smooth: they hardly show."""
 
 
 @dataclass(frozen=True)
@@ -103,16 +106,23 @@ class Cells(Layer):
         sizes = np.array([len(cell) for cell in scene.cells])
         corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
         ends = np.cumsum(sizes)
+        fills: list[Colour | None] = [None] * len(sizes)
         if not self._lines_only(canvas, scene):
             tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
             hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
-            canvas.polygons(corners, ends.tolist(), [tints[hue] for hue in hues.tolist()])
+            fills = [tints[hue] for hue in hues.tolist()]
+        wide = canvas.camera.zoom * (scene.environment.region.area / len(sizes)) ** 0.5
+        edge = canvas.theme.cell_edge
+        narrow = wide < NARROW * canvas.scale
+        canvas.polygons(corners, ends.tolist(), fills, edge if narrow else None)
+        if narrow:
+            return
         following = np.arange(1, len(corners) + 1)
         following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
         edges = np.hstack([corners, corners[following]])
         # what lies on the rim is drawn over
         edges = _forward(edges) if "boundary" in canvas.shown else _once(edges)
-        canvas.segments(edges, canvas.theme.cell_edge, canvas.width(canvas.theme.line))
+        canvas.segments(edges, edge, canvas.width(canvas.theme.line))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -263,7 +273,7 @@ class Starts(Layer):
         if self._kept is None or self._kept[0] is not scene.starts or self._kept[1] != view:
             centers = canvas.camera.to_pixels(scene.starts)
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
-            rings = canvas.placed([self._ring(canvas, radius)] * len(centers), centers)
+            rings = canvas.placed([self._ring(canvas, radius)], centers)
             self._kept = scene.starts, view, rings
         canvas.surface.fblits(self._kept[2], pygame.BLEND_PREMULTIPLIED)
 
@@ -290,16 +300,20 @@ class Robots(Layer):
             return
         theme, scale = canvas.theme, canvas.scale
         edge = mix(theme.background, theme.ink, 0.55)
-        discs = []
-        for robot, (hue, radius) in enumerate(
-            zip(canvas.hues.tolist(), drawn_radii(canvas, scene), strict=True)
-        ):
-            ring = min(1.6 * scale, rounded(0.3 * radius))
-            text = str(scene.number(robot))
-            if sprites.number_size(radius - ring, text) < SMALLEST_NUMBER * scale:
-                text = ""
-            discs.append(partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, text))
-        canvas.stamps(discs, canvas.camera.to_pixels(scene.snapshot.positions))
+        radii = drawn_radii(canvas, scene)
+        numbers = np.arange(len(radii)) + 1 if scene.numbers is None else np.array(scene.numbers)
+        rings = np.minimum(1.6 * scale, rounded(0.3 * radii))
+        sizes = sprites.number_size(radii - rings, 1 + np.digitize(numbers, [10, 100, 1000]))
+        told = np.where(sizes < SMALLEST_NUMBER * scale, 0, numbers)
+        # in a crowd many look the same
+        looks: dict[tuple[float, float, int, int], int] = {}
+        columns = radii.tolist(), rings.tolist(), canvas.hues.tolist(), told.tolist()
+        which = [looks.setdefault(look, len(looks)) for look in zip(*columns, strict=True)]
+        discs = [
+            partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, str(number or ""))
+            for radius, ring, hue, number in looks
+        ]
+        canvas.stamps(discs, canvas.camera.to_pixels(scene.snapshot.positions), np.array(which, dtype=int))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -315,7 +329,7 @@ class Robots(Layer):
         return [LegendEntry("robot", glyph)] if scene.snapshot is not None else []
 
 
-def drawn_radii(canvas: Canvas, scene: Scene) -> list[float]:
+def drawn_radii(canvas: Canvas, scene: Scene) -> Array:
     """Return the radius in pixels at which each robot is drawn, in steps of half a pixel.
 
     Large enough for a number where there is room; in a crowd smaller, so that discs keep apart, but
@@ -325,18 +339,18 @@ def drawn_radii(canvas: Canvas, scene: Scene) -> list[float]:
 
 
 @lru_cache(maxsize=8)  # several layers ask in each frame
-def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> list[float]:
+def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
     if scene.snapshot is None:
-        return []
+        return np.empty(0)
     centers = camera.to_pixels(scene.snapshot.positions)
     true = scene.team.radius * camera.zoom
-    radii = fitted_radii(centers, true, SMALLEST * scale, READABLE * scale)
-    return [rounded(radius) for radius in np.minimum(radii, 400.0).tolist()]
+    radii: Array = rounded(np.minimum(fitted_radii(centers, true, SMALLEST * scale, READABLE * scale), 400.0))
+    return radii
 
 
-def rounded(pixels: float) -> float:
-    """Return a size in steps of half a pixel, so that few sprites are made."""
-    return round(pixels * 2) / 2
+def rounded(pixels: Any) -> Any:
+    """Return sizes in steps of half a pixel, so that few sprites are made."""
+    return np.round(pixels * 2) / 2
 
 
 def _premultiplied(colour: tuple[int, int, int], alpha: float) -> tuple[int, int, int, int]:

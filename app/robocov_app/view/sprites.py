@@ -7,8 +7,9 @@ robots glide in films instead of hopping. All is premultiplied: blit with ``BLEN
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+import numpy as np
 import pygame
 
 from robocov_app.view.fonts import label
@@ -89,9 +90,9 @@ def _shrunk(large: pygame.Surface, fine: int = FINE) -> pygame.Surface:
     return pygame.transform.smoothscale(large, (width // fine, height // fine))
 
 
-def number_size(inside: float, text: str) -> float:
-    """Return the text size at which `text` fills a disc of radius `inside`, in its unit."""
-    return inside * (1.5, 1.22, 0.92, 0.72)[min(len(text), 4) - 1]
+def number_size(inside: Any, digits: Any) -> Any:
+    """Return the text sizes at which 1 to 4 digits fill discs of radius `inside`, in their unit."""
+    return inside * np.array([1.5, 1.22, 0.92, 0.72])[digits - 1]
 
 
 def disc(
@@ -136,7 +137,7 @@ def _disc(
     pygame.draw.circle(large, ring, center, radius * fine)
     pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
     if text:
-        size = number_size(radius - ring_width, text)
+        size = number_size(radius - ring_width, min(len(text), 4))
         number = label(text, round(size * fine), readable_on(fill), True)
         # the ink of digits, without the room for ascenders and descenders, goes to the middle
         ink = number.get_bounding_rect()

@@ -71,7 +71,8 @@ class Trajectories(Layer):
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         whole = canvas.width(width / canvas.scale)
         for path, end, colour in zip(self._open, ends, colours, strict=True):
-            if path[-1][0] != path[-1][0]:  # nan: not there yet
+            # nan: not there yet; what has hardly moved is below its disc
+            if path[-1][0] != path[-1][0] or (len(path) == 1 and _near(path[0], end)):
                 continue
             # mostly below the robot's disc, where seams do not show
             if whole == 1:
@@ -288,6 +289,10 @@ def _see_through(colour: Colour, part: float) -> tuple[int, int, int, int]:
     """Return a premultiplied colour."""
     red, green, blue = (round(c * part) for c in colour)
     return red, green, blue, round(255 * part)
+
+
+def _near(point: list[float], other: list[float]) -> bool:
+    return abs(point[0] - other[0]) < 1.0 and abs(point[1] - other[1]) < 1.0
 
 
 def _same(row: Array, other: Array) -> bool:
