@@ -16,7 +16,7 @@ import pymunk
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.compiled import call_c, kernel
 from robocov.observation.scans import headings
-from robocov.world import added_mover
+from robocov.world import obstacle_space
 from robocov.world.engine import addresses_of, function
 from robocov.world.solid import Mover
 
@@ -36,12 +36,10 @@ class RangeSensor:
 
     def __init__(self, pieces: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
         self._pieces, self._movers = pieces, movers
-        self._space = pymunk.Space()
-        for ring in pieces:
-            self._space.add(pymunk.Poly(self._space.static_body, ring.tolist()))
+        self._space = obstacle_space((pieces, movers, None))
         # an empty step builds the static index; queries never change the space
         self._space.step(1e-9)
-        self._bodies = [added_mover(self._space, mover) for mover in movers]
+        self._bodies = self._space.bodies
         self._failed: dict[tuple[float, float, float], pymunk.Circle] = {}
 
     def copy(self) -> RangeSensor:
@@ -65,7 +63,7 @@ class RangeSensor:
         """Return the closest solid point of each robot at (n, 2) m within its range, (n,) m; nan if none."""
         points = np.array(positions, dtype=float)
         if self._addresses is not None:
-            _nearest(self._addresses, points, ranges, np.empty(6))
+            _nearest(self._addresses, points, ranges)
         else:
             for row, (place, reach) in enumerate(zip(points.tolist(), ranges.tolist(), strict=True)):
                 found = self._space.point_query_nearest(tuple(place), min(reach, _FARTHEST), _ALL)
@@ -88,7 +86,7 @@ class RangeSensor:
         ends = positions[:, None, :] + limit[:, None, None] * headings(rays)
         fraction, hit = np.ones(ends.shape[:2]), np.zeros(ends.shape[:2], dtype=bool)
         if self._addresses is not None:
-            _first_met(self._addresses, np.array(positions), ends, fraction, hit, np.empty(6))
+            _first_met(self._addresses, np.array(positions), ends, fraction, hit)
         else:
             for row, (start, turn) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
                 for ray, end in enumerate(turn):
@@ -96,8 +94,8 @@ class RangeSensor:
                     if found is not None:
                         fraction[row, ray], hit[row, ray] = found.alpha, True
         distances = limit[:, None] * fraction
-        for array in (distances, hit):
-            array.setflags(write=False)
+        distances.setflags(write=False)
+        hit.setflags(write=False)
         return distances, hit
 
     @cached_property
@@ -108,14 +106,15 @@ class RangeSensor:
         queries = map(function, ("cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"))
         addresses, point = addresses_of(self._space._space, *queries), np.array([[0.25, 0.5]])
         expected = self._space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
-        _nearest(addresses, point, frozen([_FARTHEST]), np.empty(6))
+        _nearest(addresses, point, frozen([_FARTHEST]))
         same = bool(np.isnan(point[0, 0])) if expected is None else tuple(point[0]) == expected.point
         return addresses if same else None
 
 
 @kernel
-def _nearest(addresses: IntArray, points: Array, ranges: Array, answer: Array) -> None:
-    """Replace points by the nearest solid ones; `answer` is a cpPointQueryInfo: shape, point, ..."""
+def _nearest(addresses: IntArray, points: Array, ranges: Array) -> None:
+    """Replace points by the nearest solid ones."""
+    answer = np.empty(6)  # a cpPointQueryInfo: shape, point, ...
     for i in range(len(points)):
         reach = min(ranges[i], _FARTHEST)
         asked = (addresses[0], points[i, 0], points[i, 1], reach, 0, -1, answer.ctypes.data)
@@ -124,10 +123,9 @@ def _nearest(addresses: IntArray, points: Array, ranges: Array, answer: Array) -
 
 
 @kernel
-def _first_met(
-    addresses: IntArray, positions: Array, ends: Array, fraction: Array, hit: BoolArray, answer: Array
-) -> None:
-    """Set where segments meet something first; `answer` is a cpSegmentQueryInfo, which ends with the part."""
+def _first_met(addresses: IntArray, positions: Array, ends: Array, fraction: Array, hit: BoolArray) -> None:
+    """Set at which parts of them segments meet something first."""
+    answer = np.empty(6)  # a cpSegmentQueryInfo, which ends with the part
     for i in range(len(positions)):
         for k in range(ends.shape[1]):
             x, y = ends[i, k, 0], ends[i, k, 1]

@@ -332,16 +332,12 @@ def obstacle_space(obstacles: Obstacles) -> pymunk.Space:
         walls.append(pymunk.Circle(space.static_body, radius, (x, y)))
     space.add(*walls)
     for mover in movers:
-        for shape in added_mover(space, mover).shapes:
+        # where it is at time zero: its position is its shift
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        space.add(body, *[pymunk.Poly(body, ring.tolist()) for ring in mover.pieces])
+        for shape in body.shapes:
             shape.filter = _NO_WALL
     return space
-
-
-def added_mover(space: pymunk.Space, mover: Mover) -> pymunk.Body:
-    """Add an obstacle that moves to a space, where it is at time zero; its position is its shift."""
-    body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-    space.add(body, *[pymunk.Poly(body, ring.tolist()) for ring in mover.pieces])
-    return body
 
 
 def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
