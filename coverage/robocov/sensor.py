@@ -17,7 +17,7 @@ from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.compiled import call_c, kernel
 from robocov.observation.scans import headings
 from robocov.world import obstacle_space
-from robocov.world.engine import addresses_of, function
+from robocov.world.engine import addresses_of
 from robocov.world.solid import Mover
 
 _FARTHEST = 1e6
@@ -103,7 +103,7 @@ class RangeSensor:
         """The space and its queries for kernels; None where these cannot call them."""
         if not _IN_REGISTERS:
             return None
-        queries = map(function, ("cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"))
+        queries = "cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"
         addresses, point = addresses_of(self._space._space, *queries), np.array([[0.25, 0.5]])
         expected = self._space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
         _nearest(addresses, point, frozen([_FARTHEST]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from copy import deepcopy
+from copy import copy, deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -24,8 +24,7 @@ from robocov.observation.scans import Scanning, Scans
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
-from robocov.world import MAX_PENETRATION, World
-from robocov.world.changing_world import ChangingWorld
+from robocov.world import MAX_PENETRATION, ChangingWorld, World
 from robocov.world.relocation import check_starts
 from robocov.world.solid import movers, solid_pieces
 
@@ -91,9 +90,8 @@ class Simulation:
     ) -> None:
         positions = np.array(starts, dtype=float)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
-            raise StartError(
-                f"starts: an array of shape {positions.shape}, but (n, 2) with n of at least 1 was wanted"
-            )
+            wanted = "(n, 2) with n of at least 1 was wanted"
+            raise StartError(f"starts: an array of shape {positions.shape}, but {wanted}")
         self.team = Team.homogeneous(len(positions)) if team is None else team
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
@@ -305,8 +303,7 @@ class Simulation:
 
     def copy(self) -> Simulation:
         """Return an independent simulation in the same state; it goes on identically, bit for bit."""
-        twin = object.__new__(Simulation)
-        twin.__dict__.update(self.__dict__)
+        twin = copy(self)
         twin._world = self._world.copy()
         twin.memory = deepcopy(self.memory)
         if self._obstacles_change:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from copy import copy
 from functools import cached_property
 from typing import TypeAlias
 
@@ -27,11 +28,14 @@ from pymunk._chipmunk_cffi import lib
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inner_kernel, kernel
-from robocov.errors import ParameterError
+from robocov.conditions import Conditions
+from robocov.environment import Environment
+from robocov.errors import ParameterError, StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
 from robocov.world.engine import STATES, Engine, observed_step, substeps
-from robocov.world.solid import Mover
+from robocov.world.relocation import nearest_free
+from robocov.world.solid import Mover, movers, solid_pieces
 
 LONGEST_SUBSTEP = 0.02
 """Longest substep in seconds."""
@@ -111,9 +115,9 @@ class World:
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
-        twin = object.__new__(World)
-        # the engine, made anew when it is needed, is all that is changed in place
-        twin.__dict__.update({name: value for name, value in vars(self).items() if name != "_engine"})
+        twin = copy(self)
+        # the engine and the solver, made anew when they are needed, are all that is changed in place
+        vars(twin).pop("_engine", None)
         twin._contacts = None
         return twin
 
@@ -234,6 +238,95 @@ class World:
         speed = np.sqrt(np.maximum((velocity**2).sum(axis=1), limit[rows] ** 2))
         free[1, rows] = velocity * (limit[rows] / speed)[:, None]
         self._contacts = solver
+
+
+class ChangingWorld:
+    """A world whose robots fail and join: that of those that are there, made anew whenever that changes.
+
+    It has a row for every robot that ever is. One that failed is an obstacle from then on; one that has not
+    joined yet is nowhere, its position where it would start, or is to join. To make the world anew changes
+    nothing for the others, which go on the same from their positions and velocities alone.
+    """
+
+    def __init__(
+        self,
+        conditions: Conditions,
+        environment: Environment,
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        time: float = 0.0,
+    ) -> None:
+        self._conditions, self._environment, self.team = conditions, environment, team
+        self._pieces, self._movers = solid_pieces(environment), movers(environment)
+        self.positions = np.array(positions, dtype=float)
+        self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
+        self.working = conditions.working(time, len(team))
+        self._failed = conditions.failed(time, len(team))
+        for join in conditions.joins:
+            if join.place is not None and not (self.working | self._failed)[join.robot - 1]:
+                self.positions[join.robot - 1] = join.place
+        self._begin()
+
+    @property
+    def failed_robots(self) -> Array:
+        """x, y and radius of the robots that have failed, (w, 3) m."""
+        return np.column_stack([self.positions, self.team.radius])[self._failed]
+
+    def copy(self) -> ChangingWorld:
+        """Return an independent world in the same state, which goes on identically."""
+        twin = copy(self)
+        twin._world = None if self._world is None else self._world.copy()
+        return twin
+
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
+        """Move on as `World.step`; then robots fail and join. Raises StartError where one finds no room."""
+        rows, there, time_after = self._rows, self.working | self._failed, time + dt
+        self.positions, self.velocities = self.positions.copy(), np.zeros_like(self.velocities)
+        if self._world is not None:
+            external = None if external_forces is None else external_forces[rows]
+            self._world.step(forces[rows], dt, external, time=time)
+            self.positions[rows], self.velocities[rows] = self._world.positions, self._world.velocities
+        working = self._conditions.working(time_after, len(self.team))
+        failed = self._conditions.failed(time_after, len(self.team))
+        if (working != self.working).any() or (failed != self._failed).any():
+            self._failed = failed & there
+            for robot in np.flatnonzero(working & ~there).tolist():
+                self.positions[robot] = self._place(robot, there, time_after)
+                there[robot] = True
+            self.working = working
+            self.velocities[~working] = 0.0
+            self._begin()
+        self._protect()
+
+    def _place(self, robot: int, there: BoolArray, time: float) -> tuple[float, float]:
+        """Return where a robot joins, as near as it fits beside those that are there."""
+        radius, (x, y) = self.team.radius, self.positions[robot].tolist()
+        environment, others = self._environment.at(time), self.positions[there]
+        try:
+            return nearest_free(environment, float(radius[robot]), others, (x, y), radius[there])
+        except StartError:
+            raise StartError(
+                f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], but there is no room for it in "
+                f"map {self._environment.name!r}"
+            ) from None
+
+    def _begin(self) -> None:
+        """Make the world of the robots that work."""
+        self._protect()
+        rows = self._rows = np.flatnonzero(self.working)
+        # a team of none is no team
+        self._world: World | None = None
+        if len(rows):
+            state = self.team[rows], self.positions[rows], self.velocities[rows]
+            self._world = World(self._pieces, *state, movers=self._movers, failed_robots=self.failed_robots)
+
+    def _protect(self) -> None:
+        for array in (self.positions, self.velocities, self.working):
+            array.setflags(write=False)
 
 
 class ContactSolver:

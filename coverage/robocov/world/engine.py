@@ -20,9 +20,8 @@ _FUNCTIONS = (
     *("cpSpaceEachCachedArbiter", "pmSpaceArbiterIteratorFuncBatched"),
 )
 
+# with another layout of a pmFloatArray memory would be overwritten
 _LAYOUT = [("num", 0), ("max", 4), ("arr", 8)]
-"""Of a pmFloatArray; with another one memory would be overwritten."""
-
 if [(name, member.offset) for name, member in ffi.typeof("pmFloatArray").fields] != _LAYOUT:
     raise ImportError("this pymunk lays out its arrays in another way; 7.1 to 7.3 are known")
 
@@ -61,8 +60,7 @@ class Engine:
             for j, fields in enumerate((batch.BodyFields.FORCE, _STATE, _BODIES)):
                 each[j].fields = fields.value
                 each[j].floatArray, each[j].intArray = first + j % 2, self._touching
-            pointers = space._space, *map(function, _FUNCTIONS), each, each + 1, each + 2
-            addresses.append(addresses_of(*pointers))
+            addresses.append(addresses_of(space._space, *_FUNCTIONS, each, each + 1, each + 2))
         self.addresses = np.array(addresses)
         # what is only pointed to
         self._spaces, self._floats, self._batches = spaces, floats, batches
@@ -84,14 +82,10 @@ class Engine:
         return ffi.unpack(self._touching.arr, self._touching.num) if self._touching.num else []
 
 
-def function(name: str) -> Any:
-    """Return a C function of pymunk's engine."""
-    return ffi.addressof(lib, name)
-
-
 def addresses_of(*pointers: Any) -> IntArray:
-    """Return pointers as numbers, for `robocov.compiled.call_c`."""
-    return np.array([int(ffi.cast("intptr_t", each)) for each in pointers], dtype=np.intp)
+    """Return pointers, and C functions by their names, as numbers, for `robocov.compiled.call_c`."""
+    found = [ffi.addressof(lib, each) if isinstance(each, str) else each for each in pointers]
+    return np.array([int(ffi.cast("intptr_t", each)) for each in found], dtype=np.intp)
 
 
 @kernel

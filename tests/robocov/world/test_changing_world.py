@@ -12,8 +12,7 @@ from robocov.metrics import clearances, contacts, cost_history, summarise
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov.world import World
-from robocov.world.changing_world import ChangingWorld
+from robocov.world import ChangingWorld, World
 from robocov.world.solid import solid_pieces
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
