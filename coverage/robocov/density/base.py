@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -12,9 +13,6 @@ import shapely
 from robocov.arrays import Array
 from robocov.density.cell_edges import REGION, CellEdges
 from robocov.errors import ParameterError, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 HEAVIEST = 1e6
 """Largest value that a weight may have."""
@@ -33,8 +31,6 @@ class Density(ABC):
     ----------
     kind : str
         As map files call it.
-    lowest, highest : float
-        Between these all values lie.
     """
 
     kind: ClassVar[str]
@@ -57,12 +53,8 @@ class Density(ABC):
     def moments(self, edges: CellEdges, origins: Array) -> Array:
         """Return the integrals of φ, φ (q - o) and φ |q - o|² over n cells with origins o, (n, 4).
 
-        Parameters
-        ----------
-        edges : CellEdges
-            Of any closed polygons, holes clockwise: each edge relative to the origin of its cell.
-        origins : (n, 2) m
-            Of the n cells, the generators for Voronoi cells.
+        The cells are any closed polygons, holes clockwise, their edges relative to the origins, (n, 2) m;
+        for Voronoi cells these are the generators.
         """
 
     @property
@@ -75,13 +67,8 @@ class Density(ABC):
     ) -> tuple[Array, Array]:
         """Return M and C of equation (2), (n,) m² and (n, 2) m, with this density.
 
-        Parameters
-        ----------
-        edges : CellEdges
-        origins : (n, 2) m
-        area, centroid : (n,) m² and (n, 2) m
-            The same with density 1. Where a cell has no area, or φ is zero all over it, the centroid is
-            the latter: a cell whose mean density is below 1e-9 of the highest is filled up to that.
+        `area` and `centroid` are the same with density 1. Where a cell has no area, or φ is zero all over it,
+        the centroid is that one: a cell whose mean density is below 1e-9 of the highest is filled up to that.
         """
         moments = self.moments(edges, origins)
         mass = np.maximum(moments[:, 0], 0.0)
@@ -94,13 +81,7 @@ class Density(ABC):
 
 
 def check_weight(name: str, value: float, *, above: bool = False) -> None:
-    """Check a weight.
-
-    Raises
-    ------
-    ParameterError
-        When it is out of range.
-    """
+    """Raise a ParameterError when a weight is out of range."""
     if not ((value > 0.0 if above else value >= 0.0) and value <= HEAVIEST):
         wanted = f"a number {'above' if above else 'from'} 0 to {HEAVIEST:.0f}"
         raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
@@ -108,13 +89,7 @@ def check_weight(name: str, value: float, *, above: bool = False) -> None:
 
 @dataclass(frozen=True)
 class Uniform(Density):
-    """Every place counts the same: as no density at all, but for the unit of the cost.
-
-    Attributes
-    ----------
-    weight : float
-        Above 0.
-    """
+    """Every place has the same weight, above 0: as no density at all, but for the unit of the cost."""
 
     kind: ClassVar[str] = "uniform"
 
@@ -124,13 +99,11 @@ class Uniform(Density):
         check_weight("weight", self.weight, above=True)
 
     @property
-    def lowest(self) -> float:
-        """The weight."""
+    def lowest(self) -> float:  # noqa: D102
         return self.weight
 
     @property
-    def highest(self) -> float:
-        """The weight."""
+    def highest(self) -> float:  # noqa: D102
         return self.weight
 
     def value(self, points: Array) -> Array:
@@ -144,18 +117,14 @@ class Uniform(Density):
 
 def masses_of_polygons(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
     """Return the integral of φ over each of some valid polygons, (k,) m², their holes left out."""
-    pieces, owners, origins = [np.empty((0, 4))], [], np.zeros((len(polygons), 2))
-    for k, polygon in enumerate(polygons):
-        polygon = shapely.orient_polygons(polygon)
-        origins[k] = polygon.centroid.coords[0]
-        for ring in (polygon.exterior, *polygon.interiors):
-            points = shapely.get_coordinates(ring) - origins[k]
-            pieces.append(np.hstack([points[:-1], points[1:]]))
-            owners += [k] * (len(points) - 1)
-    ends = np.concatenate(pieces)
-    return np.maximum(
-        density.moments(_edges(ends[:, :2].copy(), ends[:, 2:].copy(), np.array(owners)), origins)[:, 0], 0.0
-    )
+    polygons = shapely.orient_polygons(polygons)
+    rings, owners = shapely.get_rings(polygons, return_index=True)
+    origins = shapely.get_coordinates(shapely.centroid(polygons))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    points -= origins[owners[ring]]
+    along = ring[1:] == ring[:-1]
+    edges = _edges(points[:-1][along], points[1:][along], owners[ring][:-1][along])
+    return np.maximum(density.moments(edges, origins)[:, 0], 0.0)
 
 
 def means_over_squares(density: Density, middles: Array, side: float) -> Array:

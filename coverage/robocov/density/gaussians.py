@@ -29,17 +29,9 @@ Matrix: TypeAlias = tuple[Point, Point]
 
 @dataclass(frozen=True)
 class Gaussian:
-    """One hot spot, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``.
+    """One hot spot, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``, its centre and σ in metres.
 
-    Attributes
-    ----------
-    center : (x, y) m
-    weight : float
-        What it adds at its centre, from 0.
-    sigma : float, m, or None
-        Its standard deviation where it is round; else
-    covariance : 2 x 2, m², or None
-        S, symmetric and positive definite.
+    Either the standard deviation σ is given, or the covariance S, m², symmetric and positive definite.
     """
 
     center: Point
@@ -95,16 +87,8 @@ class Gaussian:
 
 @dataclass(frozen=True)
 class Gaussians(Density):
-    """A sum of hot spots over a floor. Its integrals are closed forms of erf and of Owen's T function.
+    """A sum of hot spots over a floor, from 0. Its integrals are closed forms of erf and Owen's T function.
 
-    Attributes
-    ----------
-    peaks : tuple of Gaussian
-    floor : float
-        What every place counts without them, from 0.
-
-    Examples
-    --------
     >>> density = Gaussians((Gaussian((2.0, 0.0), weight=3.0, sigma=1.0),), floor=0.5)
     >>> density.value(np.array([[2.0, 0.0], [9.0, 0.0]])).round(6)
     array([3.5, 0.5])
@@ -122,16 +106,13 @@ class Gaussians(Density):
 
     @property
     def lowest(self) -> float:
-        """The floor."""
         return self.floor
 
     @property
     def highest(self) -> float:
-        """The floor and all weights."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def value(self, points: Array) -> Array:
-        """Return φ at (k, 2) points in metres, (k,)."""
         points, total = np.asarray(points, dtype=float), np.full(len(points), float(self.floor))
         for peak in self.peaks:
             x, y = peak._standard(points - np.array(peak.center)).T
@@ -139,7 +120,6 @@ class Gaussians(Density):
         return total
 
     def moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Return mass, first and polar moments of cells about their origins."""
         total = self.floor * edges.moments(len(origins))
         for peak in self.peaks:
             total += peak._moments(edges, origins)
@@ -172,16 +152,8 @@ def _edge_integrals(start: Array, end: Array) -> Array:
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
     de0 = d * e0
-    parts = np.stack(
-        [
-            turn,
-            -nx * e0,
-            -ny * e0,
-            nx * (nx * de0 + tx * e1),
-            ny * (nx * de0 + tx * e1),
-            ny * (ny * de0 + ty * e1),
-        ]
-    )
+    xx, xy, yy = nx * (nx * de0 + tx * e1), ny * (nx * de0 + tx * e1), ny * (ny * de0 + ty * e1)
+    parts = np.stack([turn, -nx * e0, -ny * e0, xx, xy, yy])
     parts[:, ~long] = 0.0
     parts[0, ~apart] = 0.0
     return parts

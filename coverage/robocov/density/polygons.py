@@ -35,17 +35,9 @@ _NODE = 0.5 - 0.5 / 3.0**0.5
 
 @dataclass(frozen=True)
 class WeightedArea:
-    """A polygon in which every place counts the same.
+    """A polygon in which every place has the same weight, from 0.
 
-    Attributes
-    ----------
-    vertices : ring of [x, y], m
-        Either way round, the first not repeated.
-    weight : float
-        From 0.
-    holes : tuple of rings
-        Not part of it.
-    name : str or None
+    The rings, of [x, y] in metres, run either way round; their first vertices are not repeated.
     """
 
     vertices: Ring
@@ -66,12 +58,7 @@ class WeightedArea:
 class WeightedPolygons(Density):
     """A density that is constant in polygons, and outside them all. Its integrals are exact.
 
-    Attributes
-    ----------
-    areas : tuple of WeightedArea
-        Where some overlap, the last of them counts.
-    background : float
-        What a place outside them all counts, from 0.
+    Where areas overlap, the last of them counts; outside them all, the background, from 0.
     """
 
     kind: ClassVar[str] = "polygons"
@@ -86,12 +73,10 @@ class WeightedPolygons(Density):
 
     @property
     def lowest(self) -> float:
-        """The smallest weight."""
         return min([self.background, *(area.weight for area in self.areas)])
 
     @property
     def highest(self) -> float:
-        """The largest weight."""
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
@@ -101,23 +86,19 @@ class WeightedPolygons(Density):
         for area in reversed(self.areas):  # the last ones are on top
             seen = shapely.difference(area.polygon, above) if not above.is_empty else area.polygon
             above = shapely.union(above, area.polygon)
-            for part in shapely.get_parts(seen):
-                if part.geom_type != "Polygon" or part.is_empty:
-                    continue
-                part = shapely.orient_polygons(part)
-                for ring in (part.exterior, *part.interiors):
-                    points = shapely.get_coordinates(ring)
-                    start, end = points[:-1], points[1:]
-                    falls = start[:, 1:] > end[:, 1:]
-                    low, high = np.where(falls, end, start), np.where(falls, start, end)
-                    # the inside of a polygon lies to the left of an edge that rises
-                    jump = np.where(falls, 1.0, -1.0) * (area.weight - self.background)
-                    pieces.append(np.hstack([low, high, jump]))
+            # of what is no polygon there are no rings
+            for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(seen))):
+                points = shapely.get_coordinates(ring)
+                start, end = points[:-1], points[1:]
+                falls = start[:, 1:] > end[:, 1:]
+                low, high = np.where(falls, end, start), np.where(falls, start, end)
+                # the inside of a polygon lies to the left of an edge that rises
+                jump = np.where(falls, 1.0, -1.0) * (area.weight - self.background)
+                pieces.append(np.hstack([low, high, jump]))
         jumps = np.concatenate(pieces)
         return np.asarray(jumps[(jumps[:, 1] < jumps[:, 3]) & (jumps[:, 4] != 0.0)])
 
     def value(self, points: Array) -> Array:
-        """Return φ at (k, 2) points in metres, (k,)."""
         x, y = np.asarray(points, dtype=float).T
         value = np.full(len(x), float(self.background))
         for area in self.areas:
@@ -125,7 +106,6 @@ class WeightedPolygons(Density):
         return value
 
     def moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Return mass, first and polar moments of cells about their origins."""
         total = self.background * edges.moments(len(origins))
         _add_steps(self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins), total)
         return total

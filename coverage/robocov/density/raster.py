@@ -62,9 +62,8 @@ class Raster(Density):
             wanted = "[x_min, y_min, x_max, y_max] with a width and a height was wanted"
             raise ParameterError(f"extent: {shown(self.extent)}, but {wanted}")
         if self.interpolation not in ("bilinear", "cells"):
-            raise ParameterError(
-                f"interpolation: {shown(self.interpolation)}, but bilinear or cells was wanted"
-            )
+            wanted = "bilinear or cells was wanted"
+            raise ParameterError(f"interpolation: {shown(self.interpolation)}, but {wanted}")
         object.__setattr__(self, "values", values)
 
     def __eq__(self, other: object) -> bool:
@@ -82,16 +81,13 @@ class Raster(Density):
 
     @property
     def lowest(self) -> float:
-        """The smallest value."""
         return float(self.values.min())
 
     @property
     def highest(self) -> float:
-        """The largest value."""
         return float(self.values.max())
 
     def value(self, points: Array) -> Array:
-        """Return φ at (k, 2) points in metres, (k,)."""
         grid = _grid(self)
         u, v = ((np.asarray(points, dtype=float) - grid.origin) / grid.step).T
         rows, columns = grid.coefficients.shape[1:]
@@ -102,7 +98,6 @@ class Raster(Density):
         return np.asarray(a + b * xi + (c + d * xi) * eta)
 
     def moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Return mass, first and polar moments of cells about their origins."""
         grid = _grid(self)
         at = (origins - grid.origin)[edges.cell]
         start, end = (edges.start + at) / grid.step, (edges.end + at) / grid.step
@@ -121,21 +116,16 @@ class _Grid(NamedTuple):
     Places are measured in steps of the grid, from its lower left corner. In the cell of column i and row j
     it is ``a + b ξ + c η + d ξ η``, with ξ and η from 0 to 1. The outermost cells reach to infinity; there
     b and c are such that nothing changes outwards.
-
-    Attributes
-    ----------
-    origin, step : (2,) m
-    coefficients : (4, rows, columns)
-        a, b, c, d.
-    left : (3, 2, rows, columns)
-        Integrals of φ, u φ and u² φ over the part of a row to the left of each cell, at η = 0, and by how
-        much they grow to η = 1.
     """
 
     origin: Array
+    """(2,) m, as the `step`."""
     step: Array
     coefficients: Array
+    """(4, rows, columns) a, b, c, d."""
     left: Array
+    """(3, 2, rows, columns) Integrals of φ, u φ and u² φ over the part of a row to the left of each cell, at
+    η = 0, and by how much they grow to η = 1."""
 
 
 # ten times as large as the picture; while one is painted there are many, and all but the last few are past
@@ -227,12 +217,7 @@ def _crossed(line: int, begin: float, along: float, lines: int) -> float:
 def sampled(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
     """Return a bilinear raster with the values of a density at the middles of its cells.
 
-    Parameters
-    ----------
-    density : Density or None
-        None counts as 1 everywhere.
-    extent : (x_min, y_min, x_max, y_max) m
-    columns, rows : int
+    No density counts as 1 everywhere. The extent is (x_min, y_min, x_max, y_max) in metres.
     """
     x_min, y_min, x_max, y_max = extent
     x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)

@@ -31,14 +31,9 @@ TOUCHING = 1e-3
 MOVING_RATE = 1.0
 """Samples of the coverage cost per simulated second, at most, where obstacles move."""
 
-STUCK_WINDOW = 5.0
-"""Seconds at the end over which a stuck robot gets nowhere."""
-
-STUCK_DISTANCE = 0.05
-"""Metres that a stuck robot may get in `STUCK_WINDOW`."""
-
-STUCK_AWAY = 0.5
-"""Metres that a stuck robot is away from its goal, at least."""
+_STUCK_WINDOW, _STUCK_DISTANCE, _STUCK_AWAY = 5.0, 0.05, 0.5
+"""Seconds over which a stuck robot gets nowhere; metres that it may get in these, and that it is away from
+its goal, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +68,10 @@ class CostHistory(Drawable):
 def cost_history(
     record: Record, cost: CoverageCost, rate: float = 10.0, on_sample: Callable[[], None] | None = None
 ) -> CostHistory:
-    """Evaluate the coverage cost along a record.
+    """Evaluate the coverage cost, of the record's environment, along a record.
 
-    Robots count while they work, and obstacles that move stand where they are at each moment.
-
-    Parameters
-    ----------
-    record : Record
-    cost : CoverageCost
-        Of the record's environment.
-    rate : float, Hz
-        Samples per simulated second; the last moment is always one. At most `MOVING_RATE` where obstacles
-        move, for each moment then has a map of its own.
-    on_sample : callable
-        Called after every evaluation, for progress.
+    Robots count while they work, and obstacles that move stand where they are at each moment. `rate` is in
+    samples per simulated second, see `sample_moments`; `on_sample` is called after every evaluation.
     """
     moments = sample_moments(record, rate)
     rows = np.empty((len(moments), 3))
@@ -107,7 +92,7 @@ def cost_history(
 def sample_moments(record: Record, rate: float) -> list[int]:
     """Return the numbers of the moments nearest to multiples of 1/rate seconds, and of the last.
 
-    Where obstacles move, the rate is `MOVING_RATE` at most.
+    Where obstacles move, the rate is `MOVING_RATE` at most: each moment then has a map of its own.
     """
     rate = min(rate, MOVING_RATE) if record.environment.moves else rate
     return [int(k) for k in nearest_moments(record.time, rate)]
@@ -129,10 +114,7 @@ def settled_at(
         return None
     moved = positions[span:] - positions[:-span]
     far = (np.sqrt((moved**2).sum(axis=-1)) >= distance).any(axis=1)
-    restless = np.flatnonzero(far)
-    if len(restless) == 0:
-        return float(time[0])
-    first = int(restless[-1]) + 1
+    first = int(np.flatnonzero(far).max(initial=-1)) + 1
     return float(time[first]) if first < len(far) else None
 
 
@@ -152,35 +134,21 @@ def mean_over_run(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time)) / duration if duration else float(values[-1])
 
 
-def stuck_robots(
-    time: Array,
-    positions: Array,
-    goals: Array,
-    window: float = STUCK_WINDOW,
-    distance: float = STUCK_DISTANCE,
-    away: float = STUCK_AWAY,
-) -> int | None:
+def stuck_robots(time: Array, positions: Array, goals: Array) -> int | None:
     """Return how many robots are stuck at the end: far from their goals, and no longer on the way there.
 
-    A robot is stuck when it is more than `away` metres from its goal and its net displacement over the
-    last `window` seconds is below `distance` metres. None where no robot has a goal, or the run is shorter
-    than the window.
-
-    Parameters
-    ----------
-    time : (T,) s
-        Ascending.
-    positions, goals : (T, n, 2) m
-        Goals are nan where there is none.
+    A robot is stuck when it is more than 0.5 m from its goal and its net displacement over the last 5 s is
+    below 0.05 m. None where no robot has a goal, or the run is shorter than that. Positions and goals are
+    (T, n, 2) m, at times (T,) s; a goal is nan where there is none.
     """
-    before = float(time[-1]) - window
+    before = float(time[-1]) - _STUCK_WINDOW
     # half a microsecond forgives the rounding of sums of steps
     if np.isnan(goals[-1]).any(axis=1).all() or before < float(time[0]) - 5e-7:
         return None
     k = int(np.searchsorted(time, before + 5e-7, side="right")) - 1
     moved = np.sqrt(((positions[-1] - positions[k]) ** 2).sum(axis=-1))
     left = np.sqrt(((goals[-1] - positions[-1]) ** 2).sum(axis=-1))
-    return int(((moved < distance) & (left > away)).sum())
+    return int(((moved < _STUCK_DISTANCE) & (left > _STUCK_AWAY)).sum())
 
 
 def clearances(record: Record) -> Array:
@@ -231,13 +199,9 @@ def contacts(record: Record, clearance: Array) -> int:
 
 
 def robot_gaps(record: Record) -> tuple[Array, int]:
-    """Return the gaps between two working robots' rims, and how many times two began to touch.
+    """Return the smallest gap between two working robots' rims, and how many times two began to touch.
 
-    Returns
-    -------
-    (T,) m
-        The smallest at each moment, inf where there are no two robots.
-    int
+    The gap is that of each moment, (T,) m, inf where there are no two robots.
     """
     places = np.where(record.working[:, :, None], record.positions, np.nan)
     closest = np.full(len(places), np.inf)

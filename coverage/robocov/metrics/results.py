@@ -39,18 +39,10 @@ _SHOWN_ROWS = 10
 class Results:
     """The table of a sweep, one row a run, and the folders of the runs; all is read when it is asked for.
 
-    Attributes
-    ----------
-    folder : Path
-        Of the sweep.
-    dataset : pyarrow Dataset
-        The table.
-    columns : tuple of str
-        Where a run stands (``map``, ``controller``, ``robots``, ``start``, ``seed``), gains and whatever else
-        was varied; figures with their units; ``run``, the name of its folder, and ``error``.
+    `dataset` is the table as pyarrow knows it, with the `columns`: where a run stands (``map``,
+    ``controller``, ``robots``, ``start``, ``seed``), gains and whatever else was varied; figures with their
+    units; ``run``, the name of its folder, and ``error``.
 
-    Examples
-    --------
     >>> results = read_results("study")  # doctest: +SKIP
     >>> results.to_pandas().groupby("controller")["mean_distance_m"].median()  # doctest: +SKIP
     """
@@ -76,33 +68,22 @@ class Results:
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from error
 
-    def to_table(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> pa.Table:  # noqa: A002 - as pyarrow calls it
-        """Return the rows as a pyarrow Table.
+    def to_table(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> pa.Table:
+        """Return rows as a pyarrow Table, by default all, with all columns.
 
-        Parameters
-        ----------
-        columns : sequence of str or None
-            By default all.
-        filter : pyarrow.compute Expression or None
-            Which rows, as in ``pyarrow.compute.field("robots") == 6``; by default all.
-
-        Raises
-        ------
-        InputError
-            When there is no such column; the message gives the nearest.
+        A filter is as in ``pyarrow.compute.field("robots") == 6``. Raises InputError when there is no such
+        column; the message gives the nearest.
         """
         return self.dataset.to_table(columns=self._known(columns), filter=filter)
 
-    def to_pandas(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> DataFrame:  # noqa: A002 - as pyarrow calls it
+    def to_pandas(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> DataFrame:
         """Return the rows as a data frame, as `to_table`; pandas comes with ``robocov[pandas]``."""
         extra("pandas", "pandas")
         frame: DataFrame = self.to_table(columns, filter).to_pandas()
         return frame
 
     def batches(
-        self,
-        columns: Sequence[str] | None = None,
-        filter: Expression | None = None,  # noqa: A002 - as pyarrow calls it
+        self, columns: Sequence[str] | None = None, filter: Expression | None = None
     ) -> Iterator[pa.RecordBatch]:
         """Yield the rows part by part, in order; the parameters are those of `to_table`."""
         yield from self.dataset.to_batches(columns=self._known(columns), filter=filter)
@@ -117,15 +98,8 @@ class Results:
     def record(self, run: str | int | Mapping[str, Any]) -> Record:
         """Return the record of a run; its moments are as far apart as the study wanted it.
 
-        Parameters
-        ----------
-        run : str, int or dict
-            The name of its folder, the number of its row, or the row.
-
-        Raises
-        ------
-        InputError
-            When there is no such run, or it failed.
+        A run is named by its folder, the number of its row, or the row. Raises InputError when there is no
+        such run, or it failed.
         """
         return Record.load(self._folder_of(run))
 
@@ -178,12 +152,8 @@ class Results:
 def read_results(folder: Path | str) -> Results:
     """Return the results in the folder of a sweep.
 
-    While the sweep is still going on, or was killed, they are those in ``results.csv``, which grows.
-
-    Raises
-    ------
-    InputError
-        When the folder holds no sweep, or its table cannot be read.
+    While the sweep is still going on, or was killed, they are those in ``results.csv``, which grows. Raises
+    InputError when the folder holds no sweep, or its table cannot be read.
     """
     from pyarrow import ArrowException
     from pyarrow import dataset as datasets

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, counted, shown
 from robocov.metrics import CostHistory, clearances, robot_gaps
-from robocov.metrics.sight import Covered, covered
+from robocov.metrics.sight import covered
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record, nearest_moments
 
@@ -57,11 +58,8 @@ class RunMetrics:
         Integral of |F|² over the time so far, summed over the robots.
     path_length : (K,) m
         Way so far, mean over the robots.
-    components : (K,)
-        Into how many parts the team falls that hear each other, directly or by way of others.
-    algebraic_connectivity : (K,)
-        Second smallest eigenvalue of the Laplacian of the graph of who hears whom: 0 where it falls apart,
-        n where all n robots hear each other.
+    components, algebraic_connectivity : (K,)
+        Of the graph of who hears whom, as `connections` returns them.
     wall_clearance, robot_clearance : (K,) m
         Smallest gap between a robot's rim and a wall, or the rims of two robots, since the moment before;
         inf where there is none.
@@ -107,21 +105,10 @@ class RunMetrics:
 def run_metrics(
     record: Record, rate: float = RATE, on_sample: Callable[[], None] | None = None
 ) -> RunMetrics:
-    """Measure a run.
+    """Measure a run, `rate` times a second and at its last moment; `on_sample` is called after each.
 
-    Parameters
-    ----------
-    record : Record
-        Energy and ways are integrated over all of its moments.
-    rate : float, Hz
-        How often the rest is measured; the last moment is always one.
-    on_sample : callable
-        Called after every moment, for progress.
-
-    Raises
-    ------
-    ParameterError
-        When the rate is negative or not finite.
+    Energy and ways are integrated over all moments of the record. Raises ParameterError when the rate is
+    negative or not finite.
     """
     if not 0.0 <= rate < np.inf:
         raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
@@ -129,18 +116,17 @@ def run_metrics(
     team, working = record.team, record.working
     since = np.concatenate([[0], moments[:-1] + 1])
     work, effort, way = _integrals(record)
-    areas, parts, connectivity = [], [], []
+    areas, graphs = [], []
     for k in moments.tolist():
         some = np.flatnonzero(working[k])
         places = record.positions[k, some]
         free = record.environment.at(float(record.time[k])).free
         areas.append(covered(free, places, team.sensing_range[some]))
-        found = connections(places, team.communication_range[some])
-        parts.append(found[0])
-        connectivity.append(found[1])
+        graphs.append(connections(places, team.communication_range[some]))
         if on_sample is not None:
             on_sample()
-    sensed, within, visible = np.array(areas).reshape(-1, len(Covered._fields)).T
+    sensed, within, visible = np.array(areas).T
+    parts, connectivity = np.array(graphs).T
     return RunMetrics(
         time=record.time[moments],
         sensed_area=sensed,
@@ -149,8 +135,8 @@ def run_metrics(
         work=work[moments],
         effort=effort[moments],
         path_length=way[moments],
-        components=np.array(parts, dtype=np.intp),
-        algebraic_connectivity=np.array(connectivity),
+        components=parts.astype(np.intp),
+        algebraic_connectivity=connectivity,
         wall_clearance=np.minimum.reduceat(clearances(record).min(axis=1), since),
         robot_clearance=np.minimum.reduceat(robot_gaps(record)[0], since),
         free_area=float(record.environment.free_area),
@@ -160,8 +146,9 @@ def run_metrics(
 def connections(places: Array, ranges: Array) -> tuple[int, float]:
     """Return the number of components of the graph of who hears whom, and its algebraic connectivity.
 
-    Two robots hear each other when they are in range of each other. The graph of one robot has the algebraic
-    connectivity 0, that of none no component.
+    Two robots hear each other when they are in range of each other. The algebraic connectivity is the second
+    smallest eigenvalue of the graph's Laplacian: 0 where it falls apart or there is one robot, n where all n
+    robots hear each other.
 
     Source: M. Fiedler, *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
 
@@ -175,12 +162,11 @@ def connections(places: Array, ranges: Array) -> tuple[int, float]:
     if neighbours.complete:
         return 1, float(n) if n > 1 else 0.0
     one, other, _ = neighbours.closer_than(places, np.inf)
-    laplacian = np.zeros((n, n))
-    laplacian[one, other] = -1.0
-    laplacian[np.arange(n), np.arange(n)] = -laplacian.sum(axis=1)
-    parts = int(connected_components(laplacian, directed=False)[0])
+    parts = int(connected_components(coo_array((np.ones(len(one)), (one, other)), (n, n)), directed=False)[0])
     if n == 1 or parts > 1:
         return parts, 0.0
+    laplacian = np.diag(np.bincount(one).astype(float))
+    laplacian[one, other] = -1.0
     # whole numbers in the matrix: what is less than this is rounding
     return parts, round(float(np.linalg.eigvalsh(laplacian)[1]), 12)
 
@@ -192,7 +178,7 @@ def time_near_final(history: CostHistory, part: float = NEAR_FINAL) -> float:
     """
     cost = history.mean_distance
     away = np.flatnonzero(~(np.abs(cost - cost[-1]) <= part * cost[-1]))
-    return float(history.time[0] if not len(away) else history.time[min(away[-1] + 1, len(cost) - 1)])
+    return float(history.time[min(away.max(initial=-1) + 1, len(cost) - 1)])
 
 
 def figures_of(record: Record, history: CostHistory) -> Mapping[str, float | None]:
