@@ -12,13 +12,8 @@ from pathlib import Path
 
 from robocov.errors import OutputError, reason, shown
 
-_KINDS = (
-    (stat.S_ISDIR, "a folder"),
-    (stat.S_ISFIFO, "a named pipe"),
-    (stat.S_ISSOCK, "a socket"),
-    (stat.S_ISCHR, "a device"),
-    (stat.S_ISBLK, "a device"),
-)
+_KINDS = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
+"""What is no regular file, by the first character of its mode."""
 _LONGEST_SUFFIX = 16
 """Characters; what is longer is no suffix that a writer goes by."""
 
@@ -29,8 +24,6 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
 
     The path has the suffix of `target`, for writers that go by it. A `durable` file is on the disk before it
     gets its name. Through a link, the file that it points to is replaced, not the link; its permissions stay.
-
-    Raises `OutputError` when the file cannot be written, or `target` is something else than a file.
     """
     real = writable(target)
     suffix = target.suffix if len(target.suffix) < _LONGEST_SUFFIX else ""
@@ -50,7 +43,7 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
 
 
 def writable(target: Path) -> Path:
-    """Return the file that is replaced where `target` is written: `target`, or what it is a link to.
+    """Return the file that is replaced where `target` is written, which may be a link to it.
 
     Raises `OutputError` when that is no regular file, a link that leads nowhere, or cannot be looked at.
     """
@@ -64,7 +57,7 @@ def writable(target: Path) -> Path:
     except (OSError, RuntimeError, ValueError) as error:  # a circle of links was a RuntimeError before 3.13
         raise _refused(target, f"cannot be written: {reason(error)}") from error
     if not stat.S_ISREG(mode):
-        kind = next((words for test, words in _KINDS if test(mode)), "something else")
+        kind = _KINDS.get(stat.filemode(mode)[0], "something else")
         raise _refused(target, f"is {kind}, but a file was wanted")
     return real
 
@@ -83,16 +76,16 @@ def on_disk(paths: Iterable[Path]) -> None:
 
 
 def _on_disk(path: Path) -> None:
-    if not path.is_dir():
+    if path.is_dir():
+        with suppress(OSError):  # not every system knows that of folders
+            descriptor = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+    else:
         with path.open("rb+") as file:
             os.fsync(file.fileno())
-        return
-    with suppress(OSError):  # not every system knows that of folders
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 @contextmanager

@@ -66,10 +66,7 @@ class ResultFolder:
             self.commit()
 
     def commit(self) -> None:
-        """Put what is made in the place of the earlier result; or beside it, where it replaces none.
-
-        An OutputError says why that cannot be done: also where a file of somebody else is in the way.
-        """
+        """Put what is made in the place of the earlier result; or beside it, where it replaces none."""
         with _telling(self.path):
             staging = self.path / _STAGING
             made = {path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()}
@@ -100,9 +97,8 @@ def results(
     A missing folder is made; if nothing comes into it, it goes again. `overwrite` replaces the result that is
     there; `parts` names the folders of a comparison's runs.
 
-    Raises `InputError` when the folder is not empty and `overwrite` is not given, or what is in it is no
-    result, and `OutputError` when it cannot be made or written to, another process is at work in it, or a
-    file of somebody else has the name of a file of the result.
+    Raises `InputError` when what is in the folder may not be replaced, `OutputError` when it cannot be used,
+    another process is at work in it, or a file of somebody else is in the way.
     """
     with _telling(folder):
         existed = folder.exists()
@@ -127,10 +123,7 @@ def results(
 
 @contextmanager
 def extended(folder: Path) -> Iterator[ResultFolder]:
-    """Give the folder of a result, or of one run of a comparison, to which files are added.
-
-    Raises an InputError where there is no result in it, and what `results` raises.
-    """
+    """Give the folder of a result, or of one run of a comparison, to which files are added."""
     home, part = _home(folder)
     with _held(home):
         with _telling(home):
@@ -145,8 +138,7 @@ def extended(folder: Path) -> Iterator[ResultFolder]:
 def settle(folder: Path) -> None:
     """Complete the commit of a result that was interrupted; to be called before the result is read.
 
-    Raises `InputError` when it cannot be known what is left to be done, and `OutputError` when it cannot be
-    done, as another process is at work in the folder or nobody may write to it.
+    Raises `InputError` when it cannot be known what is left to be done, `OutputError` when it cannot be done.
     """
     if os.path.lexists(folder / _JOURNAL):
         with locked(folder, _LOCK, remove=True), _telling(folder):
@@ -240,10 +232,8 @@ def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
         raise InputError(f"{folder}: belongs to the comparison in {home}; another --out was wanted")
     owned = _owned(folder)
     if owned is None:
-        raise InputError(
-            f"{folder}: what is in the folder is no result of robocov, so --overwrite leaves it alone; "
-            f"another --out was wanted"
-        )
+        what = "what is in the folder is no result of robocov, so --overwrite leaves it alone"
+        raise InputError(f"{folder}: {what}; another --out was wanted")
     return owned
 
 
@@ -315,9 +305,8 @@ def _require_free(folder: Path, name: str, owned: set[str]) -> None:
     """Make sure that a file of the result may be written or removed: that it is nobody else's."""
     path = _inside(folder, name)
     if os.path.lexists(path) and not (name in owned and _is_file(path)):
-        raise OutputError(
-            f"{path}: is in the way, and does not belong to the result; another --out was wanted"
-        )
+        what = "is in the way, and does not belong to the result"
+        raise OutputError(f"{path}: {what}; another --out was wanted")
 
 
 def _inside(folder: Path, name: str) -> Path:

@@ -10,13 +10,14 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache, cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions
-from robocov.controllers import gain_values, short_name
+from robocov.controllers import Controller, gain_values, short_name
+from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, counted, reason, shown
@@ -30,12 +31,6 @@ from robocov.observation.neighbours import Neighbours
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
-
-    from robocov.controllers.base import Controller
-    from robocov.controllers.gains import Value
 
 _COLUMNS = {
     "positions": ("x_m", "y_m"),
@@ -183,7 +178,7 @@ class Record(Drawable):
         """Return the record of some of the moments; its arrays are copies."""
         return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> Any:
         """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
 
         The columns are time_s, robot (from 0; pictures number robots from 1), x_m, y_m, vx_m_s, vy_m_s, fx_N,
@@ -197,8 +192,7 @@ class Record(Drawable):
         }
         for array, names in _COLUMNS.items():
             columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
-        frame: DataFrame = pandas.DataFrame(columns)
-        return frame
+        return pandas.DataFrame(columns)
 
     def to_json(
         self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
