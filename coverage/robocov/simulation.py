@@ -281,15 +281,8 @@ class Simulation:
             self.step()
             yield self.snapshot
 
-    def run(
-        self,
-        duration: float,
-        *,
-        start: str | None = None,
-        seed: int | None = None,
-        on_snapshot: Callable[[Snapshot], None] | None = None,
-    ) -> Record:
-        """Run for `duration` seconds and return the whole of it; `on_snapshot` is called for progress.
+    def run(self, duration: float, *, start: str | None = None, seed: int | None = None) -> Record:
+        """Run for `duration` seconds and return the whole of it.
 
         `start` and `seed` say where the starts came from, for the record.
         """
@@ -297,8 +290,6 @@ class Simulation:
         recorder = Recorder(*given, start=start, seed=seed, conditions=self.conditions)
         for snapshot in self.snapshots(duration):
             recorder.add(snapshot)
-            if on_snapshot is not None:
-                on_snapshot(snapshot)
         return recorder.record()
 
     def copy(self) -> Simulation:

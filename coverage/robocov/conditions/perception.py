@@ -32,16 +32,16 @@ class Perception:
     """Turns what is there into what the robots know: row i still belongs to robot i alone."""
 
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
-        self._conditions, self._dt = conditions, dt
+        self._conditions, self._ranges, self._dt = conditions, team.communication_range, dt
         self._robots = np.arange(len(team))
-        self._radio = Radio(conditions, team.communication_range, dt) if conditions.talks else None
-        self._position_chance = Draws(conditions.seed, POSITION)
-        self._sensing_chance = Draws(conditions.seed, SENSING)
-        self._scanning_chance = Draws(conditions.seed, SCANNING)
+        self._delay = math.ceil(conditions.delay / dt - SOON)
+        streams = POSITION, SENSING, SCANNING, LOSS
+        chances = [Draws(conditions.seed, stream) for stream in streams]
+        self._position_chance, self._sensing_chance, self._scanning_chance, self._loss_chance = chances
 
     def begin(self) -> Inbox | None:
         """Return what the robots have heard before the first step; None where communication is ideal."""
-        return None if self._radio is None else Inbox.empty(len(self._robots))
+        return Inbox.empty(len(self._robots)) if self._conditions.talks else None
 
     def known(
         self, seen: Observations, inbox: Inbox | None, working: BoolArray
@@ -54,10 +54,10 @@ class Perception:
             points = np.where(working[:, None], points, np.nan)
         points.setflags(write=False)
         seen = replace(seen, positions=positions, obstacle_points=points, scans=self._scanned(step, seen))
-        if self._radio is None or inbox is None:
+        if inbox is None or not self._conditions.talks:
             return replace(seen, neighbours=seen.neighbours.among(working)), None
-        inbox = self._radio.exchange(inbox, step, positions, truth, working)
-        neighbours, places, ages = self._radio.reports(inbox, step, working)
+        inbox = self.exchange(inbox, step, positions, truth, working)
+        neighbours, places, ages = self.reports(inbox, step, working)
         return replace(seen, neighbours=neighbours, reported_positions=places, report_ages=ages), inbox
 
     def _estimated(self, step: int, positions: Array) -> Array:
@@ -93,6 +93,55 @@ class Perception:
         distances = np.where(scans.hit, np.maximum(scans.distances + error, NEAREST), scans.distances)
         distances.setflags(write=False)
         return replace(scans, distances=distances)
+
+    def exchange(self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray) -> Inbox:
+        """Return what the robots have once messages were sent and delivered at a step since time zero.
+
+        Robots tell where they believe themselves to be, (n, 2) m; where they are says who is in range.
+        """
+        on_the_way = inbox.on_the_way
+        if self._sends(step):
+            reaches = self._reached(step, positions, working)
+            on_the_way = (*on_the_way, Broadcast(step + self._delay, step, np.array(told), reaches))
+        due = [each for each in on_the_way if each.arrives <= step]
+        if not due:
+            return replace(inbox, on_the_way=on_the_way)
+        sent, arrived, places = inbox.sent.copy(), inbox.arrived.copy(), inbox.places.copy()
+        for each in due:
+            sent[each.reaches], arrived[each.reaches] = each.sent, each.arrives
+            receiver, sender = np.nonzero(each.reaches)
+            places[receiver, sender] = each.places[sender]
+        return Inbox(sent, arrived, places, on_the_way[len(due) :])
+
+    def reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+        """Return of whom robots that work have a message that is not forgotten, what it said, and its age.
+
+        These are (m, 2) m and (m,) s, in the order of the neighbours' ``indices``.
+        """
+        silence = (step - inbox.arrived) * self._dt
+        known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + SOON)
+        robot, neighbour = np.nonzero(known & working[:, None])
+        neighbours = Neighbours.of_pairs(len(known), robot, neighbour, self._ranges)
+        ages = (step - inbox.sent[robot, neighbour]) * self._dt
+        return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
+
+    def _sends(self, step: int) -> bool:
+        """Whether messages are sent at a step: at time zero, and whenever a period has passed."""
+        rate = self._conditions.message_rate
+        if rate is None:
+            return True
+        period = self._dt * rate
+        return math.floor(step * period + SOON) > math.floor((step - 1) * period + SOON)
+
+    def _reached(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
+        """Return whom a message of each robot gets to, (receiver, sender) bool."""
+        receiver, sender = Neighbours.within(positions, self._ranges).among(working).pairs()
+        reaches = np.zeros((len(positions), len(positions)), dtype=bool)
+        reaches[receiver, sender] = True
+        if self._conditions.loss:
+            chance = self._loss_chance.uniform(step, receiver, sender)
+            reaches[receiver, sender] = chance >= self._conditions.loss
+        return reaches
 
 
 def of_working(decision: Decision, working: BoolArray) -> Decision:
@@ -147,61 +196,3 @@ class Inbox:
         )
         sent, arrived = (np.where(strange, NEVER, steps[pairs]) for steps in (self.sent, self.arrived))
         return Inbox(sent, arrived, self.places[pairs], on_the_way)
-
-
-class Radio:
-    """Sends and delivers messages under some conditions among robots of communication ranges, (n,) m."""
-
-    def __init__(self, conditions: Conditions, ranges: Array, dt: float) -> None:
-        self._conditions, self._ranges, self._dt = conditions, ranges, dt
-        self._chance = Draws(conditions.seed, LOSS)
-        self._delay = math.ceil(conditions.delay / dt - SOON)
-
-    def exchange(self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray) -> Inbox:
-        """Return what the robots have once messages were sent and delivered at a step since time zero.
-
-        Robots tell where they believe themselves to be, (n, 2) m; where they are says who is in range.
-        """
-        on_the_way = inbox.on_the_way
-        if self._sends(step):
-            reaches = self._reached(step, positions, working)
-            on_the_way = (*on_the_way, Broadcast(step + self._delay, step, np.array(told), reaches))
-        due = [each for each in on_the_way if each.arrives <= step]
-        if not due:
-            return replace(inbox, on_the_way=on_the_way)
-        sent, arrived, places = inbox.sent.copy(), inbox.arrived.copy(), inbox.places.copy()
-        for each in due:
-            sent[each.reaches], arrived[each.reaches] = each.sent, each.arrives
-            receiver, sender = np.nonzero(each.reaches)
-            places[receiver, sender] = each.places[sender]
-        return Inbox(sent, arrived, places, on_the_way[len(due) :])
-
-    def reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
-        """Return of whom robots that work have a message that is not forgotten, what it said, and its age.
-
-        These are (m, 2) m and (m,) s, in the order of the neighbours' ``indices``.
-        """
-        silence = (step - inbox.arrived) * self._dt
-        known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + SOON)
-        robot, neighbour = np.nonzero(known & working[:, None])
-        neighbours = Neighbours.of_pairs(len(known), robot, neighbour, self._ranges)
-        ages = (step - inbox.sent[robot, neighbour]) * self._dt
-        return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
-
-    def _sends(self, step: int) -> bool:
-        """Whether messages are sent at a step: at time zero, and whenever a period has passed."""
-        rate = self._conditions.message_rate
-        if rate is None:
-            return True
-        period = self._dt * rate
-        return math.floor(step * period + SOON) > math.floor((step - 1) * period + SOON)
-
-    def _reached(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
-        """Return whom a message of each robot gets to, (receiver, sender) bool."""
-        receiver, sender = Neighbours.within(positions, self._ranges).among(working).pairs()
-        reaches = np.zeros((len(positions), len(positions)), dtype=bool)
-        reaches[receiver, sender] = True
-        if self._conditions.loss:
-            chance = self._chance.uniform(step, receiver, sender)
-            reaches[receiver, sender] = chance >= self._conditions.loss
-        return reaches

@@ -33,7 +33,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
-from robocov.world.engine import STATES, Engine, observed_step, substeps
+from robocov.world.engine import Engine, observed_step, substeps
 from robocov.world.relocation import nearest_free
 from robocov.world.solid import Mover, movers, solid_pieces
 
@@ -177,7 +177,7 @@ class World:
         begin, state, rows = len(self._movers), engine.states[run], self._rows(run)
         state[:begin] = self._moving
         state[begin:-1, :2], state[begin:-1, 2:] = self.positions[rows], self.velocities[rows]
-        engine.write(STATES, run)
+        engine.write(run)
 
     def _substep(self, forces: Array, dt: float, external: Array, push: Array) -> None:
         engine, unusual = self._engine, self._fast or len(external) > 0
@@ -377,7 +377,7 @@ class ContactSolver:
             velocities,
             0.0,
         )
-        engine.write(STATES)
+        engine.write()
         for _, disc in robots:
             lib.cpSpaceAddShape(space, disc._shape)
         net[:], net[mine] = 0.0, forces
@@ -388,7 +388,7 @@ class ContactSolver:
         velocities = states[mine, 2:].copy()
         # what is left is the push out of an overlap that pymunk has decided but not yet applied
         states[: mine.stop, 2:] = net[:] = 0.0
-        engine.write(STATES)
+        engine.write()
         self._substeps(robots, 1, dt / parts)
         engine.read()
         for body, _ in robots:

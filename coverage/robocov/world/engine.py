@@ -65,9 +65,9 @@ class Engine:
         # what is only pointed to
         self._spaces, self._floats, self._batches = spaces, floats, batches
 
-    def write(self, values: int, k: int = 0) -> None:
-        """Set `FORCES` or `STATES` of all bodies of space k."""
-        transfer(self.addresses, self.filled, k, SET_BODY, values)
+    def write(self, k: int = 0) -> None:
+        """Set `states` of space k."""
+        transfer(self.addresses, self.filled, k, SET_BODY, STATES)
 
     def read(self, k: int = 0) -> None:
         """Get `states` of space k."""

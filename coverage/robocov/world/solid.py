@@ -60,13 +60,9 @@ def convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
 
 def _triangles(polygon: BaseGeometry) -> list[Loop]:
     triangles = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
-    loops: list[Loop] = []
-    for corners in triangles[:, :3].tolist():
-        a, b, c = map(tuple, corners)
-        turn = _turn(a, b, c)
-        if turn != 0.0:
-            loops.append([a, b, c] if turn > 0.0 else [a, c, b])
-    return loops
+    loops: list[Loop] = [[(x, y) for x, y in corners] for corners in triangles[:, :3].tolist()]
+    turned = ((loop, _turn(*loop)) for loop in loops)
+    return [loop if turn > 0.0 else [loop[0], loop[2], loop[1]] for loop, turn in turned if turn != 0.0]
 
 
 def _merged(loops: list[Loop]) -> list[Loop]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robocov.conditions import LOSS, Conditions
 from robocov.conditions.draws import Draws
-from robocov.conditions.perception import Inbox, Radio
+from robocov.conditions.perception import Inbox, Perception
 from robocov.controllers import CONTROLLERS, Controller, informed
 from robocov.environment import Environment
 from robocov.errors import InputError
@@ -25,6 +25,11 @@ from robocov.voronoi import partition
 DT = 0.1
 OPEN = Environment("open", ((0, 0), (10, 0), (10, 10), (0, 10)))
 SQUARE = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]))
+
+
+def radio_of(conditions: Conditions, ranges: np.ndarray, dt: float = DT) -> Perception:
+    team = replace(Team.homogeneous(len(ranges)), communication_range=ranges)
+    return Perception(conditions, team, dt)
 
 
 def walks(n: int, steps: int, seed: int) -> np.ndarray:
@@ -83,7 +88,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
     ranges[0] *= 0.7
     working = np.ones((25, n), dtype=bool)
     working[12:, 1] = False
-    radio, inbox = Radio(conditions, ranges, DT), Inbox.empty(n)
+    radio, inbox = radio_of(conditions, ranges, DT), Inbox.empty(n)
     expected = told_one_by_one(conditions, ranges, places, working)
     for step, now in enumerate(places):
         inbox = radio.exchange(inbox, step, now, now, working[step])
@@ -99,7 +104,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
 @pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
 def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, dt: float, steps: int) -> None:
     """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
-    radio = Radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
+    radio = radio_of(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
     inbox, working, heard = Inbox.empty(2), np.ones(2, dtype=bool), []
     for step in range(16):
         places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message
@@ -110,7 +115,7 @@ def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, d
 
 def test_an_inbox_is_replaced_and_never_changed() -> None:
     """So that a copy of a run can hold the same one."""
-    radio = Radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
+    radio = radio_of(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
     inbox, working = Inbox.empty(3), np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 12, 4)):
         before = [
@@ -133,7 +138,7 @@ def test_an_inbox_is_replaced_and_never_changed() -> None:
 
 def test_loss_is_as_often_as_it_says() -> None:
     n, steps = 40, 30
-    radio = Radio(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
+    radio = radio_of(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
     inbox, working, got = Inbox.empty(n), np.ones(n, dtype=bool), 0
     for step, now in enumerate(walks(n, steps, 1)):
         inbox = radio.exchange(inbox, step, now, now, working)
@@ -291,7 +296,7 @@ def test_heard_without_neighbours_is_refused() -> None:
 
 
 def test_an_inbox_follows_robots_that_come_and_go() -> None:
-    radio, inbox = Radio(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.empty(3)
+    radio, inbox = radio_of(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.empty(3)
     working = np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 6, 2)):
         inbox = radio.exchange(inbox, step, now, now, working)
