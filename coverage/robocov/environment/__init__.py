@@ -89,11 +89,6 @@ class PolygonObstacle:
         """The obstacle's shape."""
         return Polygon(self.vertices, self.holes)
 
-    def shifted(self, by: Array) -> PolygonObstacle:
-        """Return the obstacle elsewhere, without a path."""
-        holes = tuple(_moved(hole, by) for hole in self.holes)
-        return replace(self, vertices=_moved(self.vertices, by), holes=holes, path=None)
-
 
 @dataclass(frozen=True)
 class CircleObstacle:
@@ -113,10 +108,6 @@ class CircleObstacle:
         angle = np.arange(sides) * (2.0 * np.pi / sides)
         return Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * self.radius + self.center)
 
-    def shifted(self, by: Array) -> CircleObstacle:
-        """Return the obstacle elsewhere, without a path."""
-        return replace(self, center=_moved((self.center,), by)[0], path=None)
-
 
 @dataclass(frozen=True)
 class WallObstacle:
@@ -133,10 +124,6 @@ class WallObstacle:
         line = LineString(self.points)
         return line.buffer(self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=4.0)
 
-    def shifted(self, by: Array) -> WallObstacle:
-        """Return the obstacle elsewhere, without a path."""
-        return replace(self, points=_moved(self.points, by), path=None)
-
 
 Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 
@@ -145,7 +132,7 @@ Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 class DiscStart:
     """The robots start somewhere in a disc: a team that was unloaded in one place."""
 
-    center: tuple[float, float]
+    center: Point
     radius: float
 
 
@@ -158,7 +145,7 @@ class UniformStart:
 class PointsStart:
     """The robots start at given positions; at most as many robots as there are positions."""
 
-    positions: tuple[tuple[float, float], ...]
+    positions: Ring
 
 
 StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
@@ -246,7 +233,7 @@ class Environment(Drawable):
             return self
         obstacles = tuple(
             # to the nanometre, so that an obstacle that comes by again stands in the very same place
-            shape if shape.path is None else shape.shifted(np.round(shape.path.shift(time), 9))
+            shape if shape.path is None else shifted(shape, np.round(shape.path.shift(time), 9))
             for shape in self.obstacles
         )
         return replace(self, obstacles=obstacles)
@@ -348,7 +335,7 @@ class Start:
     def _error(self, what: str) -> StartError:
         return StartError(f"start {self.name!r}: {what}")
 
-    def _given(self, n: int, radius: float, positions: tuple[tuple[float, float], ...]) -> Array:
+    def _given(self, n: int, radius: float, positions: Ring) -> Array:
         if n > len(positions):
             found = f"has {len(positions)} positions, but {n} robots were asked for"
             raise self._error(f"{found}; at most {len(positions)} robots or another start was wanted")
@@ -459,9 +446,19 @@ def _along(polygon: Polygon, begin: Array, end: Array) -> BaseGeometry:
     return shapely.union_all([*parts, *ends])
 
 
-def _moved(points: Ring, by: Array) -> Ring:
+def shifted(obstacle: Obstacle, by: Array) -> Obstacle:
+    """Return an obstacle elsewhere, without a path."""
     dx, dy = by.tolist()
-    return tuple((x + dx, y + dy) for x, y in points)
+
+    def moved(points: Ring) -> Ring:
+        return tuple((x + dx, y + dy) for x, y in points)
+
+    if isinstance(obstacle, PolygonObstacle):
+        holes = tuple(map(moved, obstacle.holes))
+        return replace(obstacle, vertices=moved(obstacle.vertices), holes=holes, path=None)
+    if isinstance(obstacle, WallObstacle):
+        return replace(obstacle, points=moved(obstacle.points), path=None)
+    return replace(obstacle, center=moved((obstacle.center,))[0], path=None)
 
 
 def _united(shapes: NDArray[np.object_]) -> BaseGeometry:

@@ -54,8 +54,9 @@ def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dic
             # a stream ends where its entry says, whatever there may be in it
             total = sum(entry.file_size for entry in entries)
             if total > min(most_bytes, max(_MODEST, _MOST_SQUEEZED * size)):
-                found = f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB"
-                raise ValueError(f"{found} are too many")
+                raise ValueError(
+                    f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB are too many"
+                )
             for name, times in Counter(entry.filename for entry in entries).most_common(1):
                 if times > 1:
                     raise ValueError(f"{name!r} is in it {times} times")
@@ -122,28 +123,23 @@ class ArrayCache:
     def load(self, key: str) -> dict[str, NDArray[Any]] | None:
         """Return the arrays that were saved under a key, read-only, None if there are none that are whole."""
         path = self._path(key)
-        try:
+        # what was written whole can be read, except by a numpy that knows less than the writer's
+        with suppress(OSError, InputError):
             if path.stat().st_size > self.limit:
                 return None
             data = path.read_bytes()
-        except OSError:
-            return None
-        start = len(_FORMAT) + _DIGEST
-        payload = memoryview(data)[start:]
-        if data[:start] != _FORMAT + _digest(payload):
-            with suppress(OSError):
+            start = len(_FORMAT) + _DIGEST
+            payload = memoryview(data)[start:]
+            if data[:start] != _FORMAT + _digest(payload):
                 path.unlink()
-            return None
-        # what was written whole can be read, except by a numpy that knows less than the writer's
-        try:
+                return None
             arrays = read_arrays(io.BytesIO(payload), path.name, self.limit)
-        except InputError:
-            return None
-        for array in arrays.values():
-            array.setflags(write=False)
-        with suppress(OSError):
-            os.utime(path)
-        return arrays
+            for array in arrays.values():
+                array.setflags(write=False)
+            with suppress(OSError):
+                os.utime(path)
+            return arrays
+        return None
 
     def save(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Keep arrays under a key, if that is possible."""
@@ -152,13 +148,11 @@ class ArrayCache:
         payload = buffer.getbuffer()
         if len(payload) > self.limit:
             return
-        try:
+        with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
             with written(self._path(key), durable=False) as path:
                 path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
-        except (OSError, OutputError):
-            return
-        self._tidy()
+            self._tidy()
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}{_SUFFIX}"

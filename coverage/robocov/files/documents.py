@@ -64,8 +64,8 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
             continue
         state = shown_json(found) if key in document else "missing"
         newer = type(found) is int and key == "version" and found > version
-        advice = "; it was written by a newer robocov" if newer else ""
-        what = f"{state}, but {shown_json(right)} was wanted{advice}"
+        what = f"{state}, but {shown_json(right)} was wanted"
+        what += "; it was written by a newer robocov" if newer else ""
         raise MapError.of(where, [Mistake.at((key,), what)])
 
 

@@ -43,9 +43,14 @@ def density_from(model: DensityModel, boundary: Ring, folder: Path | None, where
         values[values < LIGHTEST] = 0.0
     else:
         low, high = model.black or 0.0, 1.0 if model.white is None else model.white
-        values = np.round(low + (high - low) * _greys(str(model.picture), folder, where), _DIGITS)
+        at = ("density", "picture")
+        try:
+            greys = _greys(_content(model.picture, folder))
+        except InputError as error:
+            raise MapError.of(where, [Mistake.at(at, f"{shown_json(model.picture)}: {error}")]) from None
+        values = np.round(low + (high - low) * greys, _DIGITS)
         if not values.max() > 0.0:
-            raise MapError.of(where, [_nothing(("density", "picture"))])
+            raise MapError.of(where, [_nothing(at)])
     x, y = zip(*boundary, strict=True)
     x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
@@ -119,21 +124,21 @@ def _raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
             yield _nothing(("density", "rows"))
 
 
-def _greys(name: str, folder: Path | None, where: str) -> Array:
-    """Return the greys of a picture from 0 (black) to 1 (white), (rows, columns), the top row first."""
-    try:
-        return _decoded(_content(name, folder))
-    except InputError as error:
-        mistake = Mistake.at(("density", "picture"), f"{shown_json(name)}: {error}")
-        raise MapError.of(where, [mistake]) from None
-
-
 def _content(name: str, folder: Path | None) -> bytes:
+    """Return the content of a file of that name in a folder or below it."""
     if folder is None:
         raise InputError("a map that is no file has no folder, but rows of numbers were wanted")
-    path = _inside(name, folder)
-    if path is None:
-        raise InputError("leaves the folder of the map, but a file in it was wanted")
+    outside = InputError("leaves the folder of the map, but a file in it was wanted")
+    # a drive, a root or a backslash means something on some system
+    if "\0" in name or "\\" in name or PureWindowsPath(name).anchor:
+        raise outside
+    try:
+        path = (folder / name).resolve()
+        inside = path.is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # as of links in a circle
+        inside = False
+    if not inside:
+        raise outside
     try:
         if not path.is_file():
             raise InputError("no such file")
@@ -146,20 +151,8 @@ def _content(name: str, folder: Path | None) -> bytes:
     return content
 
 
-def _inside(name: str, folder: Path) -> Path | None:
-    """Return the file of that name in a folder or below it; None when it is elsewhere."""
-    # a drive, a root or a backslash means something on some system
-    if "\0" in name or "\\" in name or PureWindowsPath(name).anchor or Path(name).is_absolute():
-        return None
-    try:
-        home = folder.resolve()
-        path = (home / name).resolve()
-    except (OSError, RuntimeError):  # as of links in a circle
-        return None
-    return path if path.is_relative_to(home) else None
-
-
-def _decoded(content: bytes) -> Array:
+def _greys(content: bytes) -> Array:
+    """Return the greys of a picture from 0 (black) to 1 (white), (rows, columns), the top row first."""
     from PIL import Image
 
     try:

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, in_the_way, swept_area
+from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, in_the_way, shifted, swept_area
 
 FRAME = PolygonObstacle(
     ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)), (((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),)
@@ -22,7 +22,7 @@ def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
     path = ObstaclePath(points, 0.5, repeat)
     area = swept_area(FRAME.polygon, path)
     times = np.linspace(0.0, path.period, 400)
-    met = shapely.union_all([FRAME.shifted(path.shift(time)).polygon for time in times])
+    met = shapely.union_all([shifted(FRAME, path.shift(time)).polygon for time in times])
     assert met.difference(area.buffer(1e-6)).area < 1e-6  # nothing is missing
     step = 0.5 * path.period / 399
     assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more
