@@ -294,12 +294,11 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
 def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
     """Recolour the vertices that conflict, and few others; None when that goes round in circles."""
     visits = np.zeros(len(hues), dtype=int)
-    pairs = hues[adjacency]
+    pairs, flat = hues[adjacency], adjacency.ravel()
     waiting = np.unique(adjacency[pairs[:, 0] == pairs[:, 1]]).tolist()
     while waiting:
         vertex = waiting.pop()
-        row, side = np.nonzero(adjacency == vertex)
-        neighbours = adjacency[row, 1 - side]
+        neighbours = flat[np.flatnonzero(flat == vertex) ^ 1]
         around = hues[neighbours].tolist()
         if hues[vertex] not in around:
             continue

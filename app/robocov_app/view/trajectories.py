@@ -22,6 +22,9 @@ PIECE = 2.0
 SECTION = 16.0
 """Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
 
+CROWD = 400
+"""From so many robots on what is drawn anew is not smooth."""
+
 FADE_STEPS = 24
 """Shades of a trajectory that fades; its page is drawn anew as often while it fades."""
 
@@ -70,13 +73,14 @@ class Trajectories(Layer):
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         whole = canvas.width(width / canvas.scale)
+        # mostly below the robot's disc, where seams do not show, nor steps in a crowd
+        lines = pygame.draw.aalines if len(ends) < CROWD else pygame.draw.lines
         for path, end, colour in zip(self._open, ends, colours, strict=True):
-            # nan: not there yet; what has hardly moved is below its disc
+            # nan: not there yet
             if path[-1][0] != path[-1][0] or (len(path) == 1 and _near(path[0], end)):
                 continue
-            # mostly below the robot's disc, where seams do not show
             if whole == 1:
-                pygame.draw.aalines(canvas.surface, colour, False, [*path, end])
+                lines(canvas.surface, colour, False, [*path, end])
             else:
                 canvas.outline(np.array([*path, end]), colour, whole, closed=False)
 
@@ -107,17 +111,17 @@ class Trajectories(Layer):
     ) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
         whole = self._sketch_of_all(page) if together else None
-        for robot, path in [*self._ended, *enumerate(self._open)]:
-            open_one = path is self._open[robot]
-            short = whole is None and open_one and PIECE * (len(path) - 1) < SECTION
-            if len(path) < 2 or short:
+        corners = 2 if together else 1 + SECTION / PIECE
+        long = [(robot, path) for robot, path in enumerate(self._open) if len(path) >= corners]
+        for robot, path in [*self._ended, *long]:
+            if len(path) < 2:
                 continue
             sketch = whole if whole is not None else Sketch.around(path, width)
             if sketch is not None:
                 sketch.path(path, colours[robot], width)
                 if sketch is not whole:
                     sketch.onto(page)
-            if open_one:
+            if path is self._open[robot]:
                 self._open[robot] = path[-1:]
         self._ended.clear()
         if whole is not None:

@@ -86,6 +86,13 @@ def test_edges_of_cells_are_drawn_between_robots():
         assert nearest(frame, painter.camera.to_pixels(np.array(point)), LIGHT.cell_edge) < 70
 
 
+@pytest.mark.parametrize("n", [100, 1000])
+def test_narrow_cells_have_plain_edges(n):
+    frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
+    colours = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
+    assert (set(map(tuple, frame.reshape(-1, 3).tolist())) <= colours) == (n == 1000)
+
+
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
 def test_obstacles_are_where_the_robots_cannot_be(environment):
     frame, painter = drawn(scene_of(run_of(environment, 4)), "obstacles")
