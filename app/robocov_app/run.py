@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import make_controller
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import MomentaryCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record, Recorder
 from robocov.robots import Team

@@ -24,8 +24,7 @@ if TYPE_CHECKING:  # isort: off
         Rpf, make_controller,
     )
     from robocov.controllers.gains import choice, gain
-    from robocov.cost import CoverageCost, CoverageResult
-    from robocov.cost.momentary_cost import MomentaryCost
+    from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
     from robocov.density import Density, Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
     from robocov.environment import (
         CircleObstacle, DiscStart, Environment, ObstaclePath, PointsStart, PolygonObstacle, UniformStart,
@@ -59,8 +58,7 @@ _NAMES = {
     "controllers": "Atlas AtlasShared CONTROLLERS Controller IndividualController Individually "
     "Lloyd OwnView Rapf Rpf make_controller",
     "controllers.gains": "choice gain",
-    "cost": "CoverageCost CoverageResult",
-    "cost.momentary_cost": "MomentaryCost",
+    "cost": "CoverageCost CoverageResult MomentaryCost",
     "density": "Density Gaussian Gaussians Raster Uniform WeightedArea WeightedPolygons",
     "environment": "CircleObstacle DiscStart Environment ObstaclePath PointsStart PolygonObstacle "
     "UniformStart WallObstacle",

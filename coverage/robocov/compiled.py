@@ -46,7 +46,7 @@ _LIMIT = 1 << 28
 _PATIENCE = 60.0
 """Seconds for which another process is waited for."""
 
-_EXAMPLES = ["robocov.cost.coverage", "robocov.simulation", "robocov.metrics"]
+_EXAMPLES = ["robocov.cost", "robocov.simulation", "robocov.metrics"]
 """Modules whose function `example` calls the kernels of the coverage cost, a step, and a summary."""
 
 _ahead: list[str] = []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawn_run import ROOMS
 
-from robocov.cost import coverage as cost_module
+from robocov.cost import CoverageCost
 from robocov.mapfile.check import vertex_count
 from robocov_app import building
 from robocov_app.building import built_cost, cost_for_pictures
@@ -15,7 +15,7 @@ PLACE = np.array([[2.0, 2.0]])
 def test_it_is_the_cost(capsys):
     cost = built_cost(ROOMS, 48)
     assert cost.lattice == 48
-    assert cost(PLACE).value == cost_module.CoverageCost(ROOMS, 48)(PLACE).value
+    assert cost(PLACE).value == CoverageCost(ROOMS, 48)(PLACE).value
     assert capsys.readouterr().err == ""
 
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from robocov.cost import CoverageCost
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
 from robocov.errors import RobocovError
 from robocov_app.live.cost_worker import CostWorker
 from robocov_app.live.evaluation import evaluated
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.arrays import Array
-    from robocov.cost import CoverageResult
-    from robocov.cost.lattice import Sites
+    from robocov.cost import CoverageResult, Sites
     from robocov.environment import Environment
 
 LATTICE = 128

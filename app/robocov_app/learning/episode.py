@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import MomentaryCost
 from robocov.errors import ParameterError, StartError, shown
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Snapshot

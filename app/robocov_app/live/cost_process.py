@@ -11,8 +11,7 @@ import threading
 import time
 from typing import BinaryIO
 
-from robocov.cost import CoverageCost
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
 from robocov.errors import RobocovError
 from robocov_app.live.evaluation import evaluated
 from robocov_app.live.messages import Build, Building, Failed, Question, Ready, receive, send, values_of

@@ -9,8 +9,7 @@ from robocov.errors import InputError, RobocovError
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
-    from robocov.cost import CoverageCost, CoverageResult
-    from robocov.cost.momentary_cost import MomentaryCost
+    from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
     from robocov_app.live.messages import Question
 
 

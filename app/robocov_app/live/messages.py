@@ -11,8 +11,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
-    from robocov.cost import CoverageResult
-    from robocov.cost.lattice import Sites
+    from robocov.cost import CoverageResult, Sites
     from robocov.environment import Environment
     from robocov_app.live.evaluation import Evaluation
 

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import MomentaryCost
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, BoolArray, IntArray
-    from robocov.cost import CoverageCost, CoverageResult
-    from robocov.cost.lattice import Sites
+    from robocov.cost import CoverageCost, CoverageResult, Sites
 
 _SHALLOW = 0.05
 """Least angle in radians at which two distances are taken to grow apart, so that borders stay thin."""

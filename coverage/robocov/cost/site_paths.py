@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel
+from robocov.compiled import inlined_kernel, inner_kernel
 from robocov.geodesic.distances import Graph, relax
 from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
 from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
@@ -55,14 +55,22 @@ class CornerViews(NamedTuple):
     """(r, 2) Distances of the nearest and the farthest of these sites."""
 
 
+class CostMap(NamedTuple):
+    """All that is known before the robots."""
+
+    walls: Walls
+    graph: Graph
+    tiles: Tiles
+    views: CornerViews
+
+
 class Paths(NamedTuple):
     """The shortest ways to corners."""
 
     distance: Array
     """(k,) grid steps, inf where none leads."""
     ways: IntArray
-    """(k, 4) The robot where it begins, the corners where it bends first and last, -1 for none; and the robot
-    that is nearest as the crow flies."""
+    """(k, 3) The robot where it begins, the corners where it bends first and last, -1 for none."""
 
 
 class TilePaths(NamedTuple):
@@ -73,6 +81,21 @@ class TilePaths(NamedTuple):
     ways: IntArray
     """(3, t, SLOTS) The robot where it begins, the corner where it bends last, -1 for none; and the robot
     that is nearest as the crow flies."""
+
+
+class Work(NamedTuple):
+    """Room for the search from n robots."""
+
+    sight: AngularWallIndex
+    """What each robot sees."""
+    lists: IntArray
+    """(3, n) Robots: all of them, those near a group of tiles, those near a tile."""
+    queue: IntArray
+    """(2, k + 1) See `relax`."""
+    hidden: IntArray
+    """(t,) A bit for each site of a tile: whether it does not see its nearest robot."""
+    to_corners: Paths
+    paths: TilePaths
 
 
 @inner_kernel
@@ -123,109 +146,126 @@ def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, til
 
 
 @inner_kernel
-def _perhaps_nearest(boxes: Array, k: int, robots: Array, given: IntArray, count: int, out: IntArray) -> int:
+def _perhaps_nearest(
+    boxes: Array, k: int, index: AngularWallIndex, given: IntArray, count: int, out: IntArray
+) -> int:
     """Write which of `count` given robots may be nearest to a place in a box; return how many."""
-    bound = np.inf
+    bound2 = np.inf
     for j in range(count):
-        x, y = robots[given[j], 0], robots[given[j], 1]
+        x, y = index.sources[given[j], 0], index.sources[given[j], 1]
         dx, dy = max(x - boxes[k, 0], boxes[k, 2] - x), max(y - boxes[k, 1], boxes[k, 3] - y)
-        bound = min(bound, dx * dx + dy * dy)
-    return _within(boxes, k, robots, bound, given, count, out)
+        bound2 = min(bound2, dx * dx + dy * dy)
+    return _within(boxes, k, index, bound2, given, count, out)
 
 
 @inner_kernel
 def _within(
-    boxes: Array, k: int, robots: Array, bound2: float, given: IntArray, count: int, out: IntArray
+    boxes: Array, k: int, index: AngularWallIndex, bound2: float, given: IntArray, count: int, out: IntArray
 ) -> int:
     """Write which of `count` given robots are not farther from a box than a bound; return how many."""
     found = 0
     for j in range(count):
         i = given[j]
-        if near2(boxes, k, robots[i, 0], robots[i, 1]) <= bound2:
+        if near2(boxes, k, index.sources[i, 0], index.sources[i, 1]) <= bound2:
             out[found] = i
             found += 1
     return found
 
 
-@inner_kernel
-def _paths_to_corners(
-    walls: Walls, graph: Graph, index: AngularWallIndex, robots: Array, lists: IntArray, queue: IntArray,
-    paths: Paths,
-) -> None:  # fmt: skip
+@inlined_kernel
+def _paths_to_corners(known: CostMap, work: Work) -> None:
     """Write the shortest ways to the corners."""
-    corners, boxes, n = walls.corners, walls.corner_boxes, len(robots)
-    everyone, some, leaves, waiting = lists[0], lists[1], len(walls.corner_boxes) // 2, 0
+    corners, boxes, n = known.walls.corners, known.walls.corner_boxes, len(work.sight.sources)
+    everyone, some, leaves, waiting = work.lists[0], work.lists[1], len(boxes) // 2, 0
+    index, paths, queue = work.sight, work.to_corners, work.queue
     for k in range(len(corners)):
-        x, y = corners[k, 0], corners[k, 1]
         if k % LEAF == 0:
-            near = _perhaps_nearest(boxes, leaves + k // LEAF, robots, everyone, n, some)
-        best, i, queue[1, k] = np.inf, -1, 0
+            near = _perhaps_nearest(boxes, leaves + k // LEAF, index, everyone, n, some)
+        best, nearest = np.inf, -1
         for j in range(near):
-            dx, dy = x - robots[some[j], 0], y - robots[some[j], 1]
+            dx, dy = corners[k, 0] - index.sources[some[j], 0], corners[k, 1] - index.sources[some[j], 1]
             if dx * dx + dy * dy < best:
-                best, i = dx * dx + dy * dy, some[j]
-        paths.distance[k], paths.ways[k, 0], paths.ways[k, 3] = np.sqrt(best), i, i
-        paths.ways[k, 1], paths.ways[k, 2] = -1, -1
-        if useful(corners, k, robots[i, 0], robots[i, 1]) and sees(walls, index, i, x, y):
-            paths.ways[k, 1] = k
-            queue[0, waiting], queue[1, k] = k, 1
-            waiting += 1
-        else:
-            paths.distance[k] = np.inf
+                best, nearest = dx * dx + dy * dy, some[j]
+        paths.distance[k], paths.ways[k, 0], queue[1, k] = np.inf, n, 0
+        waiting = _straight_to_corner(known.walls, work, k, nearest, waiting)
     # few of the other robots matter once it is known how far the nearest one has to go, if not straight
-    relax(graph, paths.distance, paths.ways, queue, waiting)
+    relax(known.graph, paths.distance, paths.ways, queue, waiting)
     waiting = 0
     for k in range(len(corners)):
-        x, y = corners[k, 0], corners[k, 1]
         if k % LEAF == 0:
             bound = 0.0
             for j in range(k, min(k + LEAF, len(corners))):
                 bound = max(bound, paths.distance[j])
-            near = _within(boxes, leaves + k // LEAF, robots, bound * bound, everyone, n, some)
+            near = _within(boxes, leaves + k // LEAF, index, bound * bound, everyone, n, some)
         for j in range(near):
-            i = some[j]
-            dx, dy = x - robots[i, 0], y - robots[i, 1]
-            away, owner = np.sqrt(dx * dx + dy * dy), paths.ways[k, 0]
-            if (
-                i != paths.ways[k, 3]
-                and (away < paths.distance[k] or (away == paths.distance[k] and i < owner))
-                and useful(corners, k, robots[i, 0], robots[i, 1])
-                and sees(walls, index, i, x, y)
-            ):
-                paths.distance[k], paths.ways[k, 0], paths.ways[k, 1], paths.ways[k, 2] = away, i, k, -1
-                if not queue[1, k]:
-                    queue[0, waiting], queue[1, k] = k, 1
-                    waiting += 1
-    relax(graph, paths.distance, paths.ways, queue, waiting)
+            waiting = _straight_to_corner(known.walls, work, k, some[j], waiting)
+    relax(known.graph, paths.distance, paths.ways, queue, waiting)
 
 
-@inner_kernel
-def _nearest_robots(
-    tiles: Tiles, tile: int, robots: Array, some: IntArray, count: int, paths: TilePaths
-) -> None:
+@inlined_kernel
+def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) -> int:
+    """Write the straight way from a robot to a corner if it is the shortest; return how many then wait."""
+    paths, x, y = work.to_corners, walls.corners[k, 0], walls.corners[k, 1]
+    from_x, from_y = work.sight.sources[i, 0], work.sight.sources[i, 1]
+    away = np.sqrt((x - from_x) * (x - from_x) + (y - from_y) * (y - from_y))
+    if (
+        (away < paths.distance[k] or (away == paths.distance[k] and i < paths.ways[k, 0]))
+        and useful(walls.corners, k, from_x, from_y)
+        and sees(walls, work.sight, i, x, y)
+    ):
+        paths.distance[k], paths.ways[k, 0], paths.ways[k, 1], paths.ways[k, 2] = away, i, k, -1
+        if not work.queue[1, k]:
+            work.queue[0, waiting], work.queue[1, k] = k, 1
+            waiting += 1
+    return waiting
+
+
+@inlined_kernel
+def _nearest_robots(tiles: Tiles, tile: int, count: int, work: Work) -> None:
     """Write the nearest of `count` robots to the sites of a tile as the crow flies, of equals the first."""
+    paths, sources = work.paths, work.sight.sources
     for s in range(SLOTS):
         paths.distance[tile, s] = np.inf
     for j in range(count):
-        i = some[j]
-        x, y = robots[i, 0], robots[i, 1]
+        i = work.lists[2, j]
+        x, y = sources[i, 0], sources[i, 1]
         for s in range(SLOTS):
             dx, dy = tiles.places[0, tile, s] - x, tiles.places[1, tile, s] - y
             away2, best = dx * dx + dy * dy, paths.distance[tile, s]
             paths.ways[2, tile, s] = i if away2 < best else paths.ways[2, tile, s]
             paths.distance[tile, s] = away2 if away2 < best else best
     for s in range(SLOTS):
-        paths.distance[tile, s] = np.sqrt(paths.distance[tile, s])
-        paths.ways[0, tile, s], paths.ways[1, tile, s] = paths.ways[2, tile, s], -1
+        i, away = paths.ways[2, tile, s], np.sqrt(paths.distance[tile, s])
+        paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = away, i, -1
+        sources[i, 2] = max(sources[i, 2], away)
 
 
-@inner_kernel
-def _by_corners(
-    tiles: Tiles, views: CornerViews, corners: Array, to: Paths, tile: int, hidden: int, paths: TilePaths
-) -> float:
-    """Write the shortest ways to the hidden sites of a tile by a corner; return the longest of these."""
+@inlined_kernel
+def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
+    """Note which sites of a tile do not see their nearest robot; return whether there are any."""
+    tiles, paths, mask = known.tiles, work.paths, 0
+    for s in range(SLOTS):
+        if not covered[tiles.facts[1, tile, s]]:
+            paths.distance[tile, s], paths.ways[0, tile, s] = np.inf, -1
+        elif tiles.facts[0, tile, s] >= 0 and not sees(
+            known.walls,
+            work.sight,
+            paths.ways[2, tile, s],
+            tiles.places[0, tile, s],
+            tiles.places[1, tile, s],
+        ):
+            paths.distance[tile, s] = np.inf
+            mask |= 1 << s
+    work.hidden[tile] = mask
+    return mask != 0
+
+
+@inlined_kernel
+def _by_corners(known: CostMap, work: Work, tile: int) -> None:
+    """Write the shortest ways to the hidden sites of a tile by a corner."""
+    places, views, corners = known.tiles.places, known.views, known.walls.corners
+    to, paths, hidden, bound = work.to_corners, work.paths, work.hidden[tile], np.inf
     # a row cannot be the best for any of them where another one is better for all
-    bound = np.inf
     for row in range(views.first[tile], views.first[tile + 1]):
         if hidden & ~views.rows[row, 1] == 0:
             bound = min(bound, to.distance[views.rows[row, 0]] + views.spans[row, 1])
@@ -236,157 +276,116 @@ def _by_corners(
             continue
         for s in range(SLOTS):
             if (mask >> s) & 1:
-                dx, dy = tiles.places[0, tile, s] - corners[k, 0], tiles.places[1, tile, s] - corners[k, 1]
+                dx, dy = places[0, tile, s] - corners[k, 0], places[1, tile, s] - corners[k, 1]
                 total, best = begin + np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
                 if total < best or (total == best and owner < paths.ways[0, tile, s]):
                     paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = total, owner, k
-    return _farthest(tile, hidden, paths)
 
 
-@inner_kernel
-def _farthest(tile: int, hidden: int, paths: TilePaths) -> float:
+@inlined_kernel
+def _farthest(work: Work, tile: int) -> float:
     """Return the longest of the ways to the hidden sites of a tile."""
-    farthest = 0.0
+    hidden, farthest = work.hidden[tile], 0.0
     for s in range(SLOTS):
         if (hidden >> s) & 1:
-            farthest = max(farthest, paths.distance[tile, s])
+            farthest = max(farthest, work.paths.distance[tile, s])
     return farthest
 
 
-@inner_kernel
-def _from_others(
-    walls: Walls, index: AngularWallIndex, robots: Array, i: int, tiles: Tiles, tile: int, hidden: int,
-    paths: TilePaths,
-) -> None:  # fmt: skip
+@inlined_kernel
+def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
     """Write the straight ways from a robot to the hidden sites of a tile where they are the shortest."""
+    paths, index, hidden = work.paths, work.sight, work.hidden[tile]
+    from_x, from_y = index.sources[i, 0], index.sources[i, 1]
     for s in range(SLOTS):
         if (hidden >> s) & 1:
-            x, y = tiles.places[0, tile, s], tiles.places[1, tile, s]
-            dx, dy = x - robots[i, 0], y - robots[i, 1]
+            x, y = known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
+            dx, dy = x - from_x, y - from_y
             away, best = np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
             if (
                 (away < best or (away == best and i < paths.ways[0, tile, s]))
                 and i != paths.ways[2, tile, s]
-                and sees(walls, index, i, x, y)
+                and sees(known.walls, index, i, x, y)
             ):
                 paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = away, i, -1
 
 
-@inner_kernel
-def _seen_from_nearest(
-    walls: Walls, index: AngularWallIndex, tiles: Tiles, tile: int, covered: BoolArray, paths: TilePaths
-) -> int:
-    """Return the mask of the sites of a tile that do not see their nearest robot."""
-    mask = 0
-    for s in range(SLOTS):
-        if not covered[tiles.facts[1, tile, s]]:
-            paths.distance[tile, s], paths.ways[0, tile, s] = np.inf, -1
-        elif tiles.facts[0, tile, s] >= 0 and not sees(
-            walls, index, paths.ways[2, tile, s], tiles.places[0, tile, s], tiles.places[1, tile, s]
-        ):
-            paths.distance[tile, s] = np.inf
-            mask |= 1 << s
-    return mask
-
-
-@inner_kernel
-def _unhide(
-    walls: Walls, tiles: Tiles, views: CornerViews, robots: Array, index: AngularWallIndex, lists: IntArray,
-    hidden: IntArray, to_corners: Paths, paths: TilePaths,
-) -> None:  # fmt: skip
+@inlined_kernel
+def _unhide(known: CostMap, work: Work) -> None:
     """Write the ways to the sites that do not see the robot that is nearest as the crow flies."""
+    tiles, index, lists = known.tiles, work.sight, work.lists
     for group in range(len(tiles.groups)):
         begin, end, bound = group * GROUP, min(group * GROUP + GROUP, len(tiles.boxes)), -1.0
         for tile in range(begin, end):
-            if hidden[tile]:
-                far = _by_corners(tiles, views, walls.corners, to_corners, tile, hidden[tile], paths)
-                bound = max(bound, far)
+            if work.hidden[tile]:
+                _by_corners(known, work, tile)
+                bound = max(bound, _farthest(work, tile))
         if bound < 0.0:
             continue
         # whoever else is nearer than by way of a corner may see the site
-        near = _within(tiles.groups, group, robots, bound * bound, lists[0], len(robots), lists[1])
+        near = _within(tiles.groups, group, index, bound * bound, lists[0], len(index.sources), lists[1])
         for tile in range(begin, end):
-            if hidden[tile]:
-                bound = _farthest(tile, hidden[tile], paths)
-                for j in range(near):
-                    i = lists[1, j]
-                    near_enough = near2(tiles.boxes, tile, robots[i, 0], robots[i, 1]) <= bound * bound
-                    if near_enough and not beyond_horizon(tiles.boxes, tile, index, i):
-                        _from_others(walls, index, robots, i, tiles, tile, hidden[tile], paths)
+            if work.hidden[tile]:
+                bound = _farthest(work, tile)
+                some = _within(tiles.boxes, tile, index, bound * bound, lists[1], near, lists[2])
+                for j in range(some):
+                    if not beyond_horizon(tiles.boxes, tile, index, lists[2, j]):
+                        _from_another(known, work, tile, lists[2, j])
 
 
-@inner_kernel
-def _team_paths(
-    walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, robots: Array, covered: BoolArray,
-    index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
-    paths: TilePaths,
-) -> int:  # fmt: skip
-    """Write the ways of the nearest of (n, 2) robots; return a number that is negative without room."""
-    n, count = len(robots), len(tiles.boxes)
+@inlined_kernel
+def _team_paths(known: CostMap, work: Work, robots: Array, covered: BoolArray) -> bool:
+    """Write the ways of the nearest of (n, 2) robots; return whether there was room for what they see."""
+    tiles, index, lists, n = known.tiles, work.sight, work.lists, len(robots)
     for i in range(n):
         lists[0, i], index.sources[i, 2] = i, 0.0
-    for tile in range(count):
+        index.sources[i, 0], index.sources[i, 1] = robots[i, 0], robots[i, 1]
+    for tile in range(len(tiles.boxes)):
         if tile % GROUP == 0:
-            near = _perhaps_nearest(tiles.groups, tile // GROUP, robots, lists[0], n, lists[1])
-        some = _perhaps_nearest(tiles.boxes, tile, robots, lists[1], near, lists[2])
-        _nearest_robots(tiles, tile, robots, lists[2], some, paths)
-        for s in range(SLOTS):
-            i = paths.ways[2, tile, s]
-            index.sources[i, 2] = max(index.sources[i, 2], paths.distance[tile, s])
-    used = 0
+            near = _perhaps_nearest(tiles.groups, tile // GROUP, index, lists[0], n, lists[1])
+        _nearest_robots(
+            tiles, tile, _perhaps_nearest(tiles.boxes, tile, index, lists[1], near, lists[2]), work
+        )
+    used, any_hidden = 0, False
     for i in range(n):
         reach = index.sources[i, 2] * (1.0 + 1e-9) if n > _FEW else np.inf
-        used = enter_walls(walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
+        used = enter_walls(known.walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
         if used < 0:
-            return -1
-    any_hidden = False
-    for tile in range(count):
-        hidden[tile] = _seen_from_nearest(walls, index, tiles, tile, covered, paths)
-        any_hidden = any_hidden or hidden[tile] != 0
+            return False
+    for tile in range(len(tiles.boxes)):
+        any_hidden = _hide(known, work, tile, covered) or any_hidden
     if any_hidden:
-        _paths_to_corners(walls, graph, index, robots, lists, queue, to_corners)
-        _unhide(walls, tiles, views, robots, index, lists, hidden, to_corners, paths)
-    return used
+        _paths_to_corners(known, work)
+        _unhide(known, work)
+    return True
 
 
 @inner_kernel
 def site_paths(
-    walls: Walls, graph: Graph, tiles: Tiles, views: CornerViews, teams: Array, covered: BoolArray,
-    index: AngularWallIndex, lists: IntArray, queue: IntArray, hidden: IntArray, to_corners: Paths,
-    paths: TilePaths, unit: float, distances: Array, ways: IntArray,
-) -> int:  # fmt: skip
-    """Write the ways of the nearest robots of each of some teams.
+    known: CostMap, work: Work, teams: Array, covered: BoolArray, unit: float, out: Array, ways: IntArray
+) -> bool:
+    """Write the ways of the nearest robots of each of some teams; return whether there was room.
 
     Parameters
     ----------
     teams : (r, n, 2)
     covered : (r, c)
         Which components of the free space hold robots of each.
-    lists : (3, n)
-        For work, as are `queue`, (2, k + 1), `hidden`, (t,), and the ways to corners and by tile.
-    unit : float
-        Length of a grid step.
-    distances : (r, m)
+    unit : float, m
+        Of a grid step.
+    out : (r, m) m
     ways : (r, 3, m)
         The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
-
-    Returns
-    -------
-    int
-        Not negative if there was room in the index.
     """
-    used = 0
+    paths, facts = work.paths, known.tiles.facts
     for r in range(len(teams)):
-        used = _team_paths(
-            walls, graph, tiles, views, teams[r], covered[r], index, lists, queue, hidden, to_corners, paths
-        )  # fmt: skip
-        if used < 0:
-            break
-        for tile in range(len(tiles.boxes)):
+        if not _team_paths(known, work, teams[r], covered[r]):
+            return False
+        for tile in range(facts.shape[1]):
             for s in range(SLOTS):
-                site, last = tiles.facts[0, tile, s], paths.ways[1, tile, s]
+                site, last = facts[0, tile, s], paths.ways[1, tile, s]
                 if site >= 0:
-                    distances[r, site] = paths.distance[tile, s] * unit
+                    out[r, site] = paths.distance[tile, s] * unit
                     ways[r, 0, site], ways[r, 2, site] = paths.ways[0, tile, s], last
-                    ways[r, 1, site] = to_corners.ways[last, 1] if last >= 0 else -1
-    return used
+                    ways[r, 1, site] = work.to_corners.ways[last, 1] if last >= 0 else -1
+    return True

@@ -11,8 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
-from robocov.cost import CoverageCost
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
 from robocov.drawing import Drawable
 from robocov.errors import counted
 from robocov.record import Record, nearest_moments

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from robocov.cost.lattice import lattice_of
+from robocov.cost import _lattice_of
 from robocov.cost.site_paths import GROUP, TILE
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError
@@ -15,7 +15,7 @@ SQUARE = ((2.0, 1.0), (6.0, 1.0), (6.0, 4.0), (2.0, 4.0))
 
 def lattice(side, *obstacles):
     environment = Environment("test", SQUARE, obstacles)
-    return environment, *lattice_of(Geodesics(environment), side)
+    return environment, *_lattice_of(Geodesics(environment), side)
 
 
 def test_the_sites_are_the_free_cell_centres_row_by_row():

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robocov.cost import CoverageCost
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 
 SQUARE = ((0, 0), (6, 0), (6, 4), (0, 4))

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.controllers import Lloyd, Rapf
-from robocov.cost import CoverageCost
-from robocov.cost.momentary_cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import StartError
 from robocov.metrics import MOVING_RATE, clearances, cost_history
