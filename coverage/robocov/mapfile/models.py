@@ -33,7 +33,6 @@ LONGEST_LABEL = 100
 """Most characters of a label."""
 _TINY = 1e-100
 """Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
-_LONGEST_PATH = 500
 _MOST = 10_000
 _NAME = r"^[^\x00-\x1f\x7f]+$"
 
@@ -53,12 +52,16 @@ Vertex: TypeAlias = Annotated[
     list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]]), AfterValidator(tuple)
 ]
 VertexRing: TypeAlias = Annotated[list[Vertex], Field(min_length=3), AfterValidator(tuple)]
+Text: TypeAlias = Annotated[str, Field(strict=True)]
+Sentence: TypeAlias = Annotated[Text, Field(max_length=10_000)]
+FileName: TypeAlias = Annotated[Text, Field(min_length=1, max_length=500)]
 Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LONGEST_LABEL, pattern=_NAME)]
 Entry: TypeAlias = Annotated[float, _between(0.0, HEAVIEST)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
 Line: TypeAlias = Annotated[list[Vertex], Field(min_length=2)]
 Places: TypeAlias = Annotated[list[Vertex], Field(min_length=1)]
 Row: TypeAlias = Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]
+Rows: TypeAlias = Annotated[list[Row], Field(min_length=1, max_length=FINEST)]
 Extent: TypeAlias = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 Variance: TypeAlias = Annotated[float, _between(-1e8, 1e8)]
 Variances: TypeAlias = Annotated[list[Variance], Field(min_length=2, max_length=2)]
@@ -104,6 +107,9 @@ _CORNERS = [[1, 1], [2, 1], [2, 3]]
 _YARDS = [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]
 _PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}
 _HOT_SPOT = {"center": [7.5, 3], "sigma": 1.5, "weight": 4}
+_WALL = {"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}
+_STARTS = {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}}
+_DENSITY = {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]}
 
 
 class _Key(NamedTuple):
@@ -188,10 +194,8 @@ class RasterModel(Model, title="raster density"):
     interpolation: Interpolation = _field(
         "bilinear between the cells' middles, or constant in each of the cells", "bilinear", "bilinear"
     )
-    rows: Annotated[list[Row], Field(min_length=1, max_length=FINEST)] | None = _field(
-        "Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None
-    )
-    picture: Annotated[str, Field(strict=True, min_length=1, max_length=_LONGEST_PATH)] | None = _field(
+    rows: Rows | None = _field("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
+    picture: FileName | None = _field(
         "In place of rows, a grey PNG or PGM, relative to the map and in its folder", "density.png", None
     )
     black: Weight | None = _field("What black counts; 0 by default", 0.1, None)
@@ -235,33 +239,18 @@ DensityModel: Any = _one_of("density", "How much each place counts")
 class MapModel(Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
 
-    schema_: Annotated[str, Field(strict=True)] | None = _field(
-        "Where this schema is, for editors", "./map.schema.json", None, alias="$schema"
-    )
+    schema_: Text | None = _field("Where this schema is, for editors", "./map.json", None, alias="$schema")
     format: Literal["robocov-map"] = _field("Says what this file is", FORMAT)
     version: Literal[1] = _field("Version of the format", VERSION)
     name: Label = _field("The map's name, for people", "Two rooms")
-    description: Annotated[str, Field(strict=True, max_length=10_000)] = _field(
-        "A sentence about it", "A wall with one door.", ""
-    )
+    description: Sentence = _field("A sentence about it", "A wall with one door.", "")
     boundary: VertexRing = _field(
-        "The outer boundary, convex or not, either way round; the robots know its convex hull",
-        [[0, 0], [10, 0], [10, 6], [0, 6]],
+        "The outer boundary, convex or not; robots know its convex hull", [[0, 0], [10, 0], [10, 6], [0, 6]]
     )
-    obstacles: list[ObstacleModel] = _field(
-        "They may overlap, touch, and stick out of the boundary",
-        [{"kind": "wall", "points": [[5, 0], [5, 2.4]], "width": 0.1}],
-        [],
-    )
-    starts: dict[Label, StartModel] = _field(
-        "Named starts; the first is the default",
-        {"corner": {"kind": "disc", "center": [1, 1], "radius": 0.8}},
-        {},
-    )
+    obstacles: list[ObstacleModel] = _field("They may overlap, touch, and stick out", [_WALL], [])
+    starts: dict[Label, StartModel] = _field("Named starts; the first is the default", _STARTS, {})
     density: DensityModel | None = _field(
-        "How much each place counts; without it every place the same",
-        {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]},
-        None,
+        "How much each place counts; by default all the same", _DENSITY, None
     )
     extra: dict[str, Any] = _field("Free keys of yours; kept untouched", {"author": "Ada"}, {})
 
