@@ -53,9 +53,8 @@ class Barrier(Law):
 
     Robots do not hear velocities: each derives its neighbours' from two positions that it heard. Obstacle
     points are the closest one and the last scan's. That the bodies and limits of the others are known is
-    taken for granted. Decided here: the root is rounded over the last
-    millimetre, and inside the safe distance continued as an odd function, so that who begins too near is
-    led out.
+    taken for granted. Decided here: the root is rounded over the last millimetre, and inside the safe
+    distance continued as an odd function, so that who begins too near is led out.
 
     Taken from what is generally known of the paper (IEEE T-RO 33, 661-674), not from its text; h_ij as
     the documentation of MathWorks' barrier certificate block has it.

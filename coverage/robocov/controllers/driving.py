@@ -49,15 +49,9 @@ def with_nearest(seen: Observations, returns: Array | None) -> Array:
 
 
 def avoid(
-    wanted: Array,
-    seen: Observations,
-    team: Team,
-    points: Array,
-    clearance: Array,
-    apart: Array,
-    rate: float,
-    braking: float,
-) -> Array:
+    wanted: Array, seen: Observations, team: Team, points: Array,
+    clearance: Array, apart: Array, rate: float, braking: float,
+) -> Array:  # fmt: skip
     """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards points and robots.
 
     Obstacle points, (n, k, 2) m, are kept a clearance, (n,) m, off, other robots `apart`, (n,) m, centre to
@@ -66,10 +60,9 @@ def avoid(
     # of two robots each brakes for its half of the way
     slow, half = braking * team.max_acceleration, 0.5 * braking * team.max_acceleration
     # whom a robot at full speed need not brake for is far
-    reach = float(
-        (apart + np.maximum(team.max_speed / max(rate, 1e-9), team.max_speed**2 / (2.0 * half))).max()
-    )
-    others, walls = offsets_from_neighbours(seen, reach), seen.positions[:, None] - points
+    stopping = np.maximum(team.max_speed / max(rate, 1e-9), team.max_speed**2 / (2.0 * half))
+    others = offsets_from_neighbours(seen, float((apart + stopping).max()))
+    walls = seen.positions[:, None] - points
     robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
     keep = np.where(robots, apart[:, None], clearance[:, None])
     close = np.concatenate([others, walls], axis=1)
@@ -108,19 +101,9 @@ def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array
     in the interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3,
     incremental linear programming, with this objective).
 
-    Parameters
-    ----------
-    wanted : (n, 2)
-    normals : (n, m, 2)
-        Of length 1; nan for no constraint.
-    offsets : (n, m)
-    radius : (n,)
-
-    Returns
-    -------
-    best : (n, 2)
-    feasible : (n,)
-        Where it is False, `best` means nothing.
+    The wanted points are (n, 2), the normals (n, m, 2), of length 1 or nan for no constraint, the offsets
+    (n, m), the radii (n,). Return the best points, (n, 2), and whether there is any, (n,); else they mean
+    nothing.
     """
     best = np.empty(wanted.shape)
     feasible = np.ones(len(wanted), dtype=np.bool_)

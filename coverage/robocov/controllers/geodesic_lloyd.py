@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array
 from robocov.controllers.base import Law
 from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import gain, response_time_gain
@@ -80,7 +80,6 @@ class GeodesicLloyd(Law):
         return GeodesicMemory(team)
 
     def decide(self, seen: Observations, memory: GeodesicMemory) -> Decision:
-        """Return the forces that drive each robot along the way to its goal."""
         team = memory.team
         if memory.way is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
             goals, way, beyond = self._plan(team).ways(seen, self.exponent)
@@ -91,16 +90,15 @@ class GeodesicLloyd(Law):
         speed = np.minimum(self.k_prop * (distance + memory.beyond), team.max_speed)
         # the last metre before a way-point that is not the goal is not slower than the others
         speed = np.minimum(speed, distance / self.response_time)
-        wanted = approach(offset, np.inf, speed)
-        forces = drive(wanted, seen, team, self.response_time)
-        return Decision(forces=forces, goals=memory.goals, terms={"attraction": forces}, memory=memory)
+        forces = drive(approach(offset, np.inf, speed), seen, team, self.response_time)
+        return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _plan(self, team: Team) -> Plan:
         if self.environment is None:
             raise ParameterError(
                 f"controller {self.name!r}: it has not been told the map; informed(environment) was wanted"
             )
-        return _plan(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
+        return _cached(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
 
 
 class Plan:
@@ -125,18 +123,15 @@ class Plan:
 
     def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
         """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
-        n = len(seen.positions)
         places = nearest_inside(self.room, seen.positions)
         if seen.neighbours.complete:
-            goals = self._goals(places, np.arange(n), exponent)
+            goals = self._goals(places, exponent)
         else:
             goals = np.empty_like(places)
-            for i in range(n):
-                team = np.concatenate(
-                    [places[i : i + 1], nearest_inside(self.room, seen.neighbour_positions(i))]
-                )
-                goals[i] = self._goals(team, np.zeros(1, dtype=np.intp), exponent)[0]
-        way, beyond = goals.copy(), np.zeros(n)
+            for i in range(len(places)):
+                heard = nearest_inside(self.room, seen.neighbour_positions(i))
+                goals[i] = self._goals(np.vstack([places[i], heard]), exponent)[0]
+        way, beyond = goals.copy(), np.zeros(len(goals))
         lines = shapely.linestrings(np.stack([places, goals], axis=1))
         for i in np.flatnonzero(~shapely.covers(self.room, lines)).tolist():
             path = self.paths.path(places[i], goals[i])
@@ -147,8 +142,8 @@ class Plan:
             beyond[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
         return goals, way, beyond
 
-    def _goals(self, places: Array, some: IntArray, exponent: float) -> Array:
-        """Return the goals of some of the robots at (k, 2) places."""
+    def _goals(self, places: Array, exponent: float) -> Array:
+        """Return the goals of robots at (k, 2) places."""
         result = self.cost(places)
         site = np.flatnonzero(result.owner >= 0)
         owner, first, distance = result.owner[site], result.first[site], result.distances[site]
@@ -162,17 +157,13 @@ class Plan:
         goals = np.column_stack([np.bincount(owner, weight * part, minlength=n) for part in first.T])
         held = total > 0.0
         goals = np.where(held[:, None], goals / np.where(held, total, 1.0)[:, None], places)
-        return nearest_inside(self.room, np.asarray(goals[some], dtype=np.float64))
+        return nearest_inside(self.room, np.asarray(goals))
 
 
 def _obstacle(part: Polygon) -> PolygonObstacle:
-    """Return a polygon as an obstacle."""
-    rings = (part.exterior, *part.interiors)
-    outer, *holes = (tuple((x, y) for x, y in list(ring.coords)[:-1]) for ring in rings)
+    outer, *holes = (tuple(map(tuple, ring.coords[:-1])) for ring in (part.exterior, *part.interiors))
     return PolygonObstacle(outer, tuple(holes))
 
 
-@lru_cache(maxsize=8)
-def _plan(environment: Environment, clearance: float, lattice: int) -> Plan:
-    """Return the plan of a map; it takes long, and memories of robots must not hold it."""
-    return Plan(environment, clearance, lattice)
+# a plan takes long, and memories of robots must not hold it
+_cached = lru_cache(maxsize=8)(Plan)

@@ -18,12 +18,9 @@ from contextlib import contextmanager, suppress
 from importlib.machinery import ModuleSpec, PathFinder
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from robocov.errors import ParameterError, shown, unknown_name
-
-if TYPE_CHECKING:
-    from types import CodeType
 
 _MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
 _OURS = str(Path(__file__).parents[1])
@@ -156,7 +153,7 @@ def _is_own(spec: ModuleSpec) -> bool:
     return not _INSTALLED.intersection(path.parts) and not any(path.is_relative_to(each) for each in others)
 
 
-class _TextLoader(importlib.abc.SourceLoader):
+class _TextLoader(importlib.abc.ExecutionLoader):
     """Loads a module from the text of its file, which need not be there any more."""
 
     def __init__(self, path: str, text: str) -> None:
@@ -165,12 +162,11 @@ class _TextLoader(importlib.abc.SourceLoader):
     def get_filename(self, fullname: str) -> str:
         return self._path
 
-    def get_data(self, path: str) -> bytes:
-        return self._text.encode()
+    def get_source(self, fullname: str) -> str:
+        return self._text
 
-    def source_to_code(self, data: object, path: object, **_: object) -> CodeType:  # type: ignore[override]
-        # the text itself: what it says of its encoding was true of the file
-        return compile(self._text, self._path, "exec", dont_inherit=True)
+    def is_package(self, fullname: str) -> bool:
+        return Path(self._path).name == "__init__.py"
 
 
 class _TextFinder(importlib.abc.MetaPathFinder):
