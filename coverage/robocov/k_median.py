@@ -113,15 +113,13 @@ def _least(sums: Array, taken: BoolArray) -> int:
 
 def best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
     """Return the sources after the best swap; the same array where none lowers the sum by the threshold."""
-    before, after, place, source = _best_swap(table, sources, fixed)
-    if not after < before * (1.0 - threshold):
-        return sources
-    return np.concatenate([sources[:place], [source], sources[place + 1 :]])
+    before, after, swapped = _best_swap(table, sources, fixed)
+    return swapped if after < before * (1.0 - threshold) else sources
 
 
 @kernel
-def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, int, int]:
-    """Return the sum, that after the best swap, which of the sources leaves for it, and which one comes."""
+def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, IntArray]:
+    """Return the sum, that after the best swap, and the sources then."""
     owner, nearest, second = _nearest_two(table, sources)
     with_new = np.zeros(table.shape[1])
     # without their own source targets go to the new one, or to their second nearest
@@ -144,7 +142,10 @@ def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float
             after = with_new[s] + without_own[k, s]
             if after < least and not taken[s] and not fixed[k]:
                 least, place, source = after, k, s
-    return total, least, place, source
+    swapped = sources.copy()
+    if place >= 0:
+        swapped[place] = source
+    return total, least, swapped
 
 
 def best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:

@@ -1,8 +1,7 @@
-"""The control laws, one file each, and how they are found by name.
+"""The control laws, and how they are found by name.
 
-A controller is named in one of three ways: a built-in name (``rapf``), a name that an installed
-package offers in the entry-point group ``robocov.controllers``, or a class in a file
-(``mine.py:MyController``).
+A controller is named in one of three ways: a built-in name (``rapf``), a name that an installed package
+offers in the entry-point group ``robocov.controllers``, or a class in a file (``mine.py:MyController``).
 
 To find one of the latter two runs its code. So `controller_kind` and `make_controller` are for names that
 somebody has typed: on a command line, in a study file, in a program. A name that stands in a file of
@@ -20,11 +19,10 @@ from robocov.controllers.base import (
     Controller,
     IndividualController,
     Individually,
-    Information,
     OwnView,
     information_of,
     informed,
-)  # fmt: skip
+)
 from robocov.controllers.gains import gain_values, gains_of, with_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.lloyd import Lloyd, RangeLimited
@@ -38,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONTROLLERS", "FLAGSHIP", "Atlas", "AtlasShared", "Barrier", "Controller", "Dispersion", "GeodesicLloyd",
-    "Howard", "IndividualController", "Individually", "Information", "Lloyd", "OwnView", "Poduri",
+    "Howard", "IndividualController", "Individually", "Lloyd", "OwnView", "Poduri",
     "RangeLimited", "Rapf", "Rpf", "TangentBug", "controller_kind", "controller_kinds", "gain_values",
     "gains_of", "information_of", "informed", "make_controller", "remembers", "short_name",
 ]  # fmt: skip

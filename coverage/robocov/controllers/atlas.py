@@ -9,14 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law
-from robocov.controllers.driving import (
-    approach,
-    avoid,
-    drive,
-    last_returns,
-    offsets_from_neighbours,
-    with_nearest,
-)
+from robocov.controllers.driving import approach, avoid, drive, last_returns, neighbour_offsets, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -26,18 +19,10 @@ from robocov.planning.placement import CoverageDemand, OwnPlace, Table, own_plac
 from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
-FINEST_CELL, MOST_CELLS = 0.1, 250_000
-"""Side of a cell of the discovered maps in metres, larger where a region is very large."""
-
-TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350
-"""Nodes of the lattices on which a robot plans: for its whole team, for itself, and for itself in a crowd."""
-
-MAX_PLANNING_GROUP = 8
-"""A robot plans for itself and up to so many less one that it hears. Where it hears more it only considers
-the nearest of them, as they are, and looks for its own place."""
-
-STILL_FOR, STILL_WITHIN = 3.0, 0.1
-"""A robot that does not get so many metres away for so many seconds rests."""
+FINEST_CELL, MOST_CELLS = 0.1, 250_000  # side of a cell of the maps, m, larger where a region is very large
+TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350  # of the lattices: for the team, for itself, in a crowd
+MAX_PLANNING_GROUP = 8  # a robot plans for itself and up to so many less one that it hears
+STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
 
 _HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
 _ARRIVED, _TURN = 0.35, 0.2  # metres from a place, or a way-point, at which it counts as reached
@@ -167,11 +152,11 @@ class Atlas(Law):
         cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
         empty = DiscoveredMap.nothing(Raster(region, cell))
         nobody = RestTracker(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
-        n = len(team)
         # the robots do not all plan at the same moment
-        first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) for i in range(n)]
+        first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) for i in range(len(team))]
         states = tuple(PlannerState(empty, due, nobody) for due in first)
-        return AtlasMemory(team, states, (np.full((1, 2), np.nan),) * n, np.zeros(n, dtype=np.intp))
+        routes = (np.full((1, 2), np.nan),) * len(team)
+        return AtlasMemory(team, states, routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces that lead each robot on its way."""
@@ -305,11 +290,10 @@ class Atlas(Law):
     def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
         """Return the forces towards the way-points, kept off walls and other robots."""
         team, positions, routes = memory.team, seen.positions, memory.routes
-        aim = np.array([route[leg] for route, leg in zip(routes, memory.legs.tolist(), strict=True)])
+        aim = np.array([route[leg] for route, leg in zip(routes, memory.legs, strict=True)])
         last = np.array([len(route) - 1 for route in routes])
         legs = memory.legs + ((memory.legs < last) & (np.hypot(*(aim - positions).T) < _TURN))
-        aim = np.array([route[leg] for route, leg in zip(routes, legs.tolist(), strict=True)])
-        points = with_nearest(seen, memory.returns)
+        aim = np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
         # what is behind a corner comes into sight late: in a narrow place nothing is far
         braking = _BRAKING * team.max_acceleration
         gap = np.maximum(np.hypot(*(positions - seen.obstacle_points).T) - team.radius, 0.0)
@@ -321,13 +305,12 @@ class Atlas(Law):
         wanted = seen.velocities + approach(wanted - seen.velocities, 1.0, change)
         # of the size of others a robot knows its own
         apart = 2.0 * team.radius + _APART
-        wanted = wanted + _aside(wanted, offsets_from_neighbours(seen, _HEEDED), apart, braking)
-        keep = team.radius + _MARGIN
+        wanted = wanted + _aside(wanted, neighbour_offsets(seen, _HEEDED), apart, braking)
+        keep, points = team.radius + _MARGIN, with_nearest(seen, memory.returns)
         wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, _BRAKING)
         forces = drive(wanted, seen, team, self.response_time)
         goals = np.array([route[-1] for route in routes])
-        memory = replace(memory, legs=legs)
-        return Decision(forces, goals=goals, terms={"attraction": forces}, memory=memory)
+        return Decision(forces, goals, {"attraction": forces}, memory=replace(memory, legs=legs))
 
 
 def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:

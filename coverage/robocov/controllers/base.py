@@ -3,17 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Literal,
-    Protocol,
-    TypeAlias,
-    cast,
-    get_args,
-    runtime_checkable,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
 import numpy as np
 
@@ -43,17 +33,15 @@ well, or the whole map from the beginning."""
 class Controller(Protocol):
     """A control law: a frozen dataclass of gains, without state of its own.
 
-    Row i of a decision may depend only on what robot i knows (see `robocov.observation`).
-    Whatever the robots remember goes through `Decision.memory`; a run can therefore be copied,
-    rewound and branched. A class that states `name`, `label` and `summary` as class variables
-    satisfies the protocol.
+    Row i of a decision may depend only on what robot i knows (see `robocov.observation`). Whatever the robots
+    remember goes through `Decision.memory`; a run can therefore be copied, rewound and branched.
 
     Optional are
 
     - the class variable ``information``, one of `Information`, "own" where it is not stated,
     - the attribute ``scanning``, a `robocov.observation.scans.Scanning`, of laws that want ray scans, and
     - the method ``informed(environment) -> Controller``, which only laws with the whole map have: it
-      returns the law that knows that map, with the same gains. `Simulation` asks for it.
+      returns the law that knows that map, with the same gains.
     """
 
     @property
@@ -78,12 +66,12 @@ class Controller(Protocol):
 def information_of(controller: Any) -> Information:
     """Return what a controller, or a class of controllers, goes by, or raise a ParameterError."""
     # a law for one robot stands in an adapter
-    stated = getattr(getattr(controller, "law", controller), "information", "own")
+    stated: Information = getattr(getattr(controller, "law", controller), "information", "own")
     if stated not in get_args(Information):
         name, words = getattr(controller, "name", "?"), ", ".join(get_args(Information))
-        wanted = f"information: {shown(stated)}, but one of {words} was wanted"
-        raise ParameterError(f"controller {name!r}: {wanted}")
-    return cast(Information, stated)
+        told = f"information: {shown(stated)}, but one of {words} was wanted"
+        raise ParameterError(f"controller {name!r}: {told}")
+    return stated
 
 
 def informed(controller: Controller, environment: Environment) -> Controller:
@@ -91,8 +79,7 @@ def informed(controller: Controller, environment: Environment) -> Controller:
 
     A ParameterError tells of a law that asks for the map and does not say so.
     """
-    information = information_of(controller)
-    tell = getattr(controller, "informed", None)
+    information, tell = information_of(controller), getattr(controller, "informed", None)
     if tell is None:
         return controller
     if information != "whole map":
@@ -100,7 +87,8 @@ def informed(controller: Controller, environment: Environment) -> Controller:
             f"controller {controller.name!r}: it has a method informed(environment), but its information "
             f"is {information!r}; 'whole map' was wanted"
         )
-    return cast(Controller, tell(environment))
+    known: Controller = tell(environment)
+    return known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,8 +182,7 @@ class Individually:
     """
 
     def __init__(self, law: IndividualController) -> None:
-        self.law = law
-        kind = type(law)
+        self.law, kind = law, type(law)
         self.name = str(getattr(law, "name", kind.__name__))
         self.label = str(getattr(law, "label", self.name))
         self.summary = str(getattr(law, "summary", (kind.__doc__ or "").strip().split("\n")[0]))

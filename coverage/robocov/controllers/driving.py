@@ -61,7 +61,7 @@ def avoid(
     slow, half = braking * team.max_acceleration, 0.5 * braking * team.max_acceleration
     # whom a robot at full speed need not brake for is far
     stopping = np.maximum(team.max_speed / max(rate, 1e-9), team.max_speed**2 / (2.0 * half))
-    others = offsets_from_neighbours(seen, float((apart + stopping).max()))
+    others = neighbour_offsets(seen, float((apart + stopping).max()))
     walls = seen.positions[:, None] - points
     robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
     keep = np.where(robots, apart[:, None], clearance[:, None])
@@ -142,7 +142,7 @@ def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array
     return best, feasible
 
 
-def offsets_from_neighbours(seen: Observations, reach: float) -> Array:
+def neighbour_offsets(seen: Observations, reach: float) -> Array:
     """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m; nan for none."""
     robot, _, offset, _ = seen.neighbours_within(reach)
     return in_rows(robot, len(seen.positions), offset, np.nan)

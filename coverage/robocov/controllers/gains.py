@@ -74,15 +74,9 @@ class Option:
 
 
 def gain(
-    default: float | None,
-    unit: str,
-    meaning: str,
-    *,
-    low: float = 0.0,
-    high: float = 1e6,
-    optional: bool = False,
-    whole: bool = False,
-) -> Any:
+    default: float | None, unit: str, meaning: str, *,
+    low: float = 0.0, high: float = 1e6, optional: bool = False, whole: bool = False,
+) -> Any:  # fmt: skip
     """Declare a gain as a dataclass field.
 
     >>> @dataclass(frozen=True)

@@ -30,15 +30,9 @@ _NOT_REPORTED = np.empty((0, 2))
 
 
 def _potential_forces(
-    seen: Observations,
-    goals: Array,
-    k_rep: float,
-    rho_0: float,
-    k_att: float = 0.0,
-    limit: float | None = None,
-    *,
-    from_robots: bool = True,
-) -> Array:
+    seen: Observations, goals: Array, k_rep: float, rho_0: float,
+    k_att: float = 0.0, limit: float | None = None, *, from_robots: bool = True,
+) -> Array:  # fmt: skip
     """Return what `potential_forces` does, of what the robots see; no `limit` is None."""
     n, links = len(seen.positions), seen.neighbours
     indptr = np.zeros(n + 1, np.intp) if not from_robots else NOBODY if links.indptr is None else links.indptr

@@ -28,23 +28,13 @@ if TYPE_CHECKING:
 UNKNOWN, FREE, PRESUMED, WALL = 0, 1, 2, 3
 """What is known of a cell, the more the higher."""
 
-BRIDGE = 0.5
-"""Ends of neighbouring rays that are closer together, in metres, are on one surface. No wider than the
-passages that a robot should find; a door seen from afar would be closed else."""
-
+BRIDGE = 0.5  # no wider, m, than the passages that a robot should find; doors seen from afar would be closed
 _STRIDE = 0.7  # a ray is looked at after every so many cells
 _INTO = 0.25  # the obstacle is so many cells behind the end of a ray, which may be on the border of two cells
 _CORE = 0.3  # a ray that passes the middle of a presumed cell, to so much of its side, shows that it is free
 
-PRIOR = 0.8
-"""Openness of what is far from all that is known."""
-
-LONG = 30.0
-"""So many blocks away is far."""
-
-BLOCKS = 1000
-"""Blocks that a map is divided into, at most."""
-
+PRIOR, LONG = 0.8, 30.0  # openness of what is far, so many blocks, from all that is known
+BLOCKS = 1000  # that a map is divided into, at most
 _OVER = 1.9  # relaxation factor; the best for walks that end after `LONG` blocks
 _SWEEPS, _EXACT = 1000, 1e-11
 

@@ -30,9 +30,7 @@ if TYPE_CHECKING:
     from robocov.planning.discovered import DiscoveredMap
     from robocov.planning.wayfinding import GridPlanner, Window
 
-MOST_SOURCES = 180
-"""A plan for a team chooses among at most so many nodes; its own goal each robot then finds among all."""
-
+MOST_SOURCES = 180  # a plan for a team chooses among at most so many nodes
 _FAR = 1e9  # metres that stand for "nobody is there"
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
@@ -127,13 +125,7 @@ class Table:
 
 
 def team_places(
-    table: Table,
-    weights: Array,
-    now: Array,
-    begin: Array,
-    fixed: BoolArray,
-    threshold: float,
-    nearby: float,
+    table: Table, weights: Array, now: Array, begin: Array, fixed: BoolArray, threshold: float, nearby: float
 ) -> Array:
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Dispersion
-from robocov.controllers.driving import approach, drive, limit_approach_speed, offsets_from_neighbours
+from robocov.controllers.driving import approach, drive, limit_approach_speed, neighbour_offsets
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.metrics import settled_at
@@ -74,9 +74,9 @@ def test_between_two_walls_that_are_too_close_it_goes_along() -> None:
     np.testing.assert_allclose(slowed, [[0.0, 0.7]], atol=1e-12)
 
 
-def test_offsets_from_neighbours_by_all_distances() -> None:
+def test_neighbour_offsets_by_all_distances() -> None:
     positions = np.random.default_rng(0).uniform(20, 30, size=(40, 2))
-    away = offsets_from_neighbours(seen_from(positions), 1.5)
+    away = neighbour_offsets(seen_from(positions), 1.5)
     for i in range(40):
         offset = positions[i] - np.delete(positions, i, axis=0)
         near = offset[np.hypot(*offset.T) <= 1.5]
