@@ -72,9 +72,6 @@ class Simulation:
     (2, 2)
     """
 
-    _observation: tuple[Observations, Inbox | None] | None
-    _snapshot: Snapshot | None
-
     def __init__(
         self,
         environment: Environment,
@@ -143,6 +140,13 @@ class Simulation:
             raise ParameterError(f"{found}, but a Scanning was wanted")
         self._begin_step()
 
+    def _begin_step(self) -> None:
+        """Turn to the present: nothing is observed or decided yet, and the sensor's obstacles move on."""
+        self._observation: tuple[Observations, Inbox | None] | None = None
+        self._snapshot: Snapshot | None = None
+        if self._obstacles_change:
+            self.sensor.show(self.time, self._world.failed_robots)
+
     def __repr__(self) -> str:
         where = f"{self.controller.name} on {self.environment.name}"
         return f"<Simulation {where}, {counted(len(self.team), 'robot')}, at {self.time:.2f} s>"
@@ -181,12 +185,6 @@ class Simulation:
                 decision = of_working(self._snapshot.decision, self.working)
                 self._snapshot = Snapshot(seen, decision, self.positions, self.working, inbox)
         return self._snapshot
-
-    def _begin_step(self) -> None:
-        """Turn to the present: nothing is observed or decided yet, and the sensor's obstacles move on."""
-        self._observation = self._snapshot = None
-        if self._obstacles_change:
-            self.sensor.show(self.time, self._world.failed_robots)
 
     def _observed(self) -> tuple[Observations, Inbox | None]:
         """Return what each robot knows now, and the messages that it then has."""
@@ -370,12 +368,9 @@ def simulate_many(
 
     Parameters
     ----------
-    environment, controller, team, dt
-        As `Simulation` takes them, the same for all.
     starts, conditions : sequences of (n, 2) m, and of Conditions or None
-        Of each run; teams may differ in size without `team`.
-    duration : float, s
-    start : str, seeds : sequence of int
+        Of each run; teams may differ in size without `team`. All else is the same for all runs.
+    start, seeds : str, sequence of int
         Where the starts came from, kept in the records.
 
     Examples

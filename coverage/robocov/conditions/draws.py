@@ -1,9 +1,9 @@
 """Random numbers that depend on nothing but a seed, a step, and whom they are for.
 
-A generator that is drawn from again and again has a state, and a run that is copied, rewound or branched
-would have to carry it. Here each number is a function of the seed and of what it is drawn for: the
-counter-based generator Philox-4x32-10 of Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy
-as 1, 2, 3* (SC 2011), over as many counters at once as are asked for; numpy's makes one stream at a time.
+A generator with a state would have to be copied, rewound and branched with a run. Here each number is a
+function of the seed and of what it is drawn for: the counter-based generator Philox-4x32-10 of Salmon,
+Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3* (SC 2011), over as many counters at once
+as are asked for; numpy's makes one stream at a time.
 """
 
 from __future__ import annotations

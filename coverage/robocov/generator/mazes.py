@@ -2,8 +2,8 @@
 
 The passages are a spanning tree of the grid, grown cell by cell ("growing tree": J. Buck, *Mazes for
 Programmers*, 2015, chapter 11): from the newest cell it makes long winding corridors, as a depth-first
-search does, from any cell many short ones; each maze mixes the two. In a tree there is one way from place
-to place. So some walls are opened after that, those at dead ends first ("braiding").
+search does, from any cell many short ones. Some walls are opened after that, those at dead ends first
+("braiding").
 
 Walls are a boolean array (columns + 1, rows + 1, 2): whether one leads from a post, where lines of the grid
 cross, upwards (0) and to the right (1).
@@ -136,26 +136,26 @@ def tree_passages(shape: Cell, rng: np.random.Generator) -> BoolArray:
 
 def _open(walls: BoolArray, rng: np.random.Generator) -> None:
     """Take away a wall, if possible one held at both ends, which makes a way round; often at a dead end."""
-    meeting = walls.sum(axis=2)
-    meeting[:, 1:] += walls[:, :-1, 0]
-    meeting[1:] += walls[:-1, :, 1]
+    at = np.argwhere(walls)
+    along = np.column_stack([at[:, 2], 1 - at[:, 2]])
+    begin, end, beside = (
+        tuple(each.T) for each in (at[:, :2], at[:, :2] + along, at[:, :2] - along[:, ::-1])
+    )
+    meeting = np.zeros(walls.shape[:2], dtype=int)
+    for posts in (begin, end):
+        np.add.at(meeting, posts, 1)
     held = meeting > 1
     held[[0, -1]] = held[:, [0, -1]] = True
-    joining = walls & held[..., None]
-    joining[:, :-1, 0] &= held[:, 1:]
-    joining[:-1, :, 1] &= held[1:]
-    candidates = joining if joining.any() else walls
+    good = held[begin] & held[end]
+    good |= not good.any()
     if rng.random() < _DEAD_END:
         passages = inner_walls((walls.shape[0] - 1, walls.shape[1] - 1)) & ~walls
         around = passages[:-1, :-1].sum(axis=2) + passages[1:, :-1, 0] + passages[:-1, 1:, 1]
-        at_dead_ends = np.zeros_like(walls)
-        at_dead_ends[:-1, :-1] = (around == 1)[..., None]
-        at_dead_ends[1:, :-1, 0] |= around == 1
-        at_dead_ends[:-1, 1:, 1] |= around == 1
-        if (candidates & at_dead_ends).any():
-            candidates = candidates & at_dead_ends
-    places = np.flatnonzero(candidates)
-    walls.flat[places[int(rng.integers(len(places)))]] = False
+        # a wall is between the cell whose lower left post it begins at, and the one beside
+        dead_end = good & ((around[begin] == 1) | (around[beside] == 1))
+        good = dead_end if dead_end.any() else good
+    places = np.flatnonzero(good)
+    walls[tuple(at[places[int(rng.integers(len(places)))]])] = False
 
 
 def trails(walls: BoolArray) -> Iterator[list[Post]]:

@@ -37,19 +37,19 @@ def scattered(request: Request, corner: DiscStart, rng: np.random.Generator) -> 
     shapes = rng.choice(list(MIX), size=request.obstacles, p=list(MIX.values()))
     waiting = list(zip(shapes.tolist(), areas.tolist(), strict=True))[::-1]
     placed: list[tuple[str, float]] = []
-    outlines = np.empty(request.obstacles, dtype=object)
+    outlines: list[shapely.Polygon] = []
     moves = _MOVES
     while waiting:
-        found = _placed(request, *waiting[-1], outlines[: len(placed)], clear, rng)
+        found = _placed(request, *waiting[-1], np.array(outlines, dtype=object), clear, rng)
         if found is not None:
-            outlines[len(placed)] = found
+            outlines.append(found)
             placed.append(waiting.pop())
         elif moves and placed:
             # another one makes room, and looks for a new place after it
             moves -= 1
             other = int(rng.integers(len(placed)))
             waiting.insert(-1, placed.pop(other))
-            outlines[other:-1] = outlines[other + 1 :]
+            outlines.pop(other)
         else:
             return None
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
