@@ -19,7 +19,7 @@ from robocov_app.view.theme import mix
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
-    from robocov.environment.passages import Gap
+    from robocov.environment import Gap
     from robocov_app.editor.problems import Problem
     from robocov_app.editor.readout import Readout
     from robocov_app.editor.sheet import View

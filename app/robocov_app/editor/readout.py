@@ -13,8 +13,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov.environment import SAGITTA
-from robocov.environment.passages import Gap, gaps_narrower, narrowest_gap
+from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.faults import place_words

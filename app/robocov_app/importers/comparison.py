@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.environment.passages import Gap, narrowest_gap
+from robocov.environment import Gap, narrowest_gap
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from shapely.geometry.base import BaseGeometry
 
-    from robocov.environment import Environment
-    from robocov.environment.passages import Gap
+    from robocov.environment import Environment, Gap
     from robocov_app.importers.foreign import ForeignMap
     from robocov_app.importers.report import ImportReport
 

@@ -10,8 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
-from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart
-from robocov.environment.passages import narrowest_gap
+from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart, narrowest_gap
 from robocov.errors import MapError, ParameterError, checked, is_number, shown, unknown_name
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave

@@ -17,8 +17,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import DiscStart, Obstacle, PolygonObstacle
-from robocov.environment.passages import Gap, gaps_narrower
+from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, gaps_narrower
 from robocov.generator.request import AREA_TOLERANCE, Request
 
 _WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber

@@ -17,15 +17,16 @@ from robocov.environment import (
     START_GAP,
     DiscStart,
     Environment,
+    Gap,
     PointsStart,
     PolygonObstacle,
     Ring,
     UniformStart,
     WallObstacle,
     in_the_way,
+    narrowest_gap,
     swept_area,
 )
-from robocov.environment.passages import Gap, narrowest_gap
 from robocov.errors import JsonPath, MapError, Mistake, StartError, counted, listed, place
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
@@ -64,14 +65,14 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     """Yield what is wrong with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
-    flat = _FLAT * float(extent.max()) ** 2
+    size, flat = f"{extent[0]:g} x {extent[1]:g} m", _FLAT * float(extent.max()) ** 2
     count = len(set(map(tuple, ring)))
     if count < 3:
         yield Mistake.at(at, f"{counted(count, 'different point')}, but at least 3 were wanted")
     elif extent.max() > LARGEST:
-        yield _too_large(at, extent)
+        yield Mistake.at(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
     elif extent.min() < SMALLEST:
-        yield Mistake.at(at, f"{_size(extent)}, but at least {SMALLEST * 1000:g} mm each way was wanted")
+        yield Mistake.at(at, f"{size}, but at least {SMALLEST * 1000:g} mm each way was wanted")
     # a ring that crosses itself may have no area either
     elif shapely.convex_hull(polygon := Polygon(points)).area <= flat:
         yield Mistake.at(at, f"area {polygon.area:g} m², but points that are not on one line were wanted")
@@ -84,19 +85,12 @@ def _line_mistakes(at: JsonPath, line: Ring, thing: str) -> Iterator[Mistake]:
     points = np.asarray(line, dtype=float)
     extent = np.ptp(points, axis=0)
     if extent.max() > LARGEST:
-        yield _too_large(at, extent)
+        size = f"{extent[0]:g} x {extent[1]:g} m"
+        yield Mistake.at(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
     elif extent.max() < SMALLEST:
         length = float(np.hypot(*np.diff(points, axis=0).T).sum())
         size = f"{length:g} m long" if thing == "wall" else f"{extent.max():g} m wide"
         yield Mistake.at(at, f"a {thing} {size}, but at least {SMALLEST * 1000:g} mm was wanted")
-
-
-def _too_large(at: JsonPath, extent: Array) -> Mistake:
-    return Mistake.at(at, f"{_size(extent)}, but at most {LARGEST / 1000:g} km was wanted")
-
-
-def _size(extent: Array) -> str:
-    return f"{extent[0]:g} x {extent[1]:g} m"
 
 
 def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
@@ -139,8 +133,7 @@ def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> It
 def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
     """Yield what is wrong with the map as a whole, once each part is good."""
     if len(environment.region.vertices) < 3:
-        what = "its convex hull is a line, but a region with an area was wanted"
-        yield Mistake.at(("boundary",), what)
+        yield Mistake.at(("boundary",), "its convex hull is a line, but a region with an area was wanted")
         return
     if environment.free.is_empty:
         yield Mistake.at(("obstacles",), "no free space is left inside the boundary, but some was wanted")
@@ -164,8 +157,7 @@ def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
             found = f"[{points[k, 0]:g}, {points[k, 1]:g}] is inside an obstacle or outside the boundary"
             yield Mistake.at((*at, "positions", k), f"{found}, but a free place was wanted")
         if len(np.unique(points, axis=0)) < len(points):
-            what = "one place is given twice, but one place a robot was wanted"
-            yield Mistake.at((*at, "positions"), what)
+            yield Mistake.at((*at, "positions"), "one place is given twice, but one place a robot was wanted")
         return
     if _plainly_has_room(environment, spec):
         return
@@ -180,15 +172,10 @@ def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
 
 
 def _plainly_has_room(environment: Environment, spec: DiscStart | UniformStart) -> bool:
-    """Return whether a robot fits with a centimetre to spare at the centre of a disc.
-
-    A draw says the same, but of a large map it takes seconds.
-    """
+    """Return whether a robot fits at the centre of a disc: quicker than a draw, which takes seconds."""
     discs = [spec] if isinstance(spec, DiscStart) else environment.starts.values()
     given = [disc.center for disc in discs if isinstance(disc, DiscStart)]
-    if not given:
-        return False
-    centres = shapely.points(given)
+    centres = shapely.points(np.reshape(given, (-1, 2)))
     inside = shapely.contains_properly(environment.free, centres)
     clearance = shapely.distance(environment.free.boundary, centres)
     return bool((inside & (clearance > DEFAULT_RADIUS * (1 + START_GAP) + 0.01)).any())

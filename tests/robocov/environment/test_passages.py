@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Point, Polygon, box
 from shapely.affinity import affine_transform
 from shapely.geometry.base import BaseGeometry
 
-from robocov.environment.passages import gaps_narrower, narrowest_gap
+from robocov.environment import gaps_narrower, narrowest_gap
 
 
 def free(*parts: BaseGeometry) -> MultiPolygon:

@@ -13,8 +13,7 @@ from shapely import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import PolygonObstacle
-from robocov.environment.passages import Gap, narrowest_gap
+from robocov.environment import Gap, PolygonObstacle, narrowest_gap
 from robocov.generator import generated_map
 from robocov.generator.caves import below, random_field, through, tunnels
 from robocov.generator.request import Request

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Point
 
-from robocov.environment import Environment, WallObstacle
-from robocov.environment.passages import narrowest_gap
+from robocov.environment import Environment, WallObstacle, narrowest_gap
 from robocov.generator import generated_map
 from robocov.generator.mazes import inner_walls, trails, tree_passages
 
