@@ -13,7 +13,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, inner_kernel
-from robocov.geodesic.distances import Graph, relax
+from robocov.geodesic import Graph, relax
 from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
 from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
 

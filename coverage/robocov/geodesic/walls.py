@@ -29,12 +29,8 @@ _DOUBT = 2.0**48
 class Grid:
     """Integer coordinates, kept in floats, for the points of one map.
 
-    Attributes
-    ----------
-    origin : (2,) m
-        Lower left corner of the map.
-    unit : float, m
-        One grid step, a power of two, so that no length is rounded by the change of scale.
+    Its lower left corner is the origin, (2,) m. The unit, one grid step in metres, is a power of two, so that
+    no length is rounded by the change of scale.
     """
 
     origin: Array
