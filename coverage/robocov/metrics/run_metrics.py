@@ -161,7 +161,7 @@ def connections(places: Array, ranges: Array) -> tuple[int, float]:
     neighbours = Neighbours.within(places, ranges)
     if neighbours.complete:
         return 1, float(n) if n > 1 else 0.0
-    one, other, _ = neighbours.closer_than(places, np.inf)
+    one, other = neighbours.pairs()
     parts = int(connected_components(coo_array((np.ones(len(one)), (one, other)), (n, n)), directed=False)[0])
     if n == 1 or parts > 1:
         return parts, 0.0

@@ -25,7 +25,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, counted, shown
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbours import Neighbours, close_pairs
 from robocov.observation.region import Region
 from robocov.observation.scans import Scans
 
@@ -80,19 +80,16 @@ class Observations:
     def neighbours_within(self, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
         """Return the directed pairs of neighbours that are at most `reach` metres apart, for all they know.
 
-        Returns
-        -------
-        robot : (m,), neighbour : (m,)
-            Sorted by robot, then neighbour.
-        offset : (m, 2) m
-            From the neighbour, as the robot knows it, to the robot.
-        distance : (m,) m
+        Robots and neighbours, (m,) each, are sorted: sums over a row are then the same to the last bit
+        whatever robots that this one cannot hear do. Offsets, (m, 2) m, lead from the neighbour, as the robot
+        knows it, to the robot; distances are (m,) m.
         """
-        if self.reported_positions is None:
-            robot, neighbour, distance = self.neighbours.closer_than(self.positions, reach)
+        if self.reported_positions is None and self.neighbours.complete:
+            robot, neighbour, distance = close_pairs(self.positions, reach)
             return robot, neighbour, self.positions[robot] - self.positions[neighbour], distance
         robot, neighbour = self.neighbours.pairs()
-        offset = self.positions[robot] - self.reported_positions
+        known = self.positions[neighbour] if self.reported_positions is None else self.reported_positions
+        offset = self.positions[robot] - known
         distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
         near = distance <= reach
         return robot[near], neighbour[near], offset[near], distance[near]
@@ -111,7 +108,7 @@ class Decision:
     terms : dict of name to (n, 2) N
         The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...).
     cells : Cells or None
-        The cells that the law used.
+        Those that the law used.
     memory : object
         What the robots remember; it is handed back at the next decision.
     """
@@ -223,10 +220,7 @@ class Cells(ABC):
 def checked_decision(made: Any, count: int, controller: str, time: float) -> Decision:
     """Return what a controller decided for `count` robots if it can be carried out and recorded.
 
-    Raises
-    ------
-    ParameterError
-        When it is no decision, or its forces are not finite and (n, 2).
+    Raises ParameterError when it is no decision, or its forces are not finite and (n, 2).
     """
     if not isinstance(made, Decision):
         wanted = "but a Decision was wanted"
@@ -248,10 +242,7 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
 def detached(decision: Decision, controller: str) -> Decision:
     """Return a checked decision with arrays of its own: a user's controller may use its arrays again.
 
-    Raises
-    ------
-    ParameterError
-        When its terms are none.
+    Raises ParameterError when its terms are none.
     """
     if not isinstance(decision.terms, Mapping):
         wanted = "but a dict of forces was wanted"
@@ -262,13 +253,7 @@ def detached(decision: Decision, controller: str) -> Decision:
 
 
 def given_forces(values: Any, count: int, what: str) -> Array:
-    """Return forces from outside, (n, 2) N, if they can be carried out.
-
-    Raises
-    ------
-    ParameterError
-        When they are not finite and (n, 2).
-    """
+    """Return forces from outside, N; a ParameterError when they are not finite and (n, 2)."""
     forces = _rows(values, count, what)
     if not _finite(forces):
         raise ParameterError(f"{what}: {shown(forces.tolist())}, but finite newtons were wanted")

@@ -37,20 +37,14 @@ class Neighbours:
 
     @classmethod
     def within(cls, positions: Array, ranges: Array) -> Neighbours:
-        """Link the robots that are in range of each other.
+        """Link the robots, at (n, 2) m, whose distance is at most the smaller of their ranges, (n,) m.
 
-        Parameters
-        ----------
-        positions : (n, 2) m
-        ranges : (n,) m
-            Two robots are linked when their distance is at most the smaller of their ranges.
-            When all are infinite the graph is complete and is not stored.
+        When all are infinite the graph is complete and is not stored.
         """
-        n = len(positions)
         if np.isinf(ranges).all():
-            return cls(n)
+            return cls(len(positions))
         indptr, _, indices, _ = _pairs(positions, ranges)
-        return cls(n, ranges, indptr, indices)
+        return cls(len(positions), ranges, indptr, indices)
 
     @classmethod
     def of_pairs(
@@ -90,41 +84,17 @@ class Neighbours:
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Return all directed pairs (robot, neighbour), (m,) each, in the order of the rows."""
         if self.indptr is None or self.indices is None:
-            others = ~np.eye(self.count, dtype=bool)
-            robot, neighbour = np.nonzero(others)
+            robot, neighbour = np.nonzero(~np.eye(self.count, dtype=bool))
             return robot, neighbour
         return np.repeat(np.arange(self.count), np.diff(self.indptr)), self.indices
 
     def among(self, working: BoolArray) -> Neighbours:
-        """Return who of the robots that work hears whom; the others neither hear nor are heard.
-
-        Parameters
-        ----------
-        working : (n,) bool
-        """
+        """Return who of the robots that work, (n,), hears whom; the others neither hear nor are heard."""
         if working.all():
             return self
         first, second = self.pairs()
         both = working[first] & working[second]
         return Neighbours.of_pairs(self.count, first[both], second[both], self.ranges)
-
-    def closer_than(self, positions: Array, reach: float) -> tuple[IntArray, IntArray, Array]:
-        """Return the directed pairs of neighbours at most `reach` metres apart.
-
-        Returns
-        -------
-        robot : (m,), neighbour : (m,)
-            Sorted by robot, then neighbour: sums over a row are then the same to the last bit
-            whatever robots that this one cannot hear do.
-        distance : (m,) m
-        """
-        if self.indptr is None or self.indices is None:
-            return close_pairs(positions, reach)
-        first = np.repeat(np.arange(self.count), np.diff(self.indptr))
-        second = self.indices
-        distance = _distances(positions, first, second)
-        near = distance <= reach
-        return first[near], second[near], distance[near]
 
 
 def close_pairs(positions: Array, reach: float) -> tuple[IntArray, IntArray, Array]:
@@ -149,18 +119,9 @@ def binned(
 ) -> tuple[float, float, float, int, int]:
     """Sort points from `first` on into square bins, row by row, so that those in reach are in the next ones.
 
-    Parameters
-    ----------
-    starts : (2 (stop - first) + 8,), order : (stop - first,), written
-        Bin b holds the points ``order[starts[b]:starts[b + 1]]``, ascending.
-
-    Returns
-    -------
-    left, low : float, m
-        Where the bins begin.
-    scale : float, 1/m
-        Bins per metre.
-    columns, rows : int
+    Written are `starts`, (2 (stop - first) + 8,), and `order`, (stop - first,): bin b then holds the points
+    ``order[starts[b]:starts[b + 1]]``, ascending. Returns where the bins begin in x and y, bins per metre,
+    and the numbers of columns and rows.
     """
     count = stop - first
     left = right = points[first, 0]
@@ -237,8 +198,3 @@ def _walked(
                 total += 1
         indptr[i + 1] = total
     return total
-
-
-def _distances(positions: Array, first: IntArray, second: IntArray) -> Array:
-    delta = positions[first] - positions[second]
-    return np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2)

@@ -17,13 +17,14 @@ from robocov.errors import InputError
 class Region:
     """A convex polygon with what the control laws need of it, computed once.
 
+    Raises InputError when the hull of the vertices has no area.
+
     Attributes
     ----------
     vertices : (k, 2) m
         Counter-clockwise, no three collinear, the first not repeated.
     edges : (k, 2) m
         ``vertices[e + 1] - vertices[e]``.
-    lengths : (k,) m
     normals : (k, 2)
         Outward unit normals of the edges.
     offsets : (k,) m
@@ -32,16 +33,10 @@ class Region:
         Vertices, normals and offsets side by side.
     area : float, m²
     centroid : (2,) m
-
-    Raises
-    ------
-    InputError
-        When the hull of the vertices has no area.
     """
 
     vertices: Array
     edges: Array = field(init=False)
-    lengths: Array = field(init=False)
     normals: Array = field(init=False)
     offsets: Array = field(init=False)
     sides: Array = field(init=False)
@@ -62,7 +57,6 @@ class Region:
         values = {
             "vertices": frozen(ring),
             "edges": frozen(edges),
-            "lengths": frozen(lengths),
             "normals": frozen(normals),
             "offsets": frozen(offsets),
             "sides": frozen(np.column_stack([ring, normals, offsets])),

@@ -17,17 +17,9 @@ MOST_RAYS = 3600
 class Scanning:
     """How a controller wants its robots to scan; it says so in an attribute `scanning`.
 
-    Attributes
-    ----------
-    rays : int
-        Evenly round a full turn, the first along +x.
-    period : float, s
-        Between two scans, rounded to whole control periods; the first is at the beginning.
-
-    Raises
-    ------
-    ParameterError
-        When one of them is out of range.
+    The rays are spread evenly round a full turn, the first along +x. The period (s) between two scans is
+    rounded to whole control periods; the first scan is at the beginning. A ParameterError is raised when one
+    of them is out of range.
     """
 
     rays: int = 120

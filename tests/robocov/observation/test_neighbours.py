@@ -3,7 +3,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from voronoi_cases import SQUARE
 
+from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours, close_pairs
 
 
@@ -37,18 +39,23 @@ def test_two_robots_are_neighbours_when_both_are_in_range(n: int, seed: int) -> 
         assert neighbours.of(i).tolist() == expected
 
 
+def seen(positions: np.ndarray, neighbours: Neighbours) -> Observations:
+    return Observations(positions, positions, neighbours, positions, SQUARE)
+
+
 def test_without_limits_everybody_hears_everybody() -> None:
     positions = np.array([[0.0, 0.0], [1e5, 0.0], [0.0, 2.0]])
     neighbours = Neighbours.within(positions, np.full(3, np.inf))
     assert neighbours.complete
     assert neighbours.of(1).tolist() == [0, 2]
-    first, second, _ = neighbours.closer_than(positions, 5.0)
+    first, second, _, _ = seen(positions, neighbours).neighbours_within(5.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
 def test_close_pairs_of_neighbours_only() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
     neighbours = Neighbours.within(positions, np.array([0.5, 3.0, 3.0]))
-    first, second, distance = neighbours.closer_than(positions, 2.0)
+    first, second, offset, distance = seen(positions, neighbours).neighbours_within(2.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
+    np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])
