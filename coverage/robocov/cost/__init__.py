@@ -30,8 +30,7 @@ from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, ParameterError, checked, counted, shown
-from robocov.geodesic import Geodesics
-from robocov.geodesic import BINS
+from robocov.geodesic import BINS, Geodesics
 from robocov.geodesic.visibility import AngularWallIndex
 from robocov.geodesic.walls import along_z_curve, box_tree
 
