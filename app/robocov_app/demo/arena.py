@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.layout import Layout
-    from robocov_app.demo.tools import Point, Preview
+    from robocov_app.demo.tool import Point, Preview
     from robocov_app.view.theme import Theme
 
 MOST_RAYS = 720

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.density import Raster, sampled
-from robocov_app.demo.tool import Base, Point, Preview, apart
+from robocov_app.demo.tool import Point, Preview, Tool, apart
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +41,7 @@ _RING = 48
 
 
 @dataclass
-class Brush(Base):
+class Brush(Tool):
     """Paints the density: the left button raises it, the right one lowers it.
 
     Attributes
@@ -83,7 +83,6 @@ class Brush(Base):
         return f"the brush has a radius of {self.radius:g} m"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Begin a stroke."""
         environment = session.environment
         self._before, self._at, self._shown = environment, point, -1e9
         raster = painted_raster(environment)
@@ -93,7 +92,6 @@ class Brush(Base):
         return None
 
     def move(self, session: Session, point: Point) -> None:
-        """Paint on."""
         if self._before is None or self._at is None:
             self._at = point
             return
@@ -114,7 +112,6 @@ class Brush(Base):
             self._show(session)
 
     def release(self, session: Session, point: Point) -> str | None:
-        """End the stroke: from here on it can be undone."""
         if self._before is None:
             return None
         self.move(session, point)
@@ -126,7 +123,6 @@ class Brush(Base):
         return words
 
     def cancel(self, session: Session) -> bool:
-        """Give the stroke up."""
         before, self._before = self._before, None
         self._at = None
         if before is None:
@@ -136,7 +132,6 @@ class Brush(Base):
         return True
 
     def preview(self, session: Session) -> Preview | None:
-        """Show how large the brush is."""
         if self._at is None:
             return None
         turn = np.linspace(0.0, 2.0 * np.pi, _RING + 1)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache, cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -62,20 +63,34 @@ class Known:
         return Field(self.lattice(), self.result)
 
 
-class Costs(Protocol):
-    """Where the window has its costs from."""
+class Costs(ABC):
+    """Where the window has its costs from.
 
-    known: dict[int, Known]
-    """By pane; of the map as it is."""
+    Parameters
+    ----------
+    lattice : int
 
-    state: str
-    """What is to be said about a map that is not ready yet, or why there is no cost; else empty."""
+    Attributes
+    ----------
+    known : dict of int to Known
+        By pane; of the map as it is.
+    state : str
+        What is to be said about a map that is not ready yet, or why there is no cost; else empty.
+    """
 
+    def __init__(self, lattice: int = LATTICE) -> None:
+        self.known: dict[int, Known] = {}
+        self.state = ""
+        self._lattice = lattice
+        self._waiting: dict[int, Question] = {}
+
+    @abstractmethod
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
 
     def forget(self) -> None:
         """Leave out what has been asked and is not yet answered: it was of another run."""
+        self._waiting, self.known = {}, {}
 
     def ask(
         self,
@@ -87,37 +102,33 @@ class Costs(Protocol):
     ) -> None:
         """Ask for the cost of (n, 2) m positions, and for a path from a point.
 
-        With `speeds`, (n,) m/s, for the mean time until the first robot is at a place too.
+        With `speeds`, (n,) m/s, for the mean time until the first robot is at a place too. What was asked
+        about the pane before and is not yet on its way is forgotten.
         """
+        # it keeps its place among the panes that wait, so that each has its turn
+        self._waiting[pane] = Question(time, np.array(positions), pane, point, speeds)
 
+    @abstractmethod
     def poll(self) -> list[tuple[int, Known]]:
         """Return what has been answered since the last call, by pane."""
 
     def close(self) -> None:
-        """End."""
+        """End what works for it."""
+        self.forget()
 
 
-class DirectCosts:
-    """Computes at once, in this process: for pictures that must not depend on the machine's speed.
-
-    Parameters
-    ----------
-    lattice : int
-    """
+class DirectCosts(Costs):
+    """Computes in this process: for pictures that must not depend on the machine's speed."""
 
     def __init__(self, lattice: int = LATTICE) -> None:
-        self.known: dict[int, Known] = {}
-        self.state = ""
-        self._lattice = lattice
+        super().__init__(lattice)
         self._cost: CoverageCost | None = None
         self._momentary: MomentaryCost | None = None
         self._lattices: tuple[CoverageCost, Callable[[], FieldLattice]] | None = None
-        self._asked: dict[int, Question] = {}
 
     def environment(self, environment: Environment) -> None:
-        """Take another map from now on."""
         before = self._cost
-        self.known, self.state, self._asked = {}, "", {}
+        self.known, self.state, self._waiting = {}, "", {}
         self._cost = self._momentary = None
         if before is not None and before.environment.same_place(environment):
             self._cost = before.with_density(environment)
@@ -129,24 +140,8 @@ class DirectCosts:
                 return
         self._momentary = MomentaryCost(self._cost)
 
-    def forget(self) -> None:
-        """Leave out what has been asked."""
-        self._asked, self.known = {}, {}
-
-    def ask(
-        self,
-        pane: int,
-        time: float,
-        positions: Array,
-        point: Array | None = None,
-        speeds: Array | None = None,
-    ) -> None:
-        """Ask; the answer is there at the next `poll`."""
-        self._asked[pane] = Question(time, np.array(positions), pane, point, speeds)
-
     def poll(self) -> list[tuple[int, Known]]:
-        """Return the answers."""
-        asked, self._asked = self._asked, {}
+        asked, self._waiting = self._waiting, {}
         answers = []
         for pane, question in asked.items():
             if self._momentary is None:
@@ -166,57 +161,33 @@ class DirectCosts:
             self._lattices = cost, lattice_of(cost.sites)
         return self._lattices[1]
 
-    def close(self) -> None:
-        """Nothing is to be ended."""
 
-
-class WorkerCosts:
-    """Has it computed by another process, which is asked about one pane after the other.
-
-    Parameters
-    ----------
-    lattice : int
-    """
+class WorkerCosts(Costs):
+    """Has it computed by another process, which is asked about one pane after the other."""
 
     def __init__(self, lattice: int = LATTICE) -> None:
-        self.known: dict[int, Known] = {}
-        self.state = ""
-        self._lattice = lattice
+        super().__init__(lattice)
         self._worker = CostWorker()
         self._generation = -1
-        self._waiting: dict[int, Question] = {}
         self._out = -1.0
         self._ready = False
         self._run = 0
         self._sites: Callable[[], FieldLattice] | None = None
 
     def environment(self, environment: Environment) -> None:
-        """Take another map from now on."""
         self.known, self._waiting, self._ready, self._out = {}, {}, False, -1.0
         self._generation = self._worker.environment(environment, self._lattice)
         self.state = "cost: preparing the map"
 
     def forget(self) -> None:
-        """Leave out what has been asked; answers that are on their way are passed over."""
-        self._waiting, self.known, self._run = {}, {}, self._run + 1
+        super().forget()
+        self._run += 1  # answers that are on their way are passed over
 
-    def ask(
-        self,
-        pane: int,
-        time: float,
-        positions: Array,
-        point: Array | None = None,
-        speeds: Array | None = None,
-    ) -> None:
-        """Ask; what was asked about the pane before and is not yet on its way is forgotten.
-
-        It keeps its place among the panes that wait, so that each has its turn.
-        """
-        self._waiting[pane] = Question(time, np.array(positions), pane, point, speeds)
+    def ask(self, *args: Any, **kwargs: Any) -> None:
+        super().ask(*args, **kwargs)
         self._send()
 
     def poll(self) -> list[tuple[int, Known]]:
-        """Return the answers that have come."""
         answers = []
         for event in self._worker.poll():
             if event.generation != self._generation:
@@ -245,7 +216,6 @@ class WorkerCosts:
         return answers
 
     def close(self) -> None:
-        """End the other process."""
         self._worker.close()
 
     def _send(self) -> None:

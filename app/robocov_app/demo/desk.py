@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from robocov.controllers import CONTROLLERS
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
+from robocov_app.demo.brush import Brush
 from robocov_app.demo.clock import SPEEDS, speed_index, speed_words
 from robocov_app.demo.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.demo.scenario import Law
-from robocov_app.demo.tools import Brush, Hand, Wall, toolbox
+from robocov_app.demo.tools import Hand, Wall, toolbox
 from robocov_app.demo.typed import command
 from robocov_app.output import free_name
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from robocov_app.demo.costs import Costs
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.session import Session
-    from robocov_app.demo.tools import Point, Tool
+    from robocov_app.demo.tool import Point, Tool
 
 SAID_FOR = 5.0
 """Seconds for which a message stays."""

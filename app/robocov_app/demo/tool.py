@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -38,64 +38,38 @@ class Preview:
     marks: bool = True
 
 
-class Tool(Protocol):
-    """What the mouse does."""
-
-    name: str
-    title: str
-    hint: str
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Take a press of the left button; return what to tell.
-
-        `reach` is so many metres as a finger is wide; `number` the robot under the cursor.
-        """
-
-    def move(self, session: Session, point: Point) -> None:
-        """Take a move of the mouse, pressed or not."""
-
-    def release(self, session: Session, point: Point) -> str | None:
-        """Take the button's release; return what to tell."""
-
-    def finish(self, session: Session) -> str | None:
-        """Take Enter, a double or a right click; return what to tell."""
-
-    def cancel(self, session: Session) -> bool:
-        """Take Escape; say whether there was something to give up."""
-
-    def preview(self, session: Session) -> Preview | None:
-        """Return what to show."""
-
-
 @dataclass
-class Base:
-    """A tool that does nothing."""
+class Tool:
+    """What the mouse does; this one does nothing."""
 
     name: str = ""
     title: str = ""
     hint: str = ""
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Do nothing."""
+        """Take a press of the left button; return what to tell.
+
+        `reach` is so many metres as a finger is wide; `number` the robot under the cursor.
+        """
         return None
 
     def move(self, session: Session, point: Point) -> None:
-        """Do nothing."""
+        """Take a move of the mouse, pressed or not."""
 
     def release(self, session: Session, point: Point) -> str | None:
-        """Do nothing."""
+        """Take the button's release; return what to tell."""
         return None
 
     def finish(self, session: Session) -> str | None:
-        """Do nothing."""
+        """Take Enter, a double or a right click; return what to tell."""
         return None
 
     def cancel(self, session: Session) -> bool:
-        """There is nothing to give up."""
+        """Take Escape; say whether there was something to give up."""
         return False
 
     def preview(self, session: Session) -> Preview | None:
-        """There is nothing to show."""
+        """Return what to show."""
         return None
 
 

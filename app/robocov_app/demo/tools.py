@@ -1,42 +1,39 @@
-"""Tools: what the mouse does in the arena. Plain classes; coordinates are metres."""
+"""Tools: what the mouse does in the arena. Coordinates are metres."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robocov.errors import RobocovError
 from robocov_app.demo.brush import Brush
-from robocov_app.demo.drawing import WALL_WIDTH, Circle, Polygon, Wall
-from robocov_app.demo.editing import moved, obstacle_at, with_moved, without_obstacle, words_for
-from robocov_app.demo.tool import Base, Point, Preview, Tool, edited
+from robocov_app.demo.editing import (
+    circle_of,
+    moved,
+    obstacle_at,
+    polygon_of,
+    wall_of,
+    with_moved,
+    with_obstacle,
+    without_obstacle,
+    words_for,
+)
+from robocov_app.demo.tool import Point, Preview, Tool, apart, edited
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from robocov.environment import Obstacle
     from robocov_app.demo.session import Session
 
-__all__ = [
-    "WALL_WIDTH",
-    "Adder",
-    "Base",
-    "Brush",
-    "Circle",
-    "Eraser",
-    "Failer",
-    "Hand",
-    "Point",
-    "Polygon",
-    "Preview",
-    "Ruler",
-    "Tool",
-    "Wall",
-    "toolbox",
-]
+WALL_WIDTH = 0.1
+"""Width of drawn walls in metres."""
 
 
 @dataclass
-class Hand(Base):
+class Hand(Tool):
     """Drags and throws robots, and moves obstacles."""
 
     name: str = "hand"
@@ -51,7 +48,6 @@ class Hand(Base):
     _drags: bool = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Take hold of what is under the cursor; a robot before an obstacle."""
         self._from, self._at, self._drags = point, point, False
         self.robot, self.obstacle = number, None
         if number is not None:
@@ -68,7 +64,6 @@ class Hand(Base):
         return self.robot is not None or self.obstacle is not None
 
     def move(self, session: Session, point: Point) -> None:
-        """Drag."""
         self._at = point
         # a click is no pull
         self._drags = self._drags or bool(np.hypot(*self._by()) > 0.02)
@@ -79,7 +74,6 @@ class Hand(Base):
             session.grab(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:
-        """Let go: what was swung flies on, an obstacle is put down."""
         self._at = point
         robot, obstacle = self.robot, self._dragged(session)
         self.robot = self.obstacle = None
@@ -92,7 +86,6 @@ class Hand(Base):
         return edited(session, with_moved(session.environment, obstacle, *self._by()), words)
 
     def cancel(self, session: Session) -> bool:
-        """Let go without moving anything; then forget the selection."""
         if self.holds:
             self.robot = self.obstacle = None
             session.release()
@@ -103,7 +96,6 @@ class Hand(Base):
         return False
 
     def preview(self, session: Session) -> Preview | None:
-        """Show where the obstacle would go."""
         obstacle = self._dragged(session)
         if obstacle is None:
             return None
@@ -123,7 +115,146 @@ class Hand(Base):
 
 
 @dataclass
-class Eraser(Base):
+class Polygon(Tool):
+    """Draws a polygon, corner by corner."""
+
+    name: str = "polygon"
+    title: str = "Polygon"
+    hint: str = "click the corners; Enter, a double click or a click on the first corner closes it"
+    _corners: list[Point] = field(default_factory=list)
+    _at: Point = (0.0, 0.0)
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        self._at = point
+        if self._ends(point, reach):
+            return self.finish(session)
+        if not self._corners or apart(point, self._corners[-1]) > 1e-6:
+            self._corners.append(point)
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        self._at = point
+
+    def finish(self, session: Session) -> str | None:
+        corners, self._corners = self._corners, []
+        if not corners:
+            return None
+        return edited(session, with_obstacle(session.environment, self._made(corners)), f"{self.name} drawn")
+
+    def cancel(self, session: Session) -> bool:
+        had, self._corners = bool(self._corners), []
+        return had
+
+    def preview(self, session: Session) -> Preview | None:
+        if not self._corners:
+            return None
+        points = (*self._corners, self._at)
+        return Preview(points, len(points) > 2, None, f"{apart(points[-1], points[-2]):.2f} m")
+
+    def _ends(self, point: Point, reach: float) -> bool:
+        """Whether a click there ends it: on the first corner."""
+        return len(self._corners) >= 3 and apart(point, self._corners[0]) < reach
+
+    def _made(self, corners: list[Point]) -> Obstacle:
+        return polygon_of(corners)
+
+
+@dataclass
+class Wall(Polygon):
+    """Draws a wall, point by point."""
+
+    name: str = "wall"
+    title: str = "Wall"
+    hint: str = "click its points; Enter or a double click ends it; [ and ] change its width"
+    width: float = WALL_WIDTH
+
+    def preview(self, session: Session) -> Preview | None:
+        if not self._corners:
+            return None
+        points = (*self._corners, self._at)
+        words = f"{apart(points[-1], points[-2]):.2f} m, {self.width:g} m wide"
+        return Preview(points, False, _tried(self._made, list(points)), words)
+
+    def widen(self, factor: float) -> None:
+        """Draw wider walls, or narrower ones."""
+        self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
+
+    def _ends(self, point: Point, reach: float) -> bool:
+        """Whether a click there ends it: on the last point."""
+        return len(self._corners) >= 2 and apart(point, self._corners[-1]) < 0.3 * reach
+
+    def _made(self, corners: list[Point]) -> Obstacle:
+        return wall_of(corners, self.width)
+
+
+@dataclass
+class Ruler(Tool):
+    """Measures."""
+
+    name: str = "ruler"
+    title: str = "Ruler"
+    hint: str = "drag from one place to another"
+    _from: Point | None = None
+    _at: Point = (0.0, 0.0)
+    _pressed: bool = False
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        self._from = self._at = point
+        self._pressed = True
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        if self._pressed:
+            self._at = point
+
+    def release(self, session: Session, point: Point) -> str | None:
+        self._pressed = False
+        return None
+
+    def cancel(self, session: Session) -> bool:
+        had, self._from = self._from is not None, None
+        return had
+
+    def preview(self, session: Session) -> Preview | None:
+        if self._from is None:
+            return None
+        dx, dy = self._at[0] - self._from[0], self._at[1] - self._from[1]
+        words = f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})"
+        return Preview((self._from, self._at), False, None, words)
+
+
+@dataclass
+class Circle(Ruler):
+    """Draws a round pillar from its middle."""
+
+    name: str = "circle"
+    title: str = "Circle"
+    hint: str = "drag from the middle to the rim"
+
+    def release(self, session: Session, point: Point) -> str | None:
+        middle, self._from = self._from, None
+        if middle is None:
+            return None
+        circle = circle_of(middle, point)
+        return edited(session, with_obstacle(session.environment, circle), "circle drawn")
+
+    def preview(self, session: Session) -> Preview | None:
+        if self._from is None:
+            return None
+        words = f"radius {apart(self._from, self._at):.2f} m"
+        return Preview((self._from, self._at), False, _tried(circle_of, self._from, self._at), words)
+
+
+def _tried(make: Callable[..., Obstacle], *args: object) -> Obstacle | None:
+    """Return an obstacle, None where it cannot be."""
+    try:
+        return make(*args)
+    except RobocovError:
+        return None
+
+
+@dataclass
+class Eraser(Tool):
     """Deletes obstacles and takes robots out."""
 
     name: str = "eraser"
@@ -131,7 +262,6 @@ class Eraser(Base):
     hint: str = "click an obstacle or a robot to delete it"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Delete what is under the cursor; a robot before an obstacle."""
         if number is not None:
             session.remove_robot(number)
             return f"robot {number} taken out"
@@ -143,7 +273,7 @@ class Eraser(Base):
 
 
 @dataclass
-class Adder(Base):
+class Adder(Tool):
     """Lets robots join."""
 
     name: str = "robot"
@@ -151,12 +281,11 @@ class Adder(Base):
     hint: str = "click where a robot is to join"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Let a robot join."""
         return f"robot {session.add_robot(point)} joined"
 
 
 @dataclass
-class Failer(Base):
+class Failer(Tool):
     """Lets robots fail, and work again."""
 
     name: str = "failure"
@@ -164,7 +293,6 @@ class Failer(Base):
     hint: str = "click a robot to let it fail; click it again to revive it"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Let the robot fail, or work again."""
         if number is None:
             return None
         if number in session.circumstances(session.lanes[0]).failed:
@@ -172,47 +300,6 @@ class Failer(Base):
             return f"robot {number} works again"
         session.fail_robot(number)
         return f"robot {number} failed"
-
-
-@dataclass
-class Ruler(Base):
-    """Measures."""
-
-    name: str = "ruler"
-    title: str = "Ruler"
-    hint: str = "drag from one place to another"
-    _from: Point | None = None
-    _at: Point = (0.0, 0.0)
-    _pressed: bool = False
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Begin to measure."""
-        self._from = self._at = point
-        self._pressed = True
-        return None
-
-    def move(self, session: Session, point: Point) -> None:
-        """Measure to here."""
-        if self._pressed:
-            self._at = point
-
-    def release(self, session: Session, point: Point) -> str | None:
-        """Leave the ruler there."""
-        self._pressed = False
-        return None
-
-    def cancel(self, session: Session) -> bool:
-        """Put the ruler away."""
-        had, self._from = self._from is not None, None
-        return had
-
-    def preview(self, session: Session) -> Preview | None:
-        """Show the length."""
-        if self._from is None:
-            return None
-        dx, dy = self._at[0] - self._from[0], self._at[1] - self._from[1]
-        length = float(np.hypot(dx, dy))
-        return Preview((self._from, self._at), False, None, f"{length:.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
 
 
 def toolbox() -> dict[str, Tool]:

@@ -9,10 +9,10 @@ from touched_run import HALL, LLOYD, RAPF, all_told, begun, robots_of, stepped, 
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
+from robocov_app.demo.tool import Tool
 from robocov_app.demo.tools import (
     WALL_WIDTH,
     Adder,
-    Base,
     Circle,
     Eraser,
     Failer,
@@ -63,7 +63,7 @@ def test_the_box_has_every_tool_once():
 
 @pytest.mark.parametrize("name", [*toolbox(), ""])
 def test_a_tool_that_was_not_used_does_nothing(name):
-    tool, session = toolbox().get(name, Base()), begun()
+    tool, session = toolbox().get(name, Tool()), begun()
     before = all_told(session)
     tool.move(session, (1.0, 1.0))
     assert tool.release(session, (1.0, 1.0)) is None
