@@ -60,16 +60,6 @@ class Simulation:
 
     Raises StartError when a robot would start in a wall or in another robot, ParameterError when dt is out of
     range, or team and starts differ in size.
-
-    Examples
-    --------
-    >>> from robocov.controllers import Rapf
-    >>> from robocov.environment import Environment
-    >>> room = Environment("room", ((0, 0), (10, 0), (10, 10), (0, 10)))
-    >>> simulation = Simulation(room, Rapf(), starts=[[1.0, 1.0], [2.0, 1.0]])
-    >>> simulation.step()
-    >>> simulation.positions.shape
-    (2, 2)
     """
 
     def __init__(

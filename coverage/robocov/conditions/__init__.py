@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from numbers import Integral
 from typing import Any, NamedTuple, TypeVar
@@ -240,10 +241,8 @@ def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry,
 
 
 def _place(at: str, given: Any) -> tuple[float, float]:
-    try:
+    with suppress(TypeError, ValueError):
         x, y = given
         if all(is_number(value) and math.isfinite(value) for value in (x, y)):
             return float(x), float(y)
-    except (TypeError, ValueError):
-        pass
     raise ParameterError(f"{at}: place {shown(given)}, but [x, y] in metres was wanted")

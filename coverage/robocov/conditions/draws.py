@@ -29,15 +29,7 @@ def philox(counter: NDArray[np.uint64], key: tuple[int, int]) -> NDArray[np.uint
 
 
 class Draws:
-    """A stream of random numbers for steps and for pairs of robots; seeds and streams are independent.
-
-    Examples
-    --------
-    >>> draws = Draws(seed=7, stream=0)
-    >>> now, later = draws.uniform(3, np.array([0, 1])), draws.uniform(4, np.array([0, 1]))
-    >>> bool((now == draws.uniform(3, np.array([0, 1]))).all()), bool((now == later).any())
-    (True, False)
-    """
+    """A stream of random numbers for steps and for pairs of robots; seeds and streams are independent."""
 
     def __init__(self, seed: int, stream: int) -> None:
         first, second = np.random.SeedSequence(seed, spawn_key=(stream,)).generate_state(2, np.uint32)

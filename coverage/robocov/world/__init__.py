@@ -102,8 +102,8 @@ class World:
         """Whether a robot may be faster than it can be by itself."""
         self._moving = motion(movers, 0.0, 1.0)
         self._contacts: ContactSolver | None = None
-        self._fastest, self._mover_speed = float(team.max_speed.max()), fastest(movers)
-        self._thinnest = float(team.radius.min())
+        self._fastest, self._thinnest = float(team.max_speed.max()), float(team.radius.min())
+        self._mover_speed = max((mover.path.speed for mover in movers), default=0.0)
         self._answered = math.nan
 
     def place(self, run: int, positions: Array) -> None:
@@ -190,12 +190,10 @@ class World:
             answer = np.column_stack([answer[:, :4], limit])
         if len(external):
             limit = np.maximum(limit, self._speeds() + push * dt)
-        state = np.empty((2, len(forces), 2))
         engine.robots[:] = forces.reshape(self._runs, -1, 2)
         engine.forget_contacts()
-        _free_substep(
-            engine.addresses, engine.filled, engine.forces, engine.states, answer, external, state, dt
-        )
+        buffers = engine.addresses, engine.filled, engine.forces, engine.states
+        state = _free_substep(*buffers, answer, external, dt)
         touching: dict[int, list[int]] = {}
         for row in self._touching():
             touching.setdefault(row // self._each, []).append(row)
@@ -218,7 +216,7 @@ class World:
 
     def _resolve_contacts(self, run: int, rows: IntArray, free: Array, dt: float, limit: Array) -> None:
         """Correct the free motion, (2, n, 2), of who touches something, and of whoever is moved by them."""
-        solver = self._contacts or ContactSolver(self.team, self._obstacles)
+        solver = self._contacts or ContactSolver(self.team, self._obstacles, self._mover_speed)
         self._contacts = None  # it is of no use once it was interrupted
         all_rows, net = self._rows(run), self._engine.robots[run]
         radius, begin = self.team.radius[all_rows], all_rows.start
@@ -335,9 +333,9 @@ class ContactSolver:
     It keeps nothing from one call to the next: what pymunk remembers of contacts goes with the discs.
     """
 
-    def __init__(self, team: Team, obstacles: Obstacles) -> None:
+    def __init__(self, team: Team, obstacles: Obstacles, mover_speed: float) -> None:
         _, movers, _ = obstacles
-        self._team, self._movers, self._mover_speed = team, movers, fastest(movers)
+        self._team, self._movers, self._mover_speed = team, movers, mover_speed
         self._space = obstacle_space(obstacles)
         # sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio
         self._space.iterations = 20 + math.ceil(2.0 * float(team.mass.max() / team.mass.min()))
@@ -347,7 +345,7 @@ class ContactSolver:
         self._space.collision_bias = 1e-9 if movers else 0.0
         self._engine = Engine([self._space], len(movers), len(team))
         self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
-        self._robots: dict[int, tuple[pymunk.Body, pymunk.Circle]] = {}
+        self._robots = list(map(robot_body, team.mass.tolist(), team.radius.tolist()))
 
     def moved(
         self, rows: IntArray, positions: Array, velocities: Array, forces: Array, motion: Array, dt: float
@@ -356,15 +354,11 @@ class ContactSolver:
 
         Net forces, (k, 2) N, are constant; `motion`, (m, 4) m and m/s, is that of the obstacles that move.
         """
-        for row in rows.tolist():
-            if row not in self._robots:
-                self._robots[row] = robot_body(float(self._team.mass[row]), float(self._team.radius[row]))
         robots = [self._robots[row] for row in rows.tolist()]
         reached = velocities + forces * (dt / self._team.mass[rows, None])
         square = max((velocities**2).sum(axis=1).max(), (reached**2).sum(axis=1).max())
         parts = math.ceil((math.sqrt(square) + self._mover_speed) * dt / self._travel)
         parts = min(_MOST_SUBSTEPS, max(1, parts))
-
         engine, space = self._engine, self._space._space
         states, net = engine.states[0], engine.forces[0]
         mine = slice(len(motion), len(motion) + len(rows))
@@ -441,11 +435,6 @@ def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
     return body, disc
 
 
-def fastest(movers: tuple[Mover, ...]) -> float:
-    """Return the largest speed of obstacles that move, m/s."""
-    return max((mover.path.speed for mover in movers), default=0.0)
-
-
 def motion(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
     """Return where moving obstacles are at a time, and how fast for `dt` seconds, (m, 4) m and m/s."""
     state = np.empty((len(movers), 4))
@@ -482,10 +471,9 @@ def _free_substep(
     states: Array,
     answer: Array,
     external: Array,
-    moved: Array,
     dt: float,
-) -> None:
-    """Move all bodies by one substep as if nothing touched; make net forces of the controllers'.
+) -> Array:
+    """Return the state after a substep as if nothing touched; make net forces of the controllers'.
 
     The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
     dt; then acceleration and speed are limited, in this order. Limiting the speed cannot break the limit of
@@ -508,7 +496,9 @@ def _free_substep(
             forces[run, row, 1] += external[i, 1]
     for run in range(len(addresses)):
         observed_step(addresses, filled, run, dt)
+    moved = np.empty((2, len(answer), 2))
     for i in range(len(answer)):
         for k in range(2):
             moved[0, i, k] = states[i // each, begin + i % each, k]
             moved[1, i, k] = states[i // each, begin + i % each, 2 + k]
+    return moved
