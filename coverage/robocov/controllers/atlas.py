@@ -15,7 +15,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.placement import CoverageDemand, OwnPlace, Table, own_place, team_places
+from robocov.planning.placement import CoverageDemand, OwnPlace, own_place, team_places
 from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
@@ -65,7 +65,7 @@ class PlannerState:
     since: float = 0.0  # when it began, or the robots that it hears became others, s
     planned: DiscoveredMap | None = None  # the map when the last plan was made,
     ways: GridPlanner | None = None  # and what was computed of it
-    table: Table | None = None
+    team_ways: GridPlanner | None = None
     situation: Array | None = None  # (k, 2) m, where the robots were at the last plan, this one first,
     group: IntArray | None = None  # (k,), who they were,
     quiet: bool = False  # whether all others rested then,
@@ -219,7 +219,7 @@ class Atlas(Law):
         if ways is None or not same_window or not np.array_equal(ways.blocked, blocked):
             ways = GridPlanner(raster, window, blocked, float(team.radius[i]) + self.clearance)
             # nodes of another window have other numbers
-            state = replace(state, ways=ways, table=None, node=state.node if same_window else -1)
+            state = replace(state, ways=ways, team_ways=None, node=state.node if same_window else -1)
         demand = CoverageDemand(state.known, window, seen.density)
         settling = 2.0 ** min((seen.time - since) / self.settling, 60.0)
         if crowd:
@@ -242,20 +242,14 @@ class Atlas(Law):
         self, state: PlannerState, seen: Observations, still: BoolArray, settling: float, together: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
-        known, ways, situation, group, table = (
-            state.known,
-            state.ways,
-            state.situation,
-            state.group,
-            state.table,
-        )
-        assert ways is not None and situation is not None and group is not None
-        if table is None:
+        known, situation, group, ways = state.known, state.situation, state.group, state.team_ways
+        assert state.ways is not None and situation is not None and group is not None
+        if ways is None:
             window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
             blocked = window.cut(known.blocked, True)
-            table = Table.of(GridPlanner(known.raster, window, blocked, ways.clearance))
+            ways = GridPlanner(known.raster, window, blocked, state.ways.clearance)
         # who is there already does not leave for what may not be there
-        weights = CoverageDemand(known, table.ways.window, seen.density, sure=not together).weights
+        weights = CoverageDemand(known, ways.window, seen.density, sure=not together).weights
         fixed = np.concatenate([[False], still])
         begin = situation.copy()
         if state.places is not None:
@@ -266,8 +260,8 @@ class Atlas(Law):
         # who decides alone goes nowhere else while others do
         threshold = min(1.0, self.threshold * settling) if together or state.quiet else 1.0
         nearby = min(1.0, self.nearby * settling)
-        places = team_places(table, weights, situation, begin, fixed, threshold, nearby)
-        return replace(state, table=table, places=np.column_stack([group, places])), places
+        places = team_places(ways, weights, situation, begin, fixed, threshold, nearby)
+        return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(
         self, state: PlannerState, demand: CoverageDemand, own: OwnPlace, place: Array, period: float

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray
 from robocov.k_median import improved, moved
 from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, openness
 
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from robocov.planning.discovered import DiscoveredMap
     from robocov.planning.wayfinding import GridPlanner, Window
 
-MOST_SOURCES = 180  # a plan for a team chooses among at most so many nodes
 _FAR = 1e9  # metres that stand for "nobody is there"
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
@@ -94,38 +92,23 @@ class CoverageDemand:
         a, b = row[:, None] + [0, 1, 0, -1], column[:, None] + [1, 0, -1, 0]
         node = np.clip(a // stride * columns + b // stride, 0, len(home) - 1)
         worth = usable[a + 1, b + 1] * stake[row, column][:, None] / (1.0 + home[node])
-        first = (
-            np.array(raster.origin) + (np.array([self.window.column, self.window.row]) + 0.5) * raster.cell
-        )
+        first = raster.middles(*np.array(self.window[:2]))
         for x, y in (np.array(former).reshape(-1, 2) - first) / raster.cell:
             worth[(x - b) ** 2 + (y - a) ** 2 < (_SEEN_ENOUGH / raster.cell) ** 2] = 0.0
         best = worth.argmax()
-        return (
-            first + np.array([b.flat[best], a.flat[best]]) * raster.cell if worth.flat[best] > 0.0 else None
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Distances from some nodes, among which a plan for a team chooses, to all."""
-
-    ways: GridPlanner
-    sources: IntArray  # (c,)
-    distance: Array  # (c, m) m
-
-    @classmethod
-    def of(cls, ways: GridPlanner) -> Table:
-        """Return the table of every k-th node in both directions, as many as are allowed."""
-        row, column = np.divmod(np.arange(len(ways.nodes)), ways.window.columns)
-        for k in count(1):
-            sources = np.flatnonzero(ways.roomy & (row % k == k // 2) & (column % k == k // 2))
-            if len(sources) <= MOST_SOURCES:
-                break
-        return cls(ways, sources, ways.table(sources))
+        if not worth.flat[best] > 0.0:
+            return None
+        return np.asarray(first + np.array([b.flat[best], a.flat[best]]) * raster.cell)
 
 
 def team_places(
-    table: Table, weights: Array, now: Array, begin: Array, fixed: BoolArray, threshold: float, nearby: float
+    ways: GridPlanner,
+    weights: Array,
+    now: Array,
+    begin: Array,
+    fixed: BoolArray,
+    threshold: float,
+    nearby: float,
 ) -> Array:
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
@@ -136,17 +119,16 @@ def team_places(
     `nearby`. Who goes to which of the places is such that the sum of the squared ways is least: then the
     choice stays the same while the robots are on their way, and their ways do not cross.
     """
-    ways = table.ways
     home = ways.standing(now[0])
     if home < 0:
         return begin
     reached = np.isfinite(ways.distances(home))
-    usable = reached[table.sources]
-    sources = table.sources[usable]
+    usable = reached[ways.sources]
+    sources = ways.sources[usable]
     target = reached & (weights > 0.0)
     if len(sources) < len(now) or not target.any():
         return begin
-    distance = table.distance[usable]
+    distance = ways.source_distances[usable]
     nodes = ways.nodes[sources]
 
     chosen = np.full(len(now), -1, dtype=np.intp)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import count
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -31,6 +32,7 @@ _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half the directions; the others are their opposites."""
 
 _NEAREST = 12  # so many nodes are tried for the first, and the last, of a route
+_MOST_SOURCES = 180  # a plan for a team chooses among at most so many nodes
 _FINE = 0.5  # a straight line is looked at after every so many cells
 
 
@@ -146,6 +148,21 @@ class GridPlanner:
             lengths.append(np.full(joined, math.hypot(down, right) * self.spacing))
         edges = np.concatenate(begins), np.concatenate(ends)
         return csr_array((np.concatenate(lengths), edges), shape=(number.size, number.size))
+
+    @cached_property
+    def sources(self) -> IntArray:
+        """Every k-th node in both directions, as many as a plan for a team may choose among."""
+        row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
+        for k in count(1):
+            sources = np.flatnonzero(self.roomy & (row % k == k // 2) & (column % k == k // 2))
+            if len(sources) <= _MOST_SOURCES:
+                break
+        return sources
+
+    @cached_property
+    def source_distances(self) -> Array:
+        """The distances from the sources to all nodes, (c, m) m."""
+        return self.table(self.sources)
 
     def cells(self, points: Array) -> tuple[IntArray, IntArray]:
         """Return row and column, in the window, of the cells of (..., 2) points, the nearest for others."""

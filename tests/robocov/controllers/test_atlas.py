@@ -189,9 +189,9 @@ def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
     asked: list[tuple[float, float, float, float]] = []
     plan, place = atlas.team_places, atlas.own_place
 
-    def planned(table, weights, situation, begin, fixed, threshold, nearby):
+    def planned(ways, weights, situation, begin, fixed, threshold, nearby):
         asked.append((some.time, threshold, nearby, math.nan))
-        return plan(table, weights, situation, begin, fixed, threshold, nearby)
+        return plan(ways, weights, situation, begin, fixed, threshold, nearby)
 
     def placed(ways, weights, elsewhere, begin, former, rest, steps):
         asked[-1] = (*asked[-1][:3], rest)
