@@ -10,8 +10,9 @@ results is only looked up in `CONTROLLERS`, and shown by `short_name`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
@@ -31,9 +32,6 @@ from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import Source, class_in_file, fault_of
 from robocov.errors import ParameterError, unknown_name
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 __all__ = [
     "CONTROLLERS", "FLAGSHIP", "Atlas", "AtlasShared", "Barrier", "Controller", "Dispersion", "GeodesicLloyd",
     "Howard", "IndividualController", "Individually", "Lloyd", "OwnView", "Poduri",
@@ -44,10 +42,8 @@ __all__ = [
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
     for kind in (
-        # the default comparison first, in its order
-        *(Rapf, Rpf, Lloyd, Atlas),
-        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
-        AtlasShared,
+        *(Rapf, Rpf, Lloyd, Atlas),  # the default comparison, in its order
+        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd, AtlasShared),
     )
 }
 """The built-in controllers by name."""

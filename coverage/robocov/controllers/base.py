@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias, get_args, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.controllers.gains import choice, validate_gains
+from robocov.environment import Environment
 from robocov.errors import ParameterError, shown
-from robocov.observation import Decision
+from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import weighted_partition
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from robocov.arrays import Array
-    from robocov.environment import Environment
-    from robocov.observation import Observations
-    from robocov.observation.region import Region
-    from robocov.robots import Team
-    from robocov.voronoi.delaunay import Mesh
-    from robocov.voronoi.weighted_cells import WeightedCells
+from robocov.voronoi.delaunay import Mesh
+from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
 """What a law goes by: what the robot itself senses and hears, maps that neighbours tell each other as

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from robocov.controllers.user_modules import fault_of
 from robocov.errors import ParameterError, RobocovError, is_number, shown, unknown_name
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 Value: TypeAlias = float | str | None
 """What a gain may be: a number, None for no limit, or one of the words of an `Option`."""

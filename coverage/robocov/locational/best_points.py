@@ -15,18 +15,14 @@ jumps within a cell, the error is of the order of the distance of the nodes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import inner_kernel, kernel
+from robocov.density import Density
 from robocov.errors import ParameterError, unknown_name
 from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, derivatives
 from robocov.observation import Cells
-
-if TYPE_CHECKING:
-    from robocov.density import Density
 
 TARGETS = ("centroid", "sensing", "median")
 """The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, by which the coverage cost (22) counts."""

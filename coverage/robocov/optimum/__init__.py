@@ -10,31 +10,25 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 from scipy.optimize import LbfgsInvHessProduct
 from scipy.spatial import cKDTree
+from shapely import MultiPolygon
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.cost import CoverageCost
-from robocov.environment import START_GAP
+from robocov.cost import CoverageCost, CoverageResult
+from robocov.environment import START_GAP, Environment
 from robocov.errors import ParameterError, checked, is_number, shown
 from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from shapely import MultiPolygon
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.cost import CoverageResult
-    from robocov.environment import Environment
 
 MOST_ROBOTS = 500
 MOST_RESTARTS = 100_000

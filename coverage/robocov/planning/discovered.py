@@ -9,21 +9,17 @@ count is said by their `openness`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, kernel
+from robocov.observation.region import Region
 from robocov.observation.scans import headings
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from robocov.observation.region import Region
 
 UNKNOWN, FREE, PRESUMED, WALL = 0, 1, 2, 3
 """What is known of a cell, the more the higher."""

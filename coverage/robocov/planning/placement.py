@@ -9,9 +9,9 @@ with geodesic distances d. An unknown cell counts by how likely it is free (see 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,10 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray
+from robocov.density import Density
 from robocov.k_median import improved, moved
-from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, openness
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from robocov.density import Density
-    from robocov.planning.discovered import DiscoveredMap
-    from robocov.planning.wayfinding import GridPlanner, Window
+from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, DiscoveredMap, openness
+from robocov.planning.wayfinding import GridPlanner, Window
 
 _FAR = 1e9  # metres that stand for "nobody is there"
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again

@@ -8,10 +8,11 @@ straight line between them that is too close to a wall; nodes close to walls can
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import count
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.planning.discovered import dilate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from robocov.planning.discovered import Raster
+from robocov.planning.discovered import Raster, dilate
 
 Cell = TypeVar("Cell", bound=np.generic)
 
@@ -126,7 +122,7 @@ class GridPlanner:
         _, _, rows, columns, stride = self.window
         number = np.arange(rows * columns).reshape(rows, columns)
         cells = self.tight + np.uint8(2) * self.blocked
-        begins, ends, lengths = [], [], []
+        edges = []
         for down, right in _MOVES:
             # nodes from which the move stays in the window, and all cells that it crosses
             high, wide, low = max(0, rows - down), max(0, columns - abs(right)), max(0, -right)
@@ -136,18 +132,13 @@ class GridPlanner:
                 met |= cells[top : top + high * stride : stride, left : left + wide * stride : stride]
             end = number[:high, low : low + wide].ravel()
             other = end + down * columns + right
-            way = (met & 1 == 0).ravel()
-            last = (met & 2 == 0).ravel() & ~way
-            onto, back = (
-                last & self.roomy[end] & ~self.roomy[other],
-                last & self.roomy[other] & ~self.roomy[end],
-            )
-            begins += [end[way | onto], other[way | back]]
-            ends += [other[way | onto], end[way | back]]
-            joined = np.count_nonzero(way | onto) + np.count_nonzero(way | back)
-            lengths.append(np.full(joined, math.hypot(down, right) * self.spacing))
-        edges = np.concatenate(begins), np.concatenate(ends)
-        return csr_array((np.concatenate(lengths), edges), shape=(number.size, number.size))
+            way, no_wall = (met & 1 == 0).ravel(), (met & 2 == 0).ravel()
+            for one, two in ((end, other), (other, end)):
+                some = way | (no_wall & self.roomy[one] & ~self.roomy[two])
+                length = math.hypot(down, right) * self.spacing
+                edges.append((one[some], two[some], np.full(np.count_nonzero(some), length)))
+        begins, ends, lengths = (np.concatenate(part) for part in zip(*edges, strict=True))
+        return csr_array((lengths, (begins, ends)), shape=(number.size, number.size))
 
     @cached_property
     def sources(self) -> IntArray:
