@@ -10,8 +10,8 @@ from pydantic import Field
 
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError
-from robocov.files.documents import Document, read_document, wanted
 from robocov.files.result_folder import settle
+from robocov.files.strictjson import Document, read_document, wanted
 from robocov.metrics.results import read_history
 from robocov.record import Record
 

@@ -21,8 +21,6 @@ from typing import Any, NamedTuple, TypeAlias, TypeGuard
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
-MOST_LISTED = 20
-"""Mistakes of one document that are told of: to find the line of each takes as long as reading the file."""
 _LONGEST = 60
 """Characters of a value or a name that are told."""
 
@@ -65,6 +63,8 @@ class MapError(InputError):
     are `unlisted` ones beside these.
     """
 
+    MOST_LISTED = 20  # to find the line of each takes as long as reading the file
+
     mistakes: tuple[Mistake, ...] = ()
     unlisted: int = 0
     where: str = ""
@@ -76,7 +76,7 @@ class MapError(InputError):
         """Return the error of a document with at least one mistake, of which `MOST_LISTED` are kept."""
         others = len(mistakes) - 1 + unlisted
         error = cls(f"{mistakes[0].told(where)}{f' (and {others} more)' if others else ''}")
-        error.mistakes, error.where = tuple(mistakes[:MOST_LISTED]), where
+        error.mistakes, error.where = tuple(mistakes[: cls.MOST_LISTED]), where
         error.unlisted = others + 1 - len(error.mistakes)
         error.line, error.column = mistakes[0].line, mistakes[0].column
         return error

@@ -17,8 +17,7 @@ from shapely import GeometryCollection, LineString, Polygon
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, PointsStart, WallObstacle
 from robocov.errors import MapError, one_line
-from robocov.files.documents import check_header
-from robocov.files.strictjson import located, parse, require_json
+from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of, dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, FORMAT, LARGEST, VERSION
 from robocov_app.editor.annotations import annotated, taken_apart

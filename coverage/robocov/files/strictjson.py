@@ -1,5 +1,7 @@
 """JSON as files should be: UTF-8, finite numbers, no key twice, no absurd depth; errors name the place.
 
+Files that robocov wrote itself are read back through models, `Document`.
+
 Parsing forgets where values were, so that valid files cost nothing; after an error the text is
 walked again along the path to the place, and what lies beside that path is skipped by the parser.
 """
@@ -11,12 +13,15 @@ import math
 import re
 from codecs import BOM_UTF8
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import count
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown
+from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown, shown_json
 
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 32
@@ -155,7 +160,9 @@ def offset_of(text: str, path: Sequence[str | int], *, at_key: bool = False) -> 
     """
     key_at = at = _after_space(text, 0)
     for step in path:
-        found = [places for key, *places in _members(text, at) if key == step] if text[at] in "{[" else []
+        members = _members(text, at) if text[at] in "{[" else ()
+        to_step = islice(members, step + 1 if isinstance(step, int) else None)
+        found = [places for key, *places in to_step if key == step]
         if not found:
             return at
         key_at, at = found[-1]
@@ -252,3 +259,76 @@ def _is_text(text: str) -> bool:
 
 def _whole_number(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
+
+
+class Document(BaseModel):
+    """An object in a file of results: strict about what it knows, and what else is there is kept unread."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+
+
+Kind = TypeVar("Kind", bound=Document)
+_WORDS = {
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+}
+"""Words for what was wanted, by the type of pydantic's error."""
+
+
+def wanted(words: str) -> WrapValidator:
+    """Return what makes messages about a field of a model say that `words` were wanted."""
+
+    def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
+        try:
+            return handler(value)
+        except ValidationError:
+            raise PydanticCustomError("wanted", words) from None
+
+    return WrapValidator(checked)
+
+
+def read_document(path: Path, kind: type[Kind], form: str, version: int) -> Kind:
+    """Return the content of a JSON file that robocov wrote, of that ``format`` and ``version``."""
+    where = str(path)
+    document = parse(read_bytes(path), where)
+    check_header(document, where, form, version)
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise refused(error, where, _mistake) from None
+
+
+def check_header(document: object, where: str, form: str, version: int) -> None:
+    """Raise `MapError` on what is not of a format, or of another version, before its content is looked at."""
+    if not isinstance(document, dict):
+        kind = f"a JSON object with a {form.removeprefix('robocov-')}"
+        raise MapError.of(where, [Mistake((), f"{shown_json(document)}, but {kind} was wanted")])
+    for key, right in (("format", form), ("version", version)):
+        found = document.get(key)
+        if type(found) is type(right) and found == right:
+            continue
+        state = shown_json(found) if key in document else "missing"
+        newer = type(found) is int and key == "version" and found > version
+        what = f"{state}, but {shown_json(right)} was wanted"
+        what += "; it was written by a newer robocov" if newer else ""
+        raise MapError.of(where, [Mistake.at((key,), what)])
+
+
+def refused(error: ValidationError, where: str, mistake: Callable[[ErrorDetails], Mistake]) -> MapError:
+    """Return the error of a document that is not like its model; `mistake` puts pydantic's in words."""
+    details = error.errors(include_url=False, include_context=False)
+    # a misspelt key is also a missing one: naming the key that is there helps more
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
+    listed = [mistake(detail) for detail in details[: MapError.MOST_LISTED]]
+    return MapError.of(where, listed, len(details) - len(listed))
+
+
+def _mistake(detail: ErrorDetails) -> Mistake:
+    path = tuple(step for step in detail["loc"] if step != "[key]")
+    if detail["type"] == "missing":
+        return Mistake.at(path, "missing")
+    words = detail["msg"] if detail["type"] == "wanted" else _WORDS.get(detail["type"], "another value")
+    return Mistake.at(path, f"{shown_json(detail['input'])}, but {words} was wanted")

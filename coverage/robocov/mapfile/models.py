@@ -17,7 +17,7 @@ from robocov import density, environment
 from robocov.density import FINEST, HEAVIEST, Interpolation
 from robocov.environment import Repeat
 from robocov.errors import Mistake, place, shown_json, unknown_name
-from robocov.files.documents import check_header, refused
+from robocov.files.strictjson import check_header, refused
 
 FORMAT = "robocov-map"
 VERSION = 1

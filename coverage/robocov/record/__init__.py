@@ -25,8 +25,8 @@ from robocov.errors import InputError, OutputError, ParameterError, counted, rea
 from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
-from robocov.files.documents import Document, read_document, wanted
 from robocov.files.result_folder import settle
+from robocov.files.strictjson import Document, read_document, wanted
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
@@ -45,7 +45,6 @@ _COLUMNS = {
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 _LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
 """Largest numbers in the arrays that are finite throughout, s, m, m/s and N."""
-
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]

@@ -18,7 +18,7 @@ from example_map import DELETED, DOCUMENT, SCHEMA, changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.errors import MOST_LISTED, MapError
+from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
 from robocov.mapfile.models import validate
 
@@ -224,8 +224,8 @@ def test_of_very_many_mistakes_some_are_listed_and_all_counted(place: Callable[[
     starts = {"given": {"kind": "points", "positions": [place(k) for k in range(50)]}}
     with pytest.raises(MapError, match=r"\(and 49 more\)$") as caught:
         parse_map(json.dumps(changed("starts", starts)), "m.json")
-    assert len(caught.value.mistakes) == MOST_LISTED
-    assert caught.value.unlisted == 50 - MOST_LISTED
+    assert len(caught.value.mistakes) == MapError.MOST_LISTED
+    assert caught.value.unlisted == 50 - MapError.MOST_LISTED
 
 
 def test_lines_are_looked_up_in_large_files_too() -> None:
