@@ -28,10 +28,9 @@ _IN_REGISTERS = sys.platform != "win32" and platform.machine() in ("x86_64", "aa
 
 
 class RangeSensor:
-    """Asks a static pymunk space for what a robot would measure.
+    """Asks a static pymunk space for what a robot would measure among pieces as of `solid.solid_pieces`.
 
-    `pieces` are convex polygons, (k, 2) m each, as of `solid.solid_pieces`; obstacles that move are where
-    they are at time zero, until they are to `show` another time.
+    Obstacles that move are where they are at time zero, until they are to `show` another time.
     """
 
     def __init__(self, pieces: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
@@ -79,8 +78,7 @@ class RangeSensor:
     def scans(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
         """Cast `rays` rays evenly round a full turn from each place, (n, 2) m, the first along +x.
 
-        Returns distances, (n, rays) m, the range, (n,) m, where a ray meets nothing, and whether it meets
-        something.
+        Returns distances, (n, rays) m, the range, (n,) m, where nothing is met, and whether something is.
         """
         limit = np.minimum(ranges, _FARTHEST)
         ends = positions[:, None, :] + limit[:, None, None] * headings(rays)

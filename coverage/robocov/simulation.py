@@ -41,14 +41,12 @@ class Simulation:
 
     Parameters
     ----------
-    starts, velocities : (n, 2) m, (n, 2) m/s
-        Centres of the robots at the beginning, and how they move; by default they are at rest.
+    starts, velocities, time : (n, 2) m, (n, 2) m/s, s
+        At the beginning; by default robots are at rest.
     team : Team
         By default `Team.homogeneous(n)`.
     dt : float, s
         Control period. The physics takes substeps where it needs them.
-    time : float, s
-        At the beginning.
     conditions : Conditions or None
         What goes wrong, or changes, during the run; None: nothing does.
     runs : int
@@ -251,10 +249,7 @@ class Simulation:
         self._begin_step()
 
     def restart(self, run: int, positions: Array) -> None:
-        """Put the robots of a run to other places, at rest; time goes on.
-
-        Raises StartError when a robot would start in a wall or in another robot of that run.
-        """
+        """Put the robots of a run to other places, at rest; raises StartError where they do not fit."""
         check_starts(self.environment.at(self.time), positions, self.team[self._each_run[run]], 1e-6)
         assert isinstance(self._world, World)
         self._world.place(run, positions)
@@ -356,12 +351,8 @@ def simulate_many(
     Teams of up to 15 robots under a law that remembers nothing (RAPF, RPF, Lloyd, range-limited), without
     conditions and moving obstacles, are moved on together, several times as quickly; others one by one.
 
-    Parameters
-    ----------
-    starts, conditions : sequences of (n, 2) m, and of Conditions or None
-        Of each run; teams may differ in size without `team`. All else is the same for all runs.
-    start, seeds : str, sequence of int
-        Where the starts came from, kept in the records.
+    `starts`, (n, 2) m each, may differ in size without `team`; they, `conditions` and `seeds` are of each
+    run, all else is the same for all. `start` and `seeds` say where the starts came from, for the records.
 
     Examples
     --------

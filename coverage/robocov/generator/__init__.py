@@ -16,8 +16,7 @@ from robocov.generator.blocks import city
 from robocov.generator.caves import cave
 from robocov.generator.mazes import maze
 from robocov.generator.polygons import scattered
-from robocov.generator.request import AREA_TOLERANCE as AREA_TOLERANCE
-from robocov.generator.request import SIDES, Request
+from robocov.generator.request import AREA_TOLERANCE, SIDES, Request
 from robocov.generator.rooms import building
 from robocov.mapfile.check import check_rules
 

@@ -85,8 +85,7 @@ class Trim(NamedTuple):
 def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return blocks between streets, the first that are cut the widest; None if they block too little.
 
-    Streets are as wide as the blocked area allows, up to a limit; what is too much then is taken off the
-    blocks all around. The corner of the start is a square.
+    Streets are as wide as the blocked area allows, up to a limit; then blocks become smaller all around.
     """
     cells = town_cells(request, rng)
     if cells is None:

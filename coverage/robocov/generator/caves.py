@@ -1,9 +1,8 @@
 """Maps of the kind `caves`: chambers and tunnels between smooth walls of rock, and pillars.
 
-Where the middle of a robot may be is what a random field leaves below a level, raised along the boundary.
-Its parts are joined by tunnels, and all of it is widened by a radius of at least half the gap (a dilation:
-J. Serra, *Image Analysis and Mathematical Morphology*, 1982), so that a disc of that radius gets everywhere.
-Where two parts of it then meet in a window that is narrower, a tunnel is led through that.
+The core is where a random field, raised along the boundary, is below a level. Its parts are joined by
+tunnels, and it is dilated (J. Serra, *Image Analysis and Mathematical Morphology*, 1982) by at least half the
+gap. Where two parts of it then meet in a window that is narrower, a tunnel is led through that.
 """
 
 from __future__ import annotations
@@ -40,10 +39,7 @@ _CLOSE = 0.5  # part of the tolerance of the blocked area that is made use of; r
 
 
 def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return the rock around a cave and the pillars in it; None where a draw leads nowhere.
-
-    The level is chosen first, by halving, so that about as much is blocked as is wanted, then the radius.
-    """
+    """Return the rock around a cave and the pillars in it; None where a draw leads nowhere."""
     unit, width, height = request.unit, float(request.width), float(request.height)
     fine = min(_FINE * unit, _FINEST * min(width, height))
     # what is lost when walls are simplified and rounded
@@ -83,6 +79,7 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
     def blocked(space: Polygon) -> float:
         return 1.0 - float(space.area) / (width * height)
 
+    # the level, and then the radius, are such that about as much is blocked as is wanted
     low, high = float(values.min()), float(values.max())
     for _ in range(_LEVELS):
         level = (low + high) / 2.0
@@ -112,11 +109,10 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
 
 
 def random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return a field of mean 0 and variance 1 that varies over the length of a usual chamber.
+    """Return a mesh over the map, (rows, columns, 2) m, and a field on it of mean 0 and variance 1.
 
     It is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis, *Simulation of
-    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991), on the points,
-    (rows, columns, 2) m, of a mesh up to the edges of the map.
+    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
     """
     sides = request.width, request.height
     step = max(request.unit / _FINENESS, min(max(sides) / _MOST, request.unit / _COARSEST))
@@ -134,8 +130,7 @@ def random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Arr
 def below(points: Array, values: Array) -> BaseGeometry:
     """Return the polygons where a field on a mesh is below 0; the edge of the mesh counts as above it.
 
-    Contours are those of the linear interpolation on triangles ("marching triangles", two to each square of
-    the mesh): there are no cases in which it is left open what hangs together.
+    By marching triangles, two to each square: there are no cases that leave open what hangs together.
     """
     inner = values[1:-1, 1:-1]
     values = np.maximum(values, 1.0)

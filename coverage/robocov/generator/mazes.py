@@ -39,9 +39,8 @@ _CLOSE = 0.8  # part of the tolerance of the blocked area that is made use of
 def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Return walls between corridors of one width; None if they are narrower than the gap.
 
-    A grid of nearly square cells has about as many as were asked for. Walls are as thick as the blocked area
-    wants; what is still too much of it, as thicknesses are whole centimetres, goes by opening some more. No
-    wall stands in the disc of the start.
+    Walls are as thick as the blocked area wants; what is still too much of it, as thicknesses are rounded,
+    goes by opening some more. No wall stands in the disc of the start.
     """
     shape = _shape(request)
     walls = inner_walls(shape) & ~tree_passages(shape, rng)

@@ -476,8 +476,8 @@ def _free_substep(
     """Return the state after a substep as if nothing touched; make net forces of the controllers'.
 
     The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
-    dt; then acceleration and speed are limited, in this order. Limiting the speed cannot break the limit of
-    the acceleration: projecting onto a disc moves a point no farther from the old velocity, which is in it.
+    dt; then acceleration and speed are limited, in this order: projecting onto the disc of speeds brings a
+    velocity no farther from the old one, which is in it.
     """
     each = len(answer) // len(addresses)
     begin = states.shape[1] - 1 - each

@@ -32,16 +32,10 @@ _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 class Engine:
     """The bodies of spaces: obstacles that move, robots as they were added, and the static body.
 
-    Attributes
-    ----------
-    forces : (spaces, bodies, 2) N
-        pymunk forgets them after each step. `robots`, (spaces, n, 2), are those of the robots.
-    states : (spaces, bodies, 4) m and m/s
-        Positions and velocities, written or read.
-    addresses : (spaces, 10)
-        Of C functions and of what they are called with.
-    filled : (spaces, 8)
-        How far `forces`, first, and `states`, fifth, have been gone through.
+    `forces`, (spaces, bodies, 2) N, among them those of the `robots`, are forgotten by pymunk after each step;
+    `states`, (spaces, bodies, 4) m and m/s, are positions and velocities, written or read. `addresses` are of
+    C functions and of what they are called with; `filled`, (spaces, 8), says how far forces, first, and
+    states, fifth, have been gone through.
     """
 
     def __init__(self, spaces: list[pymunk.Space], movers: int, robots: int) -> None:

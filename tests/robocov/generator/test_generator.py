@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from robocov import generator
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
-from robocov.generator import AREA_TOLERANCE, GENERATORS, generated_map
+from robocov.generator import GENERATORS, generated_map
+from robocov.generator.request import AREA_TOLERANCE
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov.mapfile.check import check_map
 
