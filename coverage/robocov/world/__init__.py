@@ -222,9 +222,8 @@ class World:
         radius, begin = self.team.radius[all_rows], all_rows.start
         resolved = np.zeros(self._each, dtype=bool)
         while True:
-            place, velocity = solver.moved(
-                rows, self.positions[rows], self.velocities[rows], net[rows - begin], self._moving, dt
-            )
+            before = self.positions[rows], self.velocities[rows], net[rows - begin]
+            place, velocity = solver.moved(rows, *before, self._moving, dt)
             free[0, rows], resolved[rows - begin] = place, True
             first, second, distance = close_pairs(free[0, all_rows], 2.0 * float(radius.max()))
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
@@ -307,10 +306,9 @@ class ChangingWorld:
         try:
             return nearest_free(environment, float(radius[robot]), others, (x, y), radius[there])
         except StartError:
-            raise StartError(
-                f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], but there is no room for it in "
-                f"map {self._environment.name!r}"
-            ) from None
+            joins = f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}]"
+            where = f"map {self._environment.name!r}"
+            raise StartError(f"{joins}, but there is no room for it in {where}") from None
 
     def _begin(self) -> None:
         """Make the world of the robots that work."""
@@ -365,12 +363,8 @@ class ContactSolver:
         # in C, as Python's `Space.add` and `remove` cost more than all else
         for body, _ in robots:
             lib.cpSpaceAddBody(space, body._body)
-        states[: mine.start], states[mine, :2], states[mine, 2:], states[mine.stop] = (
-            motion,
-            positions,
-            velocities,
-            0.0,
-        )
+        states[: mine.start], states[mine.stop] = motion, 0.0
+        states[mine, :2], states[mine, 2:] = positions, velocities
         engine.write()
         for _, disc in robots:
             lib.cpSpaceAddShape(space, disc._shape)

@@ -32,7 +32,7 @@ _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 class Engine:
     """The bodies of spaces: obstacles that move, robots as they were added, and the static body.
 
-    `forces`, (spaces, bodies, 2) N, among them those of the `robots`, are forgotten by pymunk after each step;
+    `forces`, (spaces, bodies, 2) N, among them those of the `robots`, are forgotten by pymunk after a step;
     `states`, (spaces, bodies, 4) m and m/s, are positions and velocities, written or read. `addresses` are of
     C functions and of what they are called with; `filled`, (spaces, 8), says how far forces, first, and
     states, fifth, have been gone through.
