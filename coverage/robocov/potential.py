@@ -43,18 +43,9 @@ def _attraction(square: float, k_att: float, limit: float) -> float:
 
 @kernel
 def potential_forces(
-    positions: Array,
-    reported: Array,
-    indptr: IntArray,
-    indices: IntArray,
-    team: int,
-    obstacle_points: Array,
-    goals: Array,
-    k_rep: float,
-    rho_0: float,
-    k_att: float,
-    limit: float,
-) -> Array:
+    positions: Array, reported: Array, indptr: IntArray, indices: IntArray, team: int, obstacle_points: Array,
+    goals: Array, k_rep: float, rho_0: float, k_att: float, limit: float,
+) -> Array:  # fmt: skip
     """Return the forces (25) + (27) on each robot, and their three parts, (4, n, 2) N.
 
     The parts are the attraction to the goal (27), the sum of (24) over the robots within `rho_0` that it
@@ -128,10 +119,7 @@ def _apart(i: int, j: int) -> tuple[float, float]:
 
 @kernel
 def separation(robot: IntArray, neighbour: IntArray) -> Array:
-    """Return unit vectors, (m, 2), along which robots in one place are told apart.
-
-    Opposite for (i, j) and (j, i), and a function of the two numbers alone.
-    """
+    """Return unit vectors, (m, 2), along which robots in one place are told apart."""
     directions = np.empty((len(robot), 2))
     for k in range(len(robot)):
         directions[k, 0], directions[k, 1] = _apart(robot[k], neighbour[k])

@@ -161,15 +161,9 @@ def _pairs(points: Array, ranges: Array) -> tuple[IntArray, IntArray, IntArray, 
 
 @inner_kernel
 def _walked(
-    points: Array,
-    ranges: Array,
-    starts: IntArray,
-    order: IntArray,
-    indptr: IntArray,
-    first: IntArray,
-    second: IntArray,
-    distance: Array,
-) -> int:
+    points: Array, ranges: Array, starts: IntArray, order: IntArray, indptr: IntArray, first: IntArray,
+    second: IntArray, distance: Array,
+) -> int:  # fmt: skip
     """Write the pairs, as many as there is room for; return how many there are."""
     n, total, reach = len(points), 0, 0.0
     for i in range(n):

@@ -23,17 +23,9 @@ _TOLERANCE = 1e-12
 
 @kernel
 def cells_of(
-    points: Array,
-    region: Array,
-    heard: Array,
-    indptr: IntArray,
-    indices: IntArray,
-    team: int,
-    mesh: Mesh,
-    mass: Array,
-    centroid: Array,
-    edges: Array,
-) -> int:
+    points: Array, region: Array, heard: Array, indptr: IntArray, indices: IntArray, team: int, mesh: Mesh,
+    mass: Array, centroid: Array, edges: Array,
+) -> int:  # fmt: skip
     """Compute mass and centroid of all cells; return how many edges they have, or -1 - i for a bad point i.
 
     Parameters
@@ -60,14 +52,18 @@ def cells_of(
             return -1 - i
     ring = np.empty((2, len(region) + max(team, n) + 2, 4))
     near = np.empty((max(team, n), 4))
+    total = 0
     if mesh.shape[1]:
         places, cotangent = np.empty((n + 3, 2)), np.empty(mesh.shape[1])
-        work = np.empty(mesh.shape[1], np.intp)
-        count = _from_mesh(points, region, mesh, places, cotangent, work, ring, near, mass, centroid, edges)
-        if count >= 0:
-            return count
-        mesh[0, 0] = -1
-    total = 0
+        begins, left = np.empty(mesh.shape[1], np.intp), 0.0
+        area = _triangulated_within(points, region, mesh, places, cotangent, begins)
+        for i in range(n if area > 0.0 else 0):
+            count, side, start = _enclosed(ring, near, points, region, mesh, cotangent, begins[i], i)
+            total = _finished(ring, side, count, start, points, i, mass, centroid, edges, total)
+            left += mass[i]
+        if area > 0.0 and abs(left - area) <= _TOLERANCE * area:
+            return total
+        mesh[0, 0], total = -1, 0
     for i in range(n):
         found, first = 0, i - i % team
         for k in range(indptr[i] if len(indptr) else first, indptr[i + 1] if len(indptr) else first + team):
@@ -89,20 +85,10 @@ def _noted(near: Array, found: int, dx: float, dy: float, j: int) -> int:
 
 
 @inner_kernel
-def _from_mesh(
-    points: Array,
-    region: Array,
-    mesh: Mesh,
-    places: Array,
-    cotangent: Array,
-    work: IntArray,
-    ring: Array,
-    near: Array,
-    mass: Array,
-    centroid: Array,
-    edges: Array,
-) -> int:
-    """Do as `cells_of` by the neighbours in the triangulation; return -1 where that is not to be trusted."""
+def _triangulated_within(
+    points: Array, region: Array, mesh: Mesh, places: Array, cotangent: Array, begins: IntArray
+) -> float:
+    """Triangulate, write a half-edge that begins at each point, return the region's area, -1 on failure."""
     n, sides = len(points), len(region)
     left = right = region[0, 0]
     low = high = region[0, 1]
@@ -114,26 +100,22 @@ def _from_mesh(
         places[i, 0], places[i, 1] = points[i, 0], points[i, 1]
         # no sentinel then cuts a cell within the region, and all robots lie within their triangle
         if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
-            return -1
+            return -1.0
     places[n, 0], places[n, 1] = x - 8.0 * size, y - 5.0 * size
     places[n + 1, 0], places[n + 1, 1] = x + 8.0 * size, y - 5.0 * size
     places[n + 2, 0], places[n + 2, 1] = x, y + 9.0 * size
-    if not triangulated(mesh, places, cotangent, work):
-        return -1
+    if not triangulated(mesh, places, cotangent, begins):
+        return -1.0
     for h in range(mesh.shape[1]):
         if h & 3 < 3:
-            work[mesh[0, h]] = h
-    area, total, edge = 0.0, 0.0, 0
+            begins[mesh[0, h]] = h
+    area = 0.0
     for k in range(sides):
         after = k + 1 if k + 1 < sides else 0
         area += 0.5 * (
             (region[k, 0] - x) * (region[after, 1] - y) - (region[after, 0] - x) * (region[k, 1] - y)
         )
-    for i in range(n):
-        count, side, start = _enclosed(ring, near, points, region, mesh, cotangent, work[i], i)
-        edge = _finished(ring, side, count, start, points, i, mass, centroid, edges, edge)
-        total += mass[i]
-    return edge if abs(total - area) <= _TOLERANCE * area else -1
+    return area
 
 
 @inner_kernel
@@ -270,17 +252,9 @@ def _meet(ring: Array, new: int, size: int, old: int, inner: int, outer: int, be
 
 @inner_kernel
 def _finished(
-    ring: Array,
-    side: int,
-    count: int,
-    start: int,
-    points: Array,
-    i: int,
-    mass: Array,
-    centroid: Array,
-    edges: Array,
-    total: int,
-) -> int:
+    ring: Array, side: int, count: int, start: int, points: Array, i: int, mass: Array, centroid: Array,
+    edges: Array, total: int,
+) -> int:  # fmt: skip
     """Write what is known of one cell; return how many edges there are with its own."""
     area = first_x = first_y = 0.0
     k = start
