@@ -1,21 +1,24 @@
-"""Map files: the map JSON, version 1, to and from `Environment`; the bundled maps."""
+"""Map files: the map JSON, version 1, to and from `Environment`, pictures of densities; the bundled maps."""
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import re
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from robocov.density import Density
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.density import FINEST, Density, Raster
 from robocov.environment import Environment, Ring
-from robocov.errors import MapError, one_line, unknown_name
+from robocov.errors import InputError, MapError, Mistake, one_line, reason, shown_json, unknown_name
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.mapfile.check import check_rules
-from robocov.mapfile.density import density_document, density_from
-from robocov.mapfile.models import FORMAT, VERSION, plain, validate
+from robocov.mapfile.models import HEAD, LIGHTEST, NOTHING, DensityModel, RasterModel, plain, validate
 from robocov.mapfile.models import map_schema as map_schema
 
 _LINE = 100
@@ -27,6 +30,10 @@ _DIGITS = 9
 """Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
 _NOISE = 16
 """Largest rounding error of a few sums and a rotation, in units of the last place (of 1 m at least)."""
+MOST_BYTES = 8_000_000
+"""Largest picture of a density, in bytes."""
+_GREY_DIGITS = 6
+"""Digits after the point of the weights that greys stand for: a map that is written again stays short."""
 
 
 def load_map(source: str | Path) -> Environment:
@@ -87,9 +94,9 @@ def from_json(document: dict[str, Any], where: str = "map", folder: Path | None 
 
 def density_of(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
     """Return the density that the JSON value at the ``density`` of a map with that boundary stands for."""
-    square = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
-    model = validate({"format": FORMAT, "version": VERSION, **square, "density": value}, where)
-    return density_from(model.density, boundary, folder, where)
+    rest = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
+    model = validate({**HEAD, **rest, "density": value}, where)
+    return _density(model.density, boundary, folder, where)
 
 
 def _environment(document: object, where: str, folder: Path | None) -> Environment:
@@ -103,7 +110,7 @@ def _environment(document: object, where: str, folder: Path | None) -> Environme
         description=model.description,
         extra=json.loads(json.dumps(model.extra)),
         schema=model.schema_,
-        density=None if model.density is None else density_from(model.density, boundary, folder, where),
+        density=None if model.density is None else _density(model.density, boundary, folder, where),
     )
     check_rules(environment, where)
     return environment
@@ -114,14 +121,13 @@ def to_json(environment: Environment) -> dict[str, Any]:
     density = environment.density
     return {
         **({} if environment.schema is None else {"$schema": environment.schema}),
-        "format": FORMAT,
-        "version": VERSION,
+        **HEAD,
         "name": environment.name,
         **({"description": environment.description} if environment.description else {}),
         "boundary": plain(environment.boundary),
         "obstacles": plain(environment.obstacles),
         "starts": {name: plain(spec) for name, spec in environment.starts.items()},
-        **({} if density is None else {"density": density_document(density)}),
+        **({} if density is None else {"density": _density_document(density)}),
         **({"extra": dict(environment.extra)} if environment.extra else {}),
     }
 
@@ -197,3 +203,88 @@ def _text(value: Any, indent: str, used: int, *, expanded: bool = False) -> str:
 
 def _is_ring(value: object) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
+
+
+def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
+    """Return the density that a model stands for; a raster without an extent covers the boundary's box.
+
+    `folder` is where the map is, and a picture that it names; None when it came without a file.
+    """
+    if not isinstance(model, RasterModel):
+        density: Density = model.built()
+        return density
+    if model.rows is not None:
+        values = np.array(model.rows, dtype=float)
+        values[values < LIGHTEST] = 0.0
+    else:
+        low, high = model.black or 0.0, 1.0 if model.white is None else model.white
+        at = ("density", "picture")
+        try:
+            greys = _greys(_content(str(model.picture), folder))
+        except InputError as error:
+            raise MapError.of(where, [Mistake.at(at, f"{shown_json(model.picture)}: {error}")]) from None
+        values = np.round(low + (high - low) * greys, _GREY_DIGITS)
+        if not values.max() > 0.0:
+            raise MapError.of(where, [Mistake.at(at, NOTHING)])
+    x, y = zip(*boundary, strict=True)
+    x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
+    return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
+
+
+def _density_document(density: Density) -> Any:
+    """Return a density as a JSON document that `_density` makes an equal one of; it names no picture."""
+    if not isinstance(density, Raster):
+        return plain(density)
+    return {
+        "kind": "raster",
+        "extent": plain(density.extent),
+        "interpolation": density.interpolation,
+        "rows": plain(density.values[::-1].tolist()),
+    }
+
+
+def _content(name: str, folder: Path | None) -> bytes:
+    """Return the content of a file of that name in a folder or below it."""
+    if folder is None:
+        raise InputError("a map that is no file has no folder, but rows of numbers were wanted")
+    outside = InputError("leaves the folder of the map, but a file in it was wanted")
+    # a drive, a root or a backslash means something on some system
+    if "\0" in name or "\\" in name or PureWindowsPath(name).anchor:
+        raise outside
+    try:
+        path = (folder / name).resolve()
+        inside = path.is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # as of links in a circle
+        inside = False
+    if not inside:
+        raise outside
+    try:
+        if not path.is_file():
+            raise InputError("no such file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read: {reason(error)}") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"larger than {MOST_BYTES / 1e6:g} MB, but a smaller file was wanted")
+    return content
+
+
+def _greys(content: bytes) -> Array:
+    """Return the greys of a picture from 0 (black) to 1 (white), (rows, columns), the top row first."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(content), formats=("PNG", "PPM")) as image:
+            width, height = image.size
+            if not 1 <= min(width, height) <= max(width, height) <= FINEST:
+                wanted = f"at most {FINEST} each way"
+                raise InputError(f"{width} x {height} pixels, but {wanted} were wanted")
+            if image.mode.startswith("I"):  # 16 bits
+                return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
+            return np.asarray(image.convert("L"), dtype=float) / 255.0
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged picture makes of a decoder
+        why = one_line(error) or type(error).__name__
+        raise InputError(f"cannot be read as PNG or PGM: {why}") from None

@@ -5,6 +5,8 @@ The models of obstacles, starts and densities follow from the classes that these
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, Union, get_args
@@ -16,11 +18,12 @@ from pydantic_core import ErrorDetails
 from robocov import density, environment
 from robocov.density import FINEST, HEAVIEST, Interpolation
 from robocov.environment import Repeat
-from robocov.errors import Mistake, place, shown_json, unknown_name
+from robocov.errors import JsonPath, MapError, Mistake, place, shown_json, unknown_name
 from robocov.files.strictjson import check_header, refused
 
 FORMAT = "robocov-map"
 VERSION = 1
+HEAD = {"format": FORMAT, "version": VERSION}
 SLOWEST, FASTEST = 1e-3, 10.0
 """Speeds of an obstacle in m/s."""
 SMALLEST, LARGEST = 1e-3, 1e4
@@ -29,8 +32,11 @@ FARTHEST = 1e7
 """Largest coordinate in metres: national grids fit, and a micrometre still counts."""
 LIGHTEST = 1e-9
 """Weights that are smaller are read as 0: they would be when the map is written."""
+NOTHING = "all places count 0, but a weight above 0 was wanted"
 LONGEST_LABEL = 100
 """Most characters of a label."""
+_BASES = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
+"""Keys of what a place counts at least, by the kind of the density."""
 _TINY = 1e-100
 """Coordinates nearer to zero, in metres, are read as zero: quotients of such numbers are no numbers."""
 _MOST = 10_000
@@ -287,12 +293,17 @@ def map_schema() -> dict[str, Any]:
 
 
 def validate(document: object, where: str) -> MapModel:
-    """Return `document` as a model; the `MapError` tells of structural mistakes."""
+    """Return `document` as a model; the `MapError` tells of mistakes in structure and density."""
     check_header(document, where, FORMAT, VERSION)
     try:
-        return MapModel.model_validate(document)
+        model = MapModel.model_validate(document)
     except ValidationError as error:
         raise refused(error, where, _mistake) from None
+    raster = isinstance(model.density, RasterModel)
+    found = list((_raster_mistakes if raster else _weight_mistakes)(model.density)) if model.density else []
+    if found:
+        raise MapError.of(where, found)
+    return model
 
 
 # what is wanted at some keys, in their items, in their items, ...
@@ -348,3 +359,55 @@ def _kind_mistake(path: tuple[str | int, ...], value: object, kinds: list[str]) 
     near = get_close_matches(str(value["kind"]).lower(), kinds, n=1, cutoff=0.5)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     return Mistake.at(path, f"{shown_json(value['kind'])}, but {wanted} was wanted{hint}")
+
+
+def _not_one_of(model: Model, one: str, other: str) -> str | None:
+    """Return what is wrong where not exactly one of two keys is given."""
+    given = [getattr(model, key) is not None for key in (one, other)]
+    if sum(given) == 1:
+        return None
+    return f"{'both' if all(given) else 'neither'} of {one} and {other}, but one of them was wanted"
+
+
+def _weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
+    peaks, areas = (getattr(model, key, []) for key in ("peaks", "areas"))
+    for k, peak in enumerate(peaks):
+        at: JsonPath = ("density", "peaks", k)
+        if what := _not_one_of(peak, "sigma", "covariance"):
+            yield Mistake.at(at, what)
+        elif peak.covariance is not None:
+            (a, b), (c, d) = peak.covariance
+            smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
+            if b != c or not smaller_eigenvalue >= SMALLEST**2 or a * d - b * c <= 1e-9 * a * d:
+                wanted = (
+                    f"a symmetric, positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
+                )
+                yield Mistake.at(
+                    (*at, "covariance"), f"{shown_json(peak.covariance)}, but {wanted} was wanted"
+                )
+    if not getattr(model, _BASES[model.kind]) and not any(part.weight for part in (*peaks, *areas)):
+        yield Mistake.at(("density", "weight") if model.kind == "uniform" else ("density",), NOTHING)
+
+
+def _raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
+    if what := _not_one_of(model, "rows", "picture"):
+        yield Mistake.at(("density",), what)
+        return
+    if model.extent is not None:
+        x_min, y_min, x_max, y_max = model.extent
+        sides = x_max - x_min, y_max - y_min
+        if not (min(sides) >= SMALLEST and max(sides) <= LARGEST):
+            wanted = f"[x_min, y_min, x_max, y_max] with sides from {SMALLEST:g} to {LARGEST:.0f} m"
+            yield Mistake.at(("density", "extent"), f"{shown_json(model.extent)}, but {wanted} was wanted")
+    if model.rows is not None:
+        for name in ("black", "white"):
+            if getattr(model, name) is not None:
+                yield Mistake.at(("density", name), "is for a picture, but there are rows of numbers")
+        widths = [len(row) for row in model.rows]
+        for k, width in enumerate(widths):
+            if width != widths[0]:
+                what = f"{width} numbers, but {widths[0]}, as in the first row, were wanted"
+                yield Mistake.at(("density", "rows", k), what)
+                return
+        if not max(map(max, model.rows)) >= LIGHTEST:
+            yield Mistake.at(("density", "rows"), NOTHING)

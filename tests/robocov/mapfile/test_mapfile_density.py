@@ -14,8 +14,7 @@ from PIL import Image
 from robocov.density import FINEST, Gaussians, Raster, Uniform, WeightedPolygons
 from robocov.environment import Environment
 from robocov.errors import MapError
-from robocov.mapfile import dump_map, from_json, load_map, parse_map, save_map, to_json
-from robocov.mapfile.density import MOST_BYTES
+from robocov.mapfile import MOST_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 PLAIN = to_json(Environment("plain", RING))
