@@ -24,16 +24,23 @@ from typing import TypeAlias
 
 import numpy as np
 import pymunk
-from pymunk._chipmunk_cffi import lib
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
-from robocov.world.engine import Engine, observed_step, substeps
+from robocov.world.engine import (
+    Engine,
+    addresses_of,
+    enter,
+    leave,
+    observed_step,
+    shortening,
+    substeps,
+)
 from robocov.world.relocation import nearest_free
 from robocov.world.solid import Mover, movers, solid_pieces
 
@@ -222,18 +229,14 @@ class World:
         radius, begin = self.team.radius[all_rows], all_rows.start
         resolved = np.zeros(self._each, dtype=bool)
         while True:
-            before = self.positions[rows], self.velocities[rows], net[rows - begin]
-            place, velocity = solver.moved(rows, *before, self._moving, dt)
-            free[0, rows], resolved[rows - begin] = place, True
+            solver.move(rows, (self.positions, self.velocities, net, self._moving), dt, limit, free)
+            resolved[rows - begin] = True
             first, second, distance = close_pairs(free[0, all_rows], 2.0 * float(radius.max()))
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
             if not reached.any():
                 break
             resolved[second[reached]] = True
             rows = begin + np.flatnonzero(resolved)
-        # impulses of a contact may exceed what a robot can do by itself
-        speed = np.sqrt(np.maximum((velocity**2).sum(axis=1), limit[rows] ** 2))
-        free[1, rows] = velocity * (limit[rows] / speed)[:, None]
         self._contacts = solver
 
 
@@ -344,65 +347,45 @@ class ContactSolver:
         self._engine = Engine([self._space], len(movers), len(team))
         self._travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
         self._robots = list(map(robot_body, team.mass.tolist(), team.radius.tolist()))
+        self._members = np.array([addresses_of(body._body, disc._shape) for body, disc in self._robots])
 
-    def moved(
-        self, rows: IntArray, positions: Array, velocities: Array, forces: Array, motion: Array, dt: float
-    ) -> tuple[Array, Array]:
-        """Return positions and velocities, (k, 2) each, of robots of ascending rows after `dt` seconds.
+    def move(
+        self, rows: IntArray, now: tuple[Array, Array, Array, Array], dt: float, limit: Array, moved: Array
+    ) -> None:
+        """Move robots of ascending rows on by `dt` seconds, no faster in the end than (n,) m/s.
 
-        Net forces, (k, 2) N, are constant; `motion`, (m, 4) m and m/s, is that of the obstacles that move.
+        `now` are the positions, the velocities, the net forces of a run, (n, 2) each, and the motion of the
+        obstacles that move, (m, 4); into `moved`, (2, n, 2), go positions and velocities.
         """
-        robots = [self._robots[row] for row in rows.tolist()]
-        reached = velocities + forces * (dt / self._team.mass[rows, None])
-        square = max((velocities**2).sum(axis=1).max(), (reached**2).sum(axis=1).max())
-        parts = math.ceil((math.sqrt(square) + self._mover_speed) * dt / self._travel)
-        parts = min(_MOST_SUBSTEPS, max(1, parts))
-        engine, space = self._engine, self._space._space
-        states, net = engine.states[0], engine.forces[0]
-        mine = slice(len(motion), len(motion) + len(rows))
-        # in C, as Python's `Space.add` and `remove` cost more than all else
-        for body, _ in robots:
-            lib.cpSpaceAddBody(space, body._body)
-        states[: mine.start], states[mine.stop] = motion, 0.0
-        states[mine, :2], states[mine, 2:] = positions, velocities
-        engine.write()
-        for _, disc in robots:
-            lib.cpSpaceAddShape(space, disc._shape)
-        net[:], net[mine] = 0.0, forces
-        self._substeps(robots, parts, dt / parts)
-        for _, disc in robots:
-            lib.cpSpaceRemoveShape(space, disc._shape)
-        engine.read()
-        velocities = states[mine, 2:].copy()
-        # what is left is the push out of an overlap that pymunk has decided but not yet applied
-        states[: mine.stop, 2:] = net[:] = 0.0
-        engine.write()
-        self._substeps(robots, 1, dt / parts)
-        engine.read()
-        for body, _ in robots:
-            lib.cpSpaceRemoveBody(space, body._body)
-        return states[mine, :2], velocities
+        engine, members = self._engine, self._members
+        space = engine.addresses, engine.filled, engine.states[0], engine.forces[0]
+        speed = enter(*space, members, rows, *now, self._team.mass, dt) + self._mover_speed
+        parts = min(_MOST_SUBSTEPS, max(1, math.ceil(speed * dt / self._travel)))
+        # what moves may push robots into walls
+        pushed = [self._robots[row] for row in rows.tolist()] if self._movers else []
+        for _ in range(parts if pushed else 1):
+            before = [body.position for body, _ in pushed]
+            substeps(engine.addresses, engine.filled, 0, 1 if pushed else parts, dt / parts)
+            self._keep_before_walls(pushed, before)
+        before = [body.position for body, _ in pushed]
+        leave(*space, members, rows, limit, moved, dt / parts)
+        if pushed:
+            self._keep_before_walls(pushed, before)
+            moved[0, rows] = [body.position for body, _ in pushed]
 
-    def _substeps(self, robots: list[tuple[pymunk.Body, pymunk.Circle]], count: int, dt: float) -> None:
-        if not self._movers:
-            substeps(self._engine.addresses, self._engine.filled, 0, count, dt)
-            return
-        for _ in range(count):
-            before = [body.position for body, _ in robots]
-            substeps(self._engine.addresses, self._engine.filled, 0, 1, dt)
-            for (body, disc), place in zip(robots, before, strict=True):
-                self._keep_before_walls(body, disc.radius, place)
-
-    def _keep_before_walls(self, body: pymunk.Body, radius: float, before: pymunk.Vec2d) -> None:
-        """Leave a robot that was pushed into a wall, from some place, in front of the wall."""
-        if self._space.segment_query_first(before, body.position, 0.0, _WALLS) is not None:
-            body.position = before
-        for _ in range(3):  # out of one wall may be into another, in a corner
-            wall = self._space.point_query_nearest(body.position, radius, _WALLS)
-            if wall is None or wall.distance >= radius - _SLOP or wall.distance <= 0.0:
-                return
-            away = body.position - wall.point
-            body.position = wall.point + away * (radius / math.hypot(*away))
+    def _keep_before_walls(
+        self, robots: list[tuple[pymunk.Body, pymunk.Circle]], before: list[pymunk.Vec2d]
+    ) -> None:
+        """Leave robots that were pushed into a wall, from some places, in front of the wall."""
+        for (body, disc), place in zip(robots, before, strict=True):
+            if self._space.segment_query_first(place, body.position, 0.0, _WALLS) is not None:
+                body.position = place
+            for _ in range(3):  # out of one wall may be into another, in a corner
+                wall = self._space.point_query_nearest(body.position, disc.radius, _WALLS)
+                if wall is None or wall.distance >= disc.radius - _SLOP or wall.distance <= 0.0:
+                    break
+                away = body.position - wall.point
+                body.position = wall.point + away * (disc.radius / math.hypot(*away))
 
 
 def obstacle_space(obstacles: Obstacles) -> pymunk.Space:
@@ -450,13 +433,6 @@ def response(team: Team, dt: float) -> Array:
     return np.column_stack([decay, drive, team.mass / dt, team.max_acceleration * dt, team.max_speed])
 
 
-@inner_kernel
-def _scale(x: float, y: float, limit: float) -> float:
-    """Return by what to multiply a vector so that it is no longer than `limit`."""
-    square = x * x + y * y
-    return limit / math.sqrt(square) if square > limit * limit else 1.0
-
-
 @kernel
 def _free_substep(
     addresses: IntArray,
@@ -480,9 +456,9 @@ def _free_substep(
         vx, vy = states[run, row, 2], states[run, row, 3]
         decay, drive = answer[i, 0], answer[i, 1]
         dx, dy = drive * forces[run, row, 0] - decay * vx, drive * forces[run, row, 1] - decay * vy
-        scale = _scale(dx, dy, answer[i, 3])
+        scale = shortening(dx, dy, answer[i, 3])
         ux, uy = vx + dx * scale, vy + dy * scale
-        scale = _scale(ux, uy, answer[i, 4])
+        scale = shortening(ux, uy, answer[i, 4])
         forces[run, row, 0] = (ux * scale - vx) * answer[i, 2]
         forces[run, row, 1] = (uy * scale - vy) * answer[i, 2]
         if len(external):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,17 @@ import pymunk
 from pymunk import batch
 from pymunk._chipmunk_cffi import ffi, lib
 
-from robocov.arrays import IntArray
-from robocov.compiled import call_c, kernel
+from robocov.arrays import Array, IntArray
+from robocov.compiled import call_c, inner_kernel, kernel
 
-SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER, FORCES, STATES, CONTACTS = range(10)
+SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER = range(7)
+ADD_BODY, ADD_SHAPE, REMOVE_BODY, REMOVE_SHAPE, FORCES, STATES, CONTACTS = range(7, 14)
 """Columns of `Engine.addresses`."""
 _FUNCTIONS = (
     *("cpSpaceStep", "cpSpaceEachBody"),
     *("pmSpaceBodySetIteratorFuncBatched", "pmSpaceBodyGetIteratorFuncBatched"),
     *("cpSpaceEachCachedArbiter", "pmSpaceArbiterIteratorFuncBatched"),
+    *("cpSpaceAddBody", "cpSpaceAddShape", "cpSpaceRemoveBody", "cpSpaceRemoveShape"),
 )
 
 # with another layout of a pmFloatArray memory would be overwritten
@@ -63,10 +66,6 @@ class Engine:
         """Set `states` of space k."""
         transfer(self.addresses, self.filled, k, SET_BODY, STATES)
 
-    def read(self, k: int = 0) -> None:
-        """Get `states` of space k."""
-        transfer(self.addresses, self.filled, k, GET_BODY, STATES)
-
     def forget_contacts(self) -> None:
         """Begin anew with what `touching` returns."""
         self._touching.num = 0
@@ -104,3 +103,79 @@ def observed_step(addresses: IntArray, filled: IntArray, k: int, dt: float) -> N
     transfer(addresses, filled, k, GET_BODY, STATES)
     noting = (addresses[k, SPACE], addresses[k, GET_ARBITER], addresses[k, CONTACTS])
     call_c(addresses[k, EACH_ARBITER], noting)
+
+
+@inner_kernel
+def shortening(x: float, y: float, limit: float) -> float:
+    """Return by what to multiply a vector so that it is no longer than `limit`."""
+    square = x * x + y * y
+    return limit / math.sqrt(square) if square > limit * limit else 1.0
+
+
+@kernel
+def enter(
+    addresses: IntArray,
+    filled: IntArray,
+    states: Array,
+    forces: Array,
+    members: IntArray,
+    rows: IntArray,
+    positions: Array,
+    velocities: Array,
+    net: Array,
+    motion: Array,
+    mass: Array,
+    dt: float,
+) -> float:
+    """Add robots to the space of contacts; return the largest speed, in m/s, now or under the net forces."""
+    square, space, last = 0.0, addresses[0, SPACE], len(motion) + len(rows)
+    begin = rows[0] // len(net) * len(net)
+    states[: len(motion)] = motion
+    states[last] = forces[last] = 0.0
+    for k in range(len(rows)):
+        row, at, before, after = rows[k], len(motion) + k, 0.0, 0.0
+        call_c(addresses[0, ADD_BODY], (space, members[row, 0]))
+        for axis in range(2):
+            speed, force = velocities[row, axis], net[row - begin, axis]
+            states[at, axis], states[at, 2 + axis], forces[at, axis] = positions[row, axis], speed, force
+            reached = speed + force * (dt / mass[row])
+            before, after = before + speed * speed, after + reached * reached
+        square = max(square, before, after)
+    transfer(addresses, filled, 0, SET_BODY, STATES)
+    for row in rows:
+        call_c(addresses[0, ADD_SHAPE], (space, members[row, 1]))
+    return math.sqrt(square)
+
+
+@kernel
+def leave(
+    addresses: IntArray,
+    filled: IntArray,
+    states: Array,
+    forces: Array,
+    members: IntArray,
+    rows: IntArray,
+    limit: Array,
+    moved: Array,
+    dt: float,
+) -> None:
+    """Read where robots are after contacts, and how fast, and remove them from the space of contacts."""
+    space, first = addresses[0, SPACE], len(states) - 1 - len(members)
+    for row in rows:
+        call_c(addresses[0, REMOVE_SHAPE], (space, members[row, 1]))
+    transfer(addresses, filled, 0, GET_BODY, STATES)
+    for k in range(len(rows)):
+        # impulses of a contact may exceed what a robot can do by itself
+        scale = shortening(states[first + k, 2], states[first + k, 3], limit[rows[k]])
+        for axis in range(2):
+            moved[1, rows[k], axis] = states[first + k, 2 + axis] * scale
+            forces[first + k, axis] = 0.0
+    # what is left is the push out of an overlap that pymunk has decided but not yet applied
+    states[: first + len(rows), 2:] = 0.0
+    transfer(addresses, filled, 0, SET_BODY, STATES)
+    substeps(addresses, filled, 0, 1, dt)
+    transfer(addresses, filled, 0, GET_BODY, STATES)
+    for k in range(len(rows)):
+        for axis in range(2):
+            moved[0, rows[k], axis] = states[first + k, axis]
+        call_c(addresses[0, REMOVE_BODY], (space, members[rows[k], 0]))
