@@ -460,11 +460,12 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     empty = slots >= np.diff(begin, append=len(order))[:, None]
     chosen = order[np.where(empty, 0, slots) + begin[:, None]]
     places = np.ascontiguousarray(np.moveaxis(grid.snap(sites.points[chosen]), -1, 0))
-    low, high = places.min(axis=2).T, places.max(axis=2).T
+    boxes = np.column_stack([*places.min(axis=2), *places.max(axis=2)])
+    low, high = boxes[:, :2], boxes[:, 2:]
     groups = np.arange(0, len(low), GROUP)
     around = np.hstack([np.minimum.reduceat(low, groups), np.maximum.reduceat(high, groups)])
     facts = np.stack([np.where(empty, -1, chosen), component[chosen]])
-    return sites, Tiles(places, facts, np.hstack([low, high]), around, box_tree(low, high))
+    return sites, Tiles(places, facts, boxes, around, box_tree(low, high))
 
 
 def _checked_speeds(speeds: object, robots: int) -> Array:
