@@ -165,8 +165,7 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    known_names = ", ".join(_cut(one_line(each)) for each in names)
-    return f"unknown {kind} {shown(name)}{hint} (known: {known_names})"
+    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(_cut(one_line(each)) for each in names)})"
 
 
 def _cut(text: str) -> str:

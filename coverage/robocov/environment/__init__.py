@@ -279,8 +279,7 @@ class Environment(Drawable):
     def start(self, name: str | None = None) -> Start:
         """Return the start called `name`, by default the map's first; raise StartError for an unknown one.
 
-        Every map has a start ``uniform``, anywhere in the free space, whether the file names it
-        or not; it is the default of a map without starts.
+        Every map has a start ``uniform``, anywhere in the free space, whether the file names it or not.
         """
         starts = {**self.starts}
         starts.setdefault("uniform", UniformStart())
@@ -398,10 +397,7 @@ def _apart(points: Array, spacing: float) -> Array:
 
 
 def _hexagonal(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:
-    """Return up to n points of the best of some randomly laid hexagonal lattices.
-
-    Darts fill a plane only to about 55 %; the lattice reaches 91 %.
-    """
+    """Return up to n points of the best of some randomly laid hexagonal lattices, denser than darts."""
     low_x, low_y, high_x, high_y = room.bounds
     reach = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
     steps = int(np.ceil(reach / (spacing * np.sqrt(3) / 2))) + 1

@@ -24,9 +24,8 @@ from robocov.files.atomic import written
 
 MOST_BYTES = 2_000_000_000
 """Bytes that the arrays of one file may take: about the largest run that can be asked for."""
-_MOST_SQUEEZED = 100
-"""Bytes of arrays that one byte of a file may stand for, where they are more than `_MODEST`."""
-_MODEST = 256_000_000
+_MOST_SQUEEZED, _MODEST = 100, 256_000_000
+"""Bytes of arrays that one byte of a file may stand for, where they are more than so many."""
 _LARGEST_READ = 1 << 20
 """Bytes that are read in one go: the directory of a file of arrays is short."""
 _BROKEN = (
@@ -44,8 +43,7 @@ _STALE = 24 * 3600.0
 def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dict[str, NDArray[Any]]:
     """Return the arrays in an .npz file, which messages call `where`.
 
-    Whatever is wrong with it is an `InputError` of one line: also where it holds objects, or more than is
-    good for the machine.
+    Raises `InputError` on whatever is wrong with it: also objects, or more than is good for the machine.
     """
     try:
         size = file.seek(0, io.SEEK_END)
@@ -99,10 +97,7 @@ class ArrayCache:
 
     @classmethod
     def of_user(cls) -> ArrayCache | None:
-        """Return the cache in the user's cache folder, None where the user wants none.
-
-        The environment variable ``ROBOCOV_CACHE`` names another folder; if it is empty, there is no cache.
-        """
+        """Return the cache in the user's folder, or that of ``ROBOCOV_CACHE``; None where that is empty."""
         wanted = os.environ.get("ROBOCOV_CACHE")
         if wanted == "":
             return None

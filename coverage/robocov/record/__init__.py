@@ -219,10 +219,7 @@ class Record(Drawable):
         return Snapshot(seen, Decision(forces=self.forces[k], goals=goals, cells=cells), working=working)
 
     def at(self, time: float) -> Snapshot:
-        """Return the moment nearest to `time`, s, of two as near the earlier; see `snapshot`.
-
-        Raises ParameterError when that is outside of the run by more than a control period.
-        """
+        """Return the moment nearest to `time`, s, which may be a control period outside of the run."""
         first, last = float(self.time[0]), float(self.time[-1])
         if not first - self.dt <= time <= last + self.dt:
             wanted = f"a number from {first:g} to {last:g} s"
@@ -230,20 +227,14 @@ class Record(Drawable):
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
     def until(self, time: float) -> Record:
-        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then.
-
-        Raises ParameterError when that is before the first moment.
-        """
+        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then."""
         # half a microsecond forgives the rounding of sums of steps
         if not time >= self.time[0] - 5e-7:
             raise ParameterError(f"time: {shown(time)} s, but a number from {self.time[0]:g} s was wanted")
         return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
 
     def thinned(self, rate: float) -> Record:
-        """Return the `nearest_moments` of the record at `rate`, Hz; 0 leaves the first and the last.
-
-        Where the record is sparser than that, it stays as it is. Raises ParameterError on a negative rate.
-        """
+        """Return the record at `rate`, Hz, see `nearest_moments`; 0 leaves the first moment and the last."""
         if not 0.0 <= rate < np.inf:
             raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
         return self._only(nearest_moments(self.time, rate))
@@ -326,19 +317,11 @@ class Record(Drawable):
                 conditions.check_team(len(team))
         except ParameterError as error:
             raise InputError(f"{path}: {error}") from error
-        return cls(
-            environment=environment,
-            team=team,
-            controller=run.controller.name,
-            label=short_name(run.controller.name),
-            gains=run.controller.gains,
-            start=run.start,
-            seed=run.seed,
-            dt=run.dt_s,
-            session=run.session.model_dump(exclude_unset=True),
-            conditions=conditions,
-            **_arrays_of(folder / "record.npz", len(team)),
-        )
+        law = run.controller.name, short_name(run.controller.name), run.controller.gains
+        origin = run.start, run.seed, run.dt_s
+        session = run.session.model_dump(exclude_unset=True)
+        arrays = _arrays_of(folder / "record.npz", len(team))
+        return cls(environment, team, *law, *origin, **arrays, session=session, conditions=conditions)
 
 
 @dataclass(eq=False)
@@ -385,9 +368,7 @@ class Recorder:
 
 
 def nearest_moments(time: Array, rate: float) -> IntArray:
-    """Return which times of (T,) s are nearest to multiples of 1/rate from the first, and the last.
-
-    Of two times as near it is the earlier.
+    """Return which times, (T,) s, are the nearest to multiples of 1/rate from the first; and the last.
 
     >>> nearest_moments(np.arange(8) * 0.1, rate=4.0).tolist()
     [0, 2, 5, 7]

@@ -150,7 +150,7 @@ class Team:
         return f"<Team of {counted(len(self), 'robot')}: {', '.join(parts)}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the team as plain JSON: None is "no limit", and a value that all share is written once."""
+        """Return the team as plain JSON: None is no limit, and a value that all share is written once."""
         plain: dict[str, Any] = {"robots": len(self)}
         for field in fields(self):
             values = [None if np.isinf(x) else float(x) for x in getattr(self, field.name)]
