@@ -16,23 +16,17 @@ REGION = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEdges:
-    """All edges of all cells, each cell's in one run and counter-clockwise round the cell.
-
-    Attributes
-    ----------
-    start, end : (s, 2) m
-        Ends of the edges **relative to the generator** of their cell, so that a tiny cell far from
-        the origin keeps all its digits.
-    cell : (s,)
-        Whose edge it is, ascending.
-    beyond : (s,)
-        The robot on the other side, or `REGION`.
-    """
+    """All edges of all cells, each cell's in one run and counter-clockwise round the cell."""
 
     start: Array
+    """(s, 2) m, where edges begin, **relative to the generator** of their cell, so that a tiny cell far from
+    the origin keeps all its digits, and"""
     end: Array
+    """where they end."""
     cell: IntArray
+    """(s,) Whose edge it is, ascending."""
     beyond: IntArray
+    """(s,) The robot on the other side, or `REGION`."""
 
     def polygons(self, generators: Array) -> list[Array]:
         """Return one counter-clockwise ring a cell, (k, 2) m, the first vertex not repeated.

@@ -37,26 +37,21 @@ its goal, at least."""
 
 @dataclass(frozen=True, eq=False)
 class CostHistory(Drawable):
-    """The coverage cost (22) along a run.
-
-    Attributes
-    ----------
-    time : (K,) s
-    mean_distance : (K,) m
-    cost : (K,) m³
-    uncovered_area : (K,) m²
-    mean_time : (K,) s or None
-        Mean time until the first robot is at a place, each at its own largest speed; None where all are
-        equally fast.
-    """
+    """The coverage cost (22) along a run, at K of its moments."""
 
     _drawn_as = "history"
 
     time: Array
+    """(K,) s"""
     mean_distance: Array
+    """(K,) m"""
     cost: Array
+    """(K,) m³"""
     uncovered_area: Array
+    """(K,) m²"""
     mean_time: Array | None = None
+    """(K,) s until the first robot is at a place, each at its own largest speed; None where all are equally
+    fast."""
 
     def __repr__(self) -> str:
         first, last = self.mean_distance[[0, -1]].tolist()

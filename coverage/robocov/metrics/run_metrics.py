@@ -40,45 +40,32 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only robots that work count.
-
-    Attributes
-    ----------
-    time : (K,) s
-    sensed_area : (K,) m²
-        Free area within the sensing range of a robot and in its line of sight.
-    range_area : (K,) m²
-        Free area within the sensing range of a robot, walls or not (blanket coverage by discs).
-    visible_area : (K,) m²
-        Free area in line of sight of a robot at any distance (an art gallery's guards).
-    work : (K,) J
-        Integral of |F v| over the time so far, summed over the robots. F is the force that the controller
-        asked for, before any limit.
-    effort : (K,) N² s
-        Integral of |F|² over the time so far, summed over the robots.
-    path_length : (K,) m
-        Way so far, mean over the robots.
-    components, algebraic_connectivity : (K,)
-        Of the graph of who hears whom, as `connections` returns them.
-    wall_clearance, robot_clearance : (K,) m
-        Smallest gap between a robot's rim and a wall, or the rims of two robots, since the moment before;
-        inf where there is none.
-    free_area : float, m²
-        Of which the areas are parts.
-    """
+    """Metrics along a run, at K of its moments. Only robots that work count."""
 
     time: Array
+    """(K,) s, as all arrays."""
     sensed_area: Array
+    """m², the free area within the sensing range of a robot and in its line of sight,"""
     range_area: Array
+    """within the sensing range of a robot, walls or not (blanket coverage by discs),"""
     visible_area: Array
+    """and in line of sight of a robot at any distance (an art gallery's guards)."""
     work: Array
+    """J, the integral of |F v| over the time so far, summed over the robots. F is the force that the
+    controller asked for, before any limit."""
     effort: Array
+    """N² s, the same of |F|²."""
     path_length: Array
+    """m so far, mean over the robots."""
     components: IntArray
+    """Of the graph of who hears whom, see `connections`, as the"""
     algebraic_connectivity: Array
     wall_clearance: Array
+    """m, the smallest gap between a robot's rim and a wall since the moment before, inf for none,"""
     robot_clearance: Array
+    """and between the rims of two robots."""
     free_area: float
+    """m², of which the areas are parts."""
 
     def __repr__(self) -> str:
         share = f"{self.sensed_area[-1] / self.free_area:.0%} of the free area sensed at the end"

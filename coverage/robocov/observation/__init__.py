@@ -34,42 +34,32 @@ from robocov.observation.scans import Scans
 class Observations:
     """All that the robots know, as a structure of arrays; row i belongs to robot i alone.
 
-    Attributes
-    ----------
-    positions : (n, 2) m
-    velocities : (n, 2) m/s
-        A robot knows its own velocity, not those of others.
-    neighbours : Neighbours
-        The robots within communication range: their positions are known, nothing else.
-    obstacle_points : (n, 2) m
-        The single closest obstacle or boundary point within sensing range, nan where none.
-    region : Region
-        The known convex outer boundary.
-    time : float, s
-    reported_positions : (m, 2) m or None
-        Where robots know their neighbours to be, in the order of ``neighbours.indices``: what the last
-        message said that arrived. None: where they are, ``positions``.
-    report_ages : (m,) s or None
-        How old that is.
-    max_speeds : (n,) m/s or None
-        The largest speed of each robot: its own, and what its neighbours tell of theirs. None: not told.
-    density : Density or None
-        φ, how much each place counts: part of the task, known to all. None: every place the same.
-    scans : Scans or None
-        A ray scan of each robot, in the steps in which the controller wants one.
+    What is None is not told, or not there: robots know where others are, and all places count the same.
     """
 
     positions: Array
+    """(n, 2) m"""
     velocities: Array
+    """(n, 2) m/s. A robot knows its own, not those of others."""
     neighbours: Neighbours
+    """The robots within communication range: their positions are known, nothing else."""
     obstacle_points: Array
+    """(n, 2) m, the single closest obstacle or boundary point within sensing range, nan where none."""
     region: Region
+    """The known convex outer boundary."""
     time: float = 0.0
+    """s"""
     max_speeds: Array | None = None
+    """(n,) m/s, the largest speed of each robot: its own, and what its neighbours tell of theirs."""
     reported_positions: Array | None = None
+    """(m, 2) m, where robots know their neighbours to be, in the order of ``neighbours.indices``: what the
+    last message said that arrived."""
     report_ages: Array | None = None
+    """(m,) s, how old that is."""
     density: Density | None = None
+    """φ, how much each place counts: part of the task, known to all."""
     scans: Scans | None = None
+    """A ray scan of each robot, in the steps in which the controller wants one."""
 
     def neighbour_positions(self, robot: int) -> Array:
         """Return where a robot knows its neighbours to be, (k, 2) m, in the order of ``neighbours.of``."""
@@ -97,50 +87,32 @@ class Observations:
 
 @dataclass(slots=True, eq=False)
 class Decision:
-    """What a controller decides, and what explains it.
-
-    Attributes
-    ----------
-    forces : (n, 2) N
-        What each robot wants to be driven with, before any limit; viscosity is the world's.
-    goals : (n, 2) m or None
-        Where each robot is drawn to, nan where it has no goal; None when the law knows no goals.
-    terms : dict of name to (n, 2) N
-        The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...).
-    cells : Cells or None
-        Those that the law used.
-    memory : object
-        What the robots remember; it is handed back at the next decision.
-    """
+    """What a controller decides, and what explains it."""
 
     forces: Array
+    """(n, 2) N, what each robot wants to be driven with, before any limit; viscosity is the world's."""
     goals: Array | None = None
+    """(n, 2) m, where each robot is drawn to, nan where it has no goal; None when the law knows no goals."""
     terms: Mapping[str, Array] = field(default_factory=dict)
+    """The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...), (n, 2) N."""
     cells: Cells | None = None
+    """Those that the law used."""
     memory: Any = None
+    """What the robots remember; it is handed back at the next decision."""
 
 
 @dataclass(slots=True, eq=False)
 class Snapshot:
-    """One moment of a simulation: the state, what was seen in it, and what was decided on it.
-
-    Attributes
-    ----------
-    seen : Observations
-    decision : Decision
-    truth : (n, 2) m or None
-        Where the robots are, if that is not where they believe themselves to be, ``seen.positions``.
-    working : (n,) bool or None
-        Which robots are there and have not failed; None: all.
-    inbox : robocov.conditions.perception.Inbox or None
-        The messages that the robots then have; None where they know the others as they are.
-    """
+    """One moment of a simulation: the state, what was seen in it, and what was decided on it."""
 
     seen: Observations
     decision: Decision
     truth: Array | None = None
+    """(n, 2) m, where the robots are, if that is not where they believe themselves to be."""
     working: BoolArray | None = None
+    """(n,) Which robots are there and have not failed; None: all."""
     inbox: Any = None
+    """The messages that the robots then have; None where they know the others as they are."""
 
     def __repr__(self) -> str:
         return f"<Snapshot at {self.time:.2f} s, {counted(len(self.positions), 'robot')}>"
@@ -163,26 +135,18 @@ class Snapshot:
 
 @dataclass(eq=False)
 class Cells(ABC):
-    """The cells of robots within the region; most of it is computed when it is first asked for.
-
-    Attributes
-    ----------
-    generators : (n, 2) m
-    mass : (n,) m²
-        M of equation (2): the areas of the cells where the density is 1.
-    centroid : (n, 2) m
-        C of equation (2). An empty cell's is its generator.
-    density : Density or None
-        φ of mass, centroid and moments; None for 1.
-    triangulation : (2, 8 n + 4) or None
-        What the next partition of slowly moving generators may start from, as its `warm`, if there is one.
-    """
+    """The cells of robots within the region; most of it is computed when it is first asked for."""
 
     generators: Array
+    """(n, 2) m"""
     mass: Array
+    """(n,) m², M of equation (2): the areas of the cells where the density is 1."""
     centroid: Array
+    """(n, 2) m, C of equation (2). An empty cell's is its generator."""
     density: Density | None = None
+    """φ of mass, centroid and moments; None for 1."""
     triangulation: NDArray[np.int32] | None = None
+    """What the next partition of slowly moving generators may start from, as its `warm`, if there is one."""
 
     @property
     @abstractmethod

@@ -18,22 +18,16 @@ _BINNED_FROM = 24
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:
-    """Who hears whom: compressed rows, or the complete graph without its n² entries.
-
-    Attributes
-    ----------
-    count : int
-        Number of robots n.
-    ranges : (n,) m or None
-        Communication ranges; None when everybody hears everybody, whatever the distance.
-    indptr : (n + 1,) and indices : (m,), or None for the complete graph
-        ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the robots that i hears.
-    """
+    """Who hears whom: compressed rows, or the complete graph without its n² entries."""
 
     count: int
+    """Number of robots n."""
     ranges: Array | None = None
+    """(n,) m, communication ranges; None when everybody hears everybody, whatever the distance."""
     indptr: IntArray | None = None
+    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the robots that i hears; None where"""
     indices: IntArray | None = None
+    """(m,) the graph is complete."""
 
     @classmethod
     def within(cls, positions: Array, ranges: Array) -> Neighbours:

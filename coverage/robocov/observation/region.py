@@ -18,30 +18,22 @@ class Region:
     """A convex polygon with what the control laws need of it, computed once.
 
     Raises InputError when the hull of the vertices has no area.
-
-    Attributes
-    ----------
-    vertices : (k, 2) m
-        Counter-clockwise, no three collinear, the first not repeated.
-    edges : (k, 2) m
-        ``vertices[e + 1] - vertices[e]``.
-    normals : (k, 2)
-        Outward unit normals of the edges.
-    offsets : (k,) m
-        ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``.
-    sides : (k, 5)
-        Vertices, normals and offsets side by side.
-    area : float, m²
-    centroid : (2,) m
     """
 
     vertices: Array
+    """(k, 2) m, counter-clockwise, no three collinear, the first not repeated."""
     edges: Array = field(init=False)
+    """(k, 2) m, ``vertices[e + 1] - vertices[e]``."""
     normals: Array = field(init=False)
+    """(k, 2) Outward unit normals of the edges."""
     offsets: Array = field(init=False)
+    """(k,) m, ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``."""
     sides: Array = field(init=False)
+    """(k, 5) Vertices, normals and offsets side by side."""
     area: float = field(init=False)
+    """m²"""
     centroid: Array = field(init=False)
+    """(2,) m"""
 
     def __post_init__(self) -> None:
         hull = shapely.convex_hull(shapely.MultiPoint(np.asarray(self.vertices, dtype=float)))
@@ -54,17 +46,16 @@ class Region:
         lengths = np.hypot(edges[:, 0], edges[:, 1])
         normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[:, None]
         offsets = np.einsum("ed,ed->e", normals, ring)
-        values = {
-            "vertices": frozen(ring),
-            "edges": frozen(edges),
-            "normals": frozen(normals),
-            "offsets": frozen(offsets),
-            "sides": frozen(np.column_stack([ring, normals, offsets])),
-            "area": float(hull.area),
-            "centroid": frozen(hull.centroid.coords[0]),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        # the way round being frozen
+        vars(self).update(
+            vertices=frozen(ring),
+            edges=frozen(edges),
+            normals=frozen(normals),
+            offsets=frozen(offsets),
+            sides=frozen(np.column_stack([ring, normals, offsets])),
+            area=float(hull.area),
+            centroid=frozen(hull.centroid.coords[0]),
+        )
 
     @property
     def polygon(self) -> Polygon:

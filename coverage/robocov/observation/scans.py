@@ -40,18 +40,12 @@ class Scanning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scans:
-    """One scan of each robot, by its own range sensor; row i belongs to robot i alone.
-
-    Attributes
-    ----------
-    distances : (n, rays) m
-        To the first solid point along each ray; the robot's sensing range where there is none.
-    hit : (n, rays)
-        Whether there is one.
-    """
+    """One scan of each robot, by its own range sensor; row i belongs to robot i alone."""
 
     distances: Array
+    """(n, rays) m, to the first solid point along each ray; the robot's sensing range where there is none."""
     hit: BoolArray
+    """(n, rays) Whether there is one."""
 
     @property
     def rays(self) -> int:

@@ -64,18 +64,13 @@ class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
 
     Where a cell is not convex, its centroid may lie outside of it. There is no triangulation.
-
-    Attributes
-    ----------
-    speeds : (n,) m/s
-    pieces : (p, 7)
-        The boundaries, relative to the generators: five numbers as in `robocov.voronoi.arcs`, whose each
-        is (ascending), and what is beyond.
-    region : Region
     """
 
     speeds: Array
+    """(n,) m/s"""
     pieces: Array
+    """(p, 7) The boundaries, relative to the generators: five numbers as in `robocov.voronoi.arcs`, whose
+    each is (ascending), and what is beyond."""
     region: Region
 
     @cached_property
