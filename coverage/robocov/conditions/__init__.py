@@ -51,14 +51,12 @@ class Failure(NamedTuple):
 
 
 class Join(NamedTuple):
-    """A robot, numbered from 1, that joins at a time, s.
-
-    It appears at `place`, (x, y) m, or as near as it fits then; by default where it would have started.
-    """
+    """A robot, numbered from 1, that joins at a time, s, at a place, (x, y) m, or as near as it fits then."""
 
     robot: int
     time: float
     place: tuple[float, float] | None = None
+    """By default where it would have started."""
 
     def __str__(self) -> str:
         place = "" if self.place is None else f":{self.place[0]:g},{self.place[1]:g}"
@@ -137,10 +135,7 @@ class Conditions:
         return None if rest.ideal else rest
 
     def check_team(self, count: int) -> None:
-        """Check that a team of `count` robots has all that are to fail or join, and some at the beginning.
-
-        Raises ParameterError when it does not.
-        """
+        """Raise ParameterError unless `count` robots have all that fail or join, and one from the start."""
         for name in ("failures", "joins"):
             for k, each in enumerate(getattr(self, name)):
                 if each.robot > count:

@@ -36,10 +36,7 @@ class Draws:
         self._key = int(first), int(second)
 
     def uniform(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
-        """Return numbers in the open interval from 0 to 1, of the shape of `one` and `other` together.
-
-        `step` is from 0 to 2⁶⁴ - 1, `one` and `other` are whole numbers from 0 to 2³² - 1.
-        """
+        """Return numbers between 0 and 1; `step` is from 0 and below 2⁶⁴, `one` and `other` below 2³²."""
         return np.asarray(self._pair(step, one, other)[0])
 
     def normal(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:

@@ -156,10 +156,7 @@ def of_working(decision: Decision, working: BoolArray) -> Decision:
 
 
 class Broadcast(NamedTuple):
-    """Messages of all robots from one step, on their way.
-
-    They said `places`, (n, 2) m, and reach those robots of the rows whose entries, (n, n), are True.
-    """
+    """Messages of all robots from one step: `places`, (n, 2) m, and which robot's `reaches` whom, (n, n)."""
 
     arrives: int
     sent: int

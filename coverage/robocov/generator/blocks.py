@@ -36,6 +36,9 @@ Cell: TypeAlias = list[Edge]
 
 Point: TypeAlias = tuple[float, float]
 
+Trim: TypeAlias = tuple[int, float, float, bool]
+"""Cut of a block's corner: its number, parts of the edges before and after it, and whether it is a yard."""
+
 
 def cut(cell: Cell, origin: Point, normal: Point, setback: float = 0.0, more: float = 0.0) -> Cell:
     """Return the part of a cell that a normal points away from; the cut is its new edge."""
@@ -61,25 +64,6 @@ def without_streets(cell: Cell, wider: float) -> Cell:
         off = edge.setback + wider * edge.more
         block = cut(block, (edge.x - normal[0] * off, edge.y - normal[1] * off), normal)
     return block
-
-
-class Trim(NamedTuple):
-    """Cut of a block's corner: parts of the edges beside it, with the corner or as a yard."""
-
-    corner: int
-    before: float
-    after: float
-    yard: bool
-
-    def applied(self, block: Cell) -> Polygon:
-        """Return the polygon of an outline without what is cut off, where that is possible."""
-        points = np.array(block)[:, :2]
-        at = self.corner % len(points)
-        here, previous, following = points[at], points[at - 1], points[(at + 1) % len(points)]
-        first, last = here + (previous - here) * self.before, here + (following - here) * self.after
-        inner = [first + last - here] if self.yard else []
-        trimmed = Polygon([*points[:at], first, *inner, last, *points[at + 1 :]])
-        return trimmed if trimmed.is_valid else _polygon(block)
 
 
 def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -162,21 +146,32 @@ def _block(cell: Cell, wider: float, corner: DiscStart, trim: Trim | None) -> Po
         # it ends at the side of the square that takes the least
         sides = (low, (1.0, 0.0)), (low, (0.0, 1.0)), (high, (-1.0, 0.0)), (high, (0.0, -1.0))
         block = max((cut(block, *side) for side in sides), key=lambda part: _polygon(part).area)
-    return _polygon(block) if trim is None or not block else trim.applied(block)
+    return _polygon(block) if trim is None or not block else _trimmed(block, *trim)
 
 
 def _polygon(cell: Cell) -> Polygon:
     return Polygon([edge[:2] for edge in cell])
 
 
+def _trimmed(block: Cell, corner: int, before: float, after: float, yard: bool) -> Polygon:
+    """Return the polygon of a block without what is cut off, where that is possible."""
+    points = np.array(block)[:, :2]
+    at = corner % len(points)
+    here, previous, following = points[at], points[at - 1], points[(at + 1) % len(points)]
+    first, last = here + (previous - here) * before, here + (following - here) * after
+    inner = [first + last - here] if yard else []
+    trimmed = Polygon([*points[:at], first, *inner, last, *points[at + 1 :]])
+    return trimmed if trimmed.is_valid else _polygon(block)
+
+
 def _trim(rng: np.random.Generator) -> Trim | None:
     kind, corner = rng.random(), int(rng.integers(0, 12))
     if kind < _CHAMFERED:
         part = rng.uniform(0.2, 0.45)
-        return Trim(corner, part, part, yard=False)
+        return corner, part, part, False
     if kind < _CHAMFERED + _NOTCHED:
         before, after = rng.uniform(0.35, 0.6, 2).tolist()
-        return Trim(corner, before, after, yard=True)
+        return corner, before, after, True
     return None
 
 

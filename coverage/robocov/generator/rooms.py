@@ -167,16 +167,15 @@ def _add_doors(request: Request, plan: FloorPlan, corridor: int | None, rng: np.
     """Add doors so that all rooms hang together, and some more; return whether that is possible."""
     joined = DisjointSet(range(len(plan.rooms)))
     stub = _STUB * request.unit + plan.thickness / 2.0
-    # the rooms by each of their four edges: its axis, whether the room ends there, and where
-    beside: defaultdict[tuple[int, int, float], list[int]] = defaultdict(list)
+    # the rooms by each of their four edges: which, and where it is
+    beside: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     for number, room in enumerate(plan.rooms):
-        for axis, ends in itertools.product((0, 1), (0, 1)):
-            beside[axis, ends, room[axis + 2 * ends]].append(number)
-    between = [
-        (wall, i, j)
-        for wall in plan.walls
-        for i, j in itertools.product(beside[wall.across, 1, wall.at], beside[wall.across, 0, wall.at])
-    ]
+        for edge, at in enumerate(room):
+            beside[edge, at].append(number)
+    between: list[tuple[Wall, int, int]] = []
+    for wall in plan.walls:
+        rooms = beside[wall.across + 2, wall.at], beside[wall.across, wall.at]
+        between += [(wall, i, j) for i, j in itertools.product(*rooms)]
     key, loop, place = rng.random((3, len(between)))
     widths = request.gap * rng.uniform(*_DOORS, len(between))
     # doors to the corridor come first

@@ -23,10 +23,9 @@ FRAME = 2.0
 
 
 def solid_pieces(environment: Environment) -> tuple[Array, ...]:
-    """Return convex counter-clockwise polygons, (k, 2) m each, that fill all that is not free.
+    """Return convex counter-clockwise polygons, (k, 2) m each, that tile all that is not free.
 
-    They cover the obstacles that stand still, the region outside a non-convex boundary, and a frame of
-    thickness `FRAME` around the region; they do not overlap.
+    That are obstacles that stand still, the outside of the boundary, and a `FRAME` around the region.
     """
     static = environment.static
     # kept as a cached property would, which an environment, that knows of no engine, cannot have
