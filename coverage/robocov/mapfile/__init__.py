@@ -6,6 +6,7 @@ import io
 import json
 import math
 import re
+from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -40,9 +41,6 @@ def load_map(source: str | Path) -> Environment:
     """Return the map in a file, or the bundled map of that name: a str without suffix and separator.
 
     Raises `MapError`, one line: the file with line and column, the JSON path, the value and what was wanted.
-
-    >>> load_map("square").area
-    100.0
     """
     path = map_file(source)
     return parse_map(read_bytes(path), str(path), path.parent)
@@ -55,25 +53,17 @@ def map_file(source: str | Path) -> Path:
     known = bundled_maps()
     if source in known:
         return known[source]
-    try:
+    with suppress(OSError):  # as of a name that is longer than any file's
         if Path(source).is_file():
             return Path(source)
-    except OSError:  # as of a name that is longer than any file's
-        pass
     raise MapError(unknown_name("map", source, known))
 
 
 def bundled_maps() -> dict[str, Path]:
-    """Return the files of the bundled maps by name, sorted.
-
-    An installed package holds them; in a checkout they are in the folder ``maps``.
-    """
+    """Return the files of the bundled maps by name, sorted: those in the package, else in the checkout."""
     here = Path(__file__).resolve()
-    for folder in (here.parents[1] / "maps", here.parents[3] / "maps"):
-        files = sorted(folder.glob("*.json"))
-        if files:
-            return {file.stem: file for file in files}
-    return {}
+    inside, beside = (sorted((here.parents[up] / "maps").glob("*.json")) for up in (1, 3))
+    return {file.stem: file for file in inside or beside}
 
 
 def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
@@ -96,7 +86,8 @@ def density_of(value: object, boundary: Ring, where: str = "map", folder: Path |
     """Return the density that the JSON value at the ``density`` of a map with that boundary stands for."""
     rest = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
     model = validate({**HEAD, **rest, "density": value}, where)
-    return _density(model.density, boundary, folder, where)
+    density: Density = _density(model.density, boundary, folder, where)
+    return density
 
 
 def _environment(document: object, where: str, folder: Path | None) -> Environment:
@@ -205,14 +196,13 @@ def _is_ring(value: object) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
 
 
-def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Density:
+def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
     """Return the density that a model stands for; a raster without an extent covers the boundary's box.
 
     `folder` is where the map is, and a picture that it names; None when it came without a file.
     """
     if not isinstance(model, RasterModel):
-        density: Density = model.built()
-        return density
+        return model.built()
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
         values[values < LIGHTEST] = 0.0
@@ -278,8 +268,8 @@ def _greys(content: bytes) -> Array:
         with Image.open(io.BytesIO(content), formats=("PNG", "PPM")) as image:
             width, height = image.size
             if not 1 <= min(width, height) <= max(width, height) <= FINEST:
-                wanted = f"at most {FINEST} each way"
-                raise InputError(f"{width} x {height} pixels, but {wanted} were wanted")
+                found = f"{width} x {height} pixels"
+                raise InputError(f"{found}, but at most {FINEST} each way were wanted")
             if image.mode.startswith("I"):  # 16 bits
                 return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
             return np.asarray(image.convert("L"), dtype=float) / 255.0

@@ -255,9 +255,7 @@ class MapModel(Model, title="robocov map"):
     )
     obstacles: list[ObstacleModel] = _field("They may overlap, touch, and stick out", [_WALL], [])
     starts: dict[Label, StartModel] = _field("Named starts; the first is the default", _STARTS, {})
-    density: DensityModel | None = _field(
-        "How much each place counts; by default all the same", _DENSITY, None
-    )
+    density: DensityModel | None = _field("How much places count, by default the same", _DENSITY, None)
     extra: dict[str, Any] = _field("Free keys of yours; kept untouched", {"author": "Ada"}, {})
 
 
@@ -299,9 +297,8 @@ def validate(document: object, where: str) -> MapModel:
         model = MapModel.model_validate(document)
     except ValidationError as error:
         raise refused(error, where, _mistake) from None
-    raster = isinstance(model.density, RasterModel)
-    found = list((_raster_mistakes if raster else _weight_mistakes)(model.density)) if model.density else []
-    if found:
+    mistakes = _raster_mistakes if isinstance(model.density, RasterModel) else _weight_mistakes
+    if model.density is not None and (found := list(mistakes(model.density))):
         raise MapError.of(where, found)
     return model
 
@@ -379,12 +376,9 @@ def _weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
             (a, b), (c, d) = peak.covariance
             smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
             if b != c or not smaller_eigenvalue >= SMALLEST**2 or a * d - b * c <= 1e-9 * a * d:
-                wanted = (
-                    f"a symmetric, positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
-                )
-                yield Mistake.at(
-                    (*at, "covariance"), f"{shown_json(peak.covariance)}, but {wanted} was wanted"
-                )
+                wanted = f"positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
+                what = f"{shown_json(peak.covariance)}, but a symmetric, {wanted} was wanted"
+                yield Mistake.at((*at, "covariance"), what)
     if not getattr(model, _BASES[model.kind]) and not any(part.weight for part in (*peaks, *areas)):
         yield Mistake.at(("density", "weight") if model.kind == "uniform" else ("density",), NOTHING)
 
