@@ -19,8 +19,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.base import Density, check_weight
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges, Density, check_weight
 from robocov.errors import ParameterError, shown
 
 Point: TypeAlias = tuple[float, float]

@@ -23,8 +23,7 @@ import shapely
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
-from robocov.density.base import Density, check_weight
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges, Density, check_weight
 from robocov.errors import ParameterError
 
 Ring: TypeAlias = tuple[tuple[float, float], ...]

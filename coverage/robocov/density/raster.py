@@ -11,8 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray, frozen
 from robocov.compiled import inlined_kernel, kernel
-from robocov.density.base import HEAVIEST, Density
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import HEAVIEST, CellEdges, Density
 from robocov.errors import ParameterError, shown
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, inner_kernel, kernel
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges
 from robocov.errors import ParameterError, shown
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.density.base import Density
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges, Density
 from robocov.errors import ParameterError, counted, shown
 from robocov.observation.neighbours import Neighbours, close_pairs
 from robocov.observation.region import Region

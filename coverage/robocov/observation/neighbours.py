@@ -144,45 +144,38 @@ def binned(
 @kernel
 def _pairs(points: Array, ranges: Array) -> tuple[IntArray, IntArray, IntArray, Array]:
     """Return rows, first and second points, and distances of the directed pairs in range of each other."""
-    n = len(points)
-    indptr, none, no_distance = np.zeros(n + 1, np.intp), np.empty(0, np.intp), np.empty(0)
-    starts, order = np.empty(2 * n + 8, np.intp), np.empty(n, np.intp)
-    total = _walked(points, ranges, starts, order, indptr, none, none, no_distance)
-    first, second, distance = np.empty(total, np.intp), np.empty(total, np.intp), np.empty(total)
-    _walked(points, ranges, starts, order, indptr, first, second, distance)
-    return indptr, first, second, distance
-
-
-@inner_kernel
-def _walked(
-    points: Array, ranges: Array, starts: IntArray, order: IntArray, indptr: IntArray, first: IntArray,
-    second: IntArray, distance: Array,
-) -> int:  # fmt: skip
-    """Write the pairs, as many as there is room for; return how many there are."""
-    n, total, reach = len(points), 0, 0.0
+    n, reach = len(points), 0.0
     for i in range(n):
         reach = max(reach, ranges[i])
+    starts, order = np.empty(2 * n + 8, np.intp), np.empty(n, np.intp)
     left, low, scale, columns, rows = 0.0, 0.0, 0.0, 1, 1
     if n:
         left, low, scale, columns, rows = binned(points, 0, n, reach, starts, order)
-    for i in range(n):
-        x, y = points[i, 0], points[i, 1]
-        column, row = row_of(x - left, scale), row_of(y - low, scale)
-        for r in range(max(row - 1, 0), min(row + 2, rows)):
-            b = r * columns
-            for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
-                j = order[k]
-                dx, dy = points[j, 0] - x, points[j, 1] - y
-                away = np.sqrt(dx * dx + dy * dy)
-                if not away <= min(ranges[i], ranges[j]) or j == i:
-                    continue
-                if total < len(second):
-                    # sorted in: those of one bin ascend already
-                    place = total
-                    while place > indptr[i] and second[place - 1] > j:
-                        second[place], distance[place] = second[place - 1], distance[place - 1]
-                        place -= 1
-                    first[total], second[place], distance[place] = i, j, away
-                total += 1
-        indptr[i + 1] = total
-    return total
+    indptr, total = np.zeros(n + 1, np.intp), 0
+    first, second, distance = np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
+    # they are counted, then written
+    for turn in range(2):
+        if turn:
+            first, second, distance = np.empty(total, np.intp), np.empty(total, np.intp), np.empty(total)
+        total = 0
+        for i in range(n):
+            x, y = points[i, 0], points[i, 1]
+            column, row = row_of(x - left, scale), row_of(y - low, scale)
+            for r in range(max(row - 1, 0), min(row + 2, rows)):
+                b = r * columns
+                for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
+                    j = order[k]
+                    dx, dy = points[j, 0] - x, points[j, 1] - y
+                    away = np.sqrt(dx * dx + dy * dy)
+                    if not away <= min(ranges[i], ranges[j]) or j == i:
+                        continue
+                    if turn:
+                        # sorted in: those of one bin ascend already
+                        place = total
+                        while place > indptr[i] and second[place - 1] > j:
+                            second[place], distance[place] = second[place - 1], distance[place - 1]
+                            place -= 1
+                        first[total], second[place], distance[place] = i, j, away
+                    total += 1
+            indptr[i + 1] = total
+    return indptr, first, second, distance

@@ -10,8 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.density.base import Density
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges, Density
 from robocov.errors import InputError, shown
 from robocov.observation import Cells
 from robocov.observation.neighbours import NOBODY, Neighbours

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inner_kernel, kernel
-from robocov.density.cell_edges import REGION
+from robocov.density.base import REGION
 from robocov.voronoi.delaunay import Mesh, before, following, triangulated
 
 _NEAREST = 6

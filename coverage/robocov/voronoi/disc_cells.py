@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.cell_edges import REGION, CellEdges
+from robocov.density.base import REGION, CellEdges
 
 _CHORDS = 64
 """For one arc, which is less than half a turn."""

@@ -35,8 +35,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inner_kernel, kernel
-from robocov.density.base import Density
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges, Density
 from robocov.errors import InputError, shown
 from robocov.observation import Cells
 from robocov.observation.neighbours import Neighbours
@@ -119,29 +118,20 @@ def weighted_partition(
 ) -> VoronoiPartition | WeightedCells:
     """Return the cells of the places that each robot reaches first, going straight.
 
+    Parameters and errors are those of `partition`, but for the following. Each cell depends, to the last bit,
+    on the places and speeds of the robot and those that it hears alone.
+
     Parameters
     ----------
     generators : (n, 2) m
         Those at the very same place do not cut each other when they are equally fast; of others the
         fastest has the cell, and the rest have none.
     speeds : (n,) m/s
-        Positive. When all are equal, the cells are those of `partition`, bit for bit.
-    region : Region
-    neighbours : Neighbours or None
-        Who hears whom. Cell i is cut only against the robots that i hears, and depends, to the last bit, on
-        their places and speeds and its own. None: everybody hears everybody.
-    warm : Mesh or None
-        As `partition` takes it.
-    heard : (m, 2) m or None
-        Where robots know their neighbours to be, in the order of ``neighbours.indices``.
+        Positive; else an InputError is raised. When all are equal, the cells are those of `partition`, bit
+        for bit.
     density : Density or None
-        φ, by which mass, centroid and moments are taken, over cells whose arcs are cut into chords that leave
-        them by at most 2e-5 of the region's diameter. None: 1 everywhere, without that.
-
-    Raises
-    ------
-    InputError
-        When the generators are not (n, 2) finite numbers, or the speeds not (n,) positive ones.
+        φ is integrated over cells whose arcs are cut into chords that leave them by at most 2e-5 of the
+        region's diameter.
 
     Examples
     --------

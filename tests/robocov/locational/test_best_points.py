@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize, minimize_scalar
 from voronoi_cases import FAMILIES, PENTAGON, REGIONS, Family, families, names, performance, scattered, seeds
 
-from robocov.density.cell_edges import CellEdges
+from robocov.density.base import CellEdges
 from robocov.locational import Distance, Performance, Sensing, SquaredDistance, gradient, value
 from robocov.locational.best_points import _downhill, best_points
 from robocov.observation.neighbours import Neighbours
