@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from robocov_app.demo.curves import DISTANCE, TIME, chosen, compared, curve_of
 from robocov_app.demo.layout import inside
 from robocov_app.demo.overlays import tag
-from robocov_app.demo.plotted import DISTANCE, TIME, chosen, compared, curve_of
 from robocov_app.view import sprites
 from robocov_app.view.camera import Camera, round_length
 from robocov_app.view.canvas import Canvas
@@ -21,11 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.arrays import Array
-    from robocov_app.demo.curves import Event
+    from robocov_app.demo.curves import Event, Plotted
     from robocov_app.demo.desk import Desk
     from robocov_app.demo.lane import Lane
     from robocov_app.demo.layout import Box, Layout
-    from robocov_app.demo.plotted import Plotted
     from robocov_app.view.theme import Colour, Theme
 
 LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20

@@ -15,6 +15,7 @@ import shapely
 
 from robocov.environment import WallObstacle
 from robocov.metrics import SETTLED_DISTANCE, TOUCHING
+from robocov_app.demo.lane import with_failed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Decision, Snapshot
     from robocov.robots import Team
+    from robocov_app.demo.desk import Desk
 
 SLOW = 0.05
 """Speed in m/s below which a robot seems to be at rest."""
@@ -69,6 +71,24 @@ class Report:
     title: str
     verdict: str
     lines: tuple[Line, ...]
+
+
+def report_on(desk: Desk, number: int) -> Report:
+    """Return what the inspector says of a robot of the chosen pane."""
+    session, lane = desk.session, desk.lane
+    circumstances = session.circumstances(lane)
+    if number in circumstances.failed:
+        x, y = circumstances.failed[number]
+        verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
+        return Report(f"Robot {number}", verdict, ())
+    return explain(
+        session.snapshot(lane),
+        circumstances.team,
+        with_failed(circumstances),
+        circumstances.numbers.index(number),
+        names=circumstances.numbers,
+        recent=session.recent(lane, number),
+    )
 
 
 def explain(

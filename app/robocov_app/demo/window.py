@@ -12,17 +12,17 @@ from robocov.errors import RobocovError
 from robocov.files.atomic import written
 from robocov_app.demo.actions import all_actions
 from robocov_app.demo.arena import Arena
-from robocov_app.demo.asked import report_on
 from robocov_app.demo.chart import Chart
+from robocov_app.demo.curves import speeds_of
 from robocov_app.demo.desk import plain
 from robocov_app.demo.film import FPS as FILM_FPS
 from robocov_app.demo.film import Film, pixels
+from robocov_app.demo.inspector import report_on
 from robocov_app.demo.keeping import Keeper
 from robocov_app.demo.keyboard import Keyboard
 from robocov_app.demo.layout import inside, laid_out
 from robocov_app.demo.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.demo.panel import TABS, Panel
-from robocov_app.demo.plotted import speeds_of
 from robocov_app.demo.pointer import Pointer
 from robocov_app.demo.report_page import ReportPage
 from robocov_app.demo.screen import shown, undisturbed

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.demo.chart import curve_colour, spread, time_axis, value_axis
+from robocov_app.demo.curves import compared
 from robocov_app.demo.film import pixels
-from robocov_app.demo.plotted import compared
 from robocov_app.demo.scenario import Law
 
 

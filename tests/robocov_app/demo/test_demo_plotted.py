@@ -10,7 +10,7 @@ from driven_window import opened
 
 from robocov.cost import CoverageCost
 from robocov.robots import Team
-from robocov_app.demo.plotted import DISTANCE, TIME, chosen, compared, curve_of, speeds_of
+from robocov_app.demo.curves import DISTANCE, TIME, chosen, compared, curve_of, speeds_of
 from robocov_app.demo.scenario import Limits
 
 MIXED = Limits.of(Team.joined([Team.homogeneous(2, max_speed=1.0), Team.homogeneous(1, max_speed=0.25)]))
