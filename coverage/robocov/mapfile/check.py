@@ -201,8 +201,6 @@ class MapReport:
         As they are given in the file: a circle has none.
     components : tuple of float, m²
         Areas of the connected parts of the free space, the largest first.
-    narrowest_gap : Gap or None
-        None where the free space has no passage, as in a convex room.
     warnings : tuple of str
         What may be a mistake, one line each.
     density, density_range, mean_density : str or None, ...
