@@ -159,7 +159,6 @@ class Atlas(Law):
         return AtlasMemory(team, states, routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
-        """Return the forces that lead each robot on its way."""
         states, scans = list(memory.states), seen.scans
         if scans is not None:
             each = zip(states, seen.positions, scans.distances, scans.hit, strict=True)

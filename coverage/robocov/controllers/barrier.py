@@ -11,7 +11,6 @@ from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
-from robocov.observation.region import Region
 from robocov.observation.scans import Scanning
 from robocov.potential import separation
 from robocov.robots import Team
@@ -64,6 +63,7 @@ class Barrier(Law):
     label = "LA, safe"
     summary = "Lloyd's algorithm with safety barrier certificates (Wang, Ames and Egerstedt 2017)"
     scanning = Scanning(rays=72, period=0.1)
+    memory = BarrierMemory
 
     safe_gap: float = gain(0.05, "m", "least distance between surfaces: D_s less the radii", high=100.0)
     gamma: float = gain(20.0, "s/m²", "how fast h may fall, as gamma h³", low=1e-3)
@@ -71,9 +71,6 @@ class Barrier(Law):
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = choice_of_cells()
-
-    def begin(self, region: Region, team: Team) -> BarrierMemory:
-        return BarrierMemory(team)
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
         """Return the forces of the nearest accelerations to Lloyd's that are certified."""
@@ -86,9 +83,8 @@ class Barrier(Law):
         limit = team.max_acceleration / np.maximum(np.hypot(*wanted.T), 1e-300)
         changed = (chosen - wanted * np.minimum(1.0, limit)[:, None]) * team.mass[:, None]
         terms = {"attraction": forces - changed, "barrier": changed}
-        return Decision(
-            forces, cells.centroid, terms, cells, replace(memory, triangulation=cells.triangulation)
-        )
+        memory = replace(memory, triangulation=cells.triangulation)
+        return Decision(forces, cells.centroid, terms, cells, memory)
 
     def certified(
         self, seen: Observations, memory: BarrierMemory, wanted: Array

@@ -78,10 +78,8 @@ def informed(controller: Controller, environment: Environment) -> Controller:
     if tell is None:
         return controller
     if information != "whole map":
-        raise ParameterError(
-            f"controller {controller.name!r}: it has a method informed(environment), but its information "
-            f"is {information!r}; 'whole map' was wanted"
-        )
+        told = f"it has a method informed(environment), but its information is {information!r}"
+        raise ParameterError(f"controller {controller.name!r}: {told}; 'whole map' was wanted")
     known: Controller = tell(environment)
     return known
 
@@ -102,21 +100,20 @@ class Law:
     label: ClassVar[str]
     summary: ClassVar[str]
     information: ClassVar[Information] = "own"
+    memory: ClassVar[type[Memory]] = Memory
 
     def __post_init__(self) -> None:
         validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> Any:
         """Return what the robots know of themselves."""
-        return Memory(team)
+        return self.memory(team)
 
 
 def choice_of_cells() -> Any:
     """Declare the gain that says by what the cells of a law are divided, as a dataclass field."""
-    meaning = (
-        "whose a place is: the nearest robot's, or the one's that is there first at its own largest speed"
-    )
-    return choice("distance", ("distance", "time"), meaning)
+    what = "whose a place is: the nearest robot's, or the one's that is there first at its own largest speed"
+    return choice("distance", ("distance", "time"), what)
 
 
 def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPartition | WeightedCells:
@@ -187,22 +184,14 @@ class Individually:
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         """Ask the law for each robot's force."""
-        cells = partition(
-            seen.positions, seen.region, seen.neighbours, memory, seen.reported_positions, seen.density
-        )
+        known = seen.region, seen.neighbours, memory, seen.reported_positions, seen.density
+        cells = partition(seen.positions, *known)
         forces = np.empty_like(seen.positions)
         for i in range(len(forces)):
-            point = seen.obstacle_points[i]
-            own = OwnView(
-                number=i,
-                position=seen.positions[i].copy(),
-                velocity=seen.velocities[i].copy(),
-                neighbours=seen.neighbour_positions(i),
-                obstacle_point=None if np.isnan(point[0]) else point.copy(),
-                region=seen.region,
-                time=seen.time,
-                _cells=cells,
-            )
+            place, velocity = seen.positions[i].copy(), seen.velocities[i].copy()
+            point = None if np.isnan(seen.obstacle_points[i, 0]) else seen.obstacle_points[i].copy()
+            heard = seen.neighbour_positions(i)
+            own = OwnView(i, place, velocity, heard, point, seen.region, seen.time, cells)
             force = np.asarray(self.law.force(own), dtype=float)
             if force.shape != (2,):
                 told = f"gave {shown(force.tolist())}, but two numbers in newtons were wanted"

@@ -159,7 +159,5 @@ def in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:
 
 def summed(robot: IntArray, vectors: Array, n: int) -> Array:
     """Return the sums of (m, 2) vectors that belong to each of n robots, (n, 2)."""
-    sums = np.empty((n, 2))
-    for k in (0, 1):
-        sums[:, k] = np.bincount(robot, vectors[:, k], minlength=n)
-    return sums
+    sums = [np.bincount(robot, part, minlength=n) for part in vectors.T]
+    return np.column_stack(sums).astype(np.float64, copy=False)  # of nothing counts are whole

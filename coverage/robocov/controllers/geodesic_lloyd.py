@@ -95,9 +95,8 @@ class GeodesicLloyd(Law):
 
     def _plan(self, team: Team) -> Plan:
         if self.environment is None:
-            raise ParameterError(
-                f"controller {self.name!r}: it has not been told the map; informed(environment) was wanted"
-            )
+            told = "it has not been told the map; informed(environment) was wanted"
+            raise ParameterError(f"controller {self.name!r}: {told}")
         return _cached(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
 
 
@@ -110,9 +109,8 @@ class Plan:
     def __init__(self, environment: Environment, clearance: float, lattice: int) -> None:
         room = environment.free.buffer(-clearance, quad_segs=_SEGMENTS).simplify(_SIMPLER)
         if room.is_empty:
-            raise ParameterError(
-                f"map {environment.name!r} has no room for robots that keep {clearance:g} m from its walls"
-            )
+            told = f"no room for robots that keep {clearance:g} m from its walls"
+            raise ParameterError(f"map {environment.name!r} has {told}")
         walls = environment.region.polygon.difference(room)
         solid = tuple(_obstacle(part) for part in shapely.get_parts(walls) if isinstance(part, Polygon))
         ring = tuple((x, y) for x, y in environment.region.vertices.tolist())

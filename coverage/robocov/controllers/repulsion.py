@@ -21,9 +21,7 @@ from robocov.voronoi.delaunay import Mesh
 
 _TOGETHER = 1e-9  # metres at which robots in one place are taken to be
 _NEAREST = 0.05  # metres below which Howard's forces no longer grow; robots that touch are farther apart
-_WALL = 2.0 / (
-    3.0 * np.pi
-)  # what a wall at a distance of 1 does by all its rays, in parts of what a point does
+_WALL = 2.0 / (3.0 * np.pi)  # what a wall does by all its rays, in parts of what a point as near does
 _STRETCHED = 0.999  # part of the range of a link beyond which the force that holds it no longer grows
 _STILL = 0.01  # speed in m/s below which a robot has no direction in which it could go on
 _NOT_REPORTED = np.empty((0, 2))
@@ -38,10 +36,8 @@ def _potential_forces(
     indptr = np.zeros(n + 1, np.intp) if not from_robots else NOBODY if links.indptr is None else links.indptr
     indices = NOBODY if links.indices is None else links.indices
     reported = _NOT_REPORTED if seen.reported_positions is None else seen.reported_positions
-    cap, points = np.inf if limit is None else limit, seen.obstacle_points
-    return potential_forces(
-        seen.positions, reported, indptr, indices, n, points, goals, k_rep, rho_0, k_att, cap
-    )
+    known = seen.positions, reported, indptr, indices, n, seen.obstacle_points
+    return potential_forces(*known, goals, k_rep, rho_0, k_att, np.inf if limit is None else limit)
 
 
 def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
@@ -110,9 +106,8 @@ class Rapf(Law):
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         cells = cells_seen(seen, self.cells, memory)
         goals = targets(cells, seen.density, self.target, self.height)
-        forces, attraction, robots, obstacle = _potential_forces(
-            seen, goals, self.k_rep, self.rho_0, self.k_att, self.attraction_limit
-        )
+        gains = self.k_rep, self.rho_0, self.k_att, self.attraction_limit
+        forces, attraction, robots, obstacle = _potential_forces(seen, goals, *gains)
         terms = {"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle}
         return Decision(forces, goals, terms, cells, cells.triangulation)
 

@@ -15,7 +15,6 @@ from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations
-from robocov.observation.region import Region
 from robocov.observation.scans import Scanning, headings
 from robocov.robots import Team
 
@@ -27,6 +26,7 @@ _ARRIVED = 0.05  # distance in metres at which a robot has arrived
 _WALK = 1.0  # way in metres along a boundary that is not worth trying
 _WANES = 0.9  # part of its patience that is left to a robot after every goal that it has kept
 _TOUCHING = 0.95  # a point that is already nearer than the clearance is kept off by this part of its distance
+_DETOUR = "longest way along a boundary, in those to the goal; null: once round"
 
 
 class Mode(Enum):
@@ -109,22 +109,15 @@ class TangentBug(Law):
     label = "LA + TangentBug"
     summary = "Lloyd's algorithm, with TangentBug to go round obstacles (Breitenmoser et al. 2010)"
     scanning = Scanning(rays=120, period=0.1)
+    memory = TangentBugMemory
 
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
-    detour: float | None = gain(
-        4.0,
-        "distances",
-        "longest way along a boundary, in those to the goal; null: once round",
-        optional=True,
-    )
+    detour: float | None = gain(4.0, "distances", _DETOUR, optional=True)
     moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     cells: str = choice_of_cells()
-
-    def begin(self, region: Region, team: Team) -> TangentBugMemory:
-        return TangentBugMemory(team)
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
         team, cells = memory.team, cells_seen(seen, self.cells, memory.triangulation)
@@ -202,7 +195,7 @@ class Look:
             return bug
         if bug.mode is Mode.LEAVING:
             there = bug.way - self.position
-            if _length(there) > _BACK and self._in_view(there):
+            if math.hypot(*there) > _BACK and self._in_view(there):
                 return bug
             # as good as reached: the next place to leave for must be nearer
             bug = replace(bug, mode=Mode.GOAL, best=bug.way)
@@ -214,12 +207,12 @@ class Look:
 
     def _in_view(self, place: Array) -> bool:
         """Return whether the robot can go straight to a place."""
-        far = _length(place)
+        far = math.hypot(*place)
         return far < _ARRIVED or self._towards(place) >= far - 1e-9
 
     def _towards(self, place: Array) -> float:
         """Return how far the robot can go straight on towards a place, m."""
-        direction = place / max(_length(place), 1e-300)
+        direction = place / max(math.hypot(*place), 1e-300)
         return float(free_distances(self.points, direction[None], self.keep, self.reach)[0])
 
     def _ends(self, towards: Array) -> dict[int, Gap]:
@@ -232,11 +225,11 @@ class Look:
     def _to_goal(self, bug: Bug) -> Bug:
         ends = self._ends(self.goal)
         left = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
-        by_way_of = {turn: _length(end.point) + left[turn] for turn, end in ends.items()}
+        by_way_of = {turn: math.hypot(*end.point) + left[turn] for turn, end in ends.items()}
         if bug.turn in ends:
             # of two that are about as good, the one that it was going to
             by_way_of[bug.turn] -= _BETTER
-        distance = _length(self.goal)
+        distance = math.hypot(*self.goal)
         nearer = [turn for turn in ends if left[turn] < distance]
         turn = min(nearer or ends, key=by_way_of.__getitem__, default=bug.turn)
         if nearer:
@@ -256,7 +249,7 @@ class Look:
     def _along_boundary(self, bug: Bug) -> Bug:
         entered = bug.entered
         assert entered is not None and bug.last is not None
-        bug = replace(bug, followed=bug.followed + _length(self.position - bug.last), last=self.position)
+        bug = replace(bug, followed=bug.followed + math.dist(self.position, bug.last), last=self.position)
         distances = np.hypot(*self.points.T)
         if np.isnan(distances).all():
             return self._off(bug, Mode.GOAL, self.position + self.goal)
@@ -272,10 +265,10 @@ class Look:
         along = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free)
         left = np.hypot(*(self.goal - along[:, None] * self.directions).T)
         ray = int(left.argmin())
-        if left[ray] < _length(self.position + self.goal - best) - _BETTER:
+        if left[ray] < math.dist(self.position + self.goal, best) - _BETTER:
             there = self.position + along[ray] * self.directions[ray]
             return self._off(bug, Mode.LEAVING, there, passing=True)
-        round_once = bug.followed > 2.0 * np.pi * _BACK and _length(self.position - entered) < _BACK
+        round_once = bug.followed > 2.0 * np.pi * _BACK and math.dist(self.position, entered) < _BACK
         if round_once or not ends or bug.followed > bug.patience:
             # who has not been round goes back the way that it came
             turn = bug.turn if round_once else -bug.turn
@@ -298,7 +291,7 @@ class Look:
         """Return the bug on the last piece of its way to the best point, when that is in view."""
         assert bug.best is not None
         there = bug.best - self.position
-        far, free = _length(there), self._towards(there)
+        far, free = math.hypot(*there), self._towards(there)
         # seen from here the boundary may be a little closer than it looked
         if far < _ARRIVED or free >= far - self.keep:
             way = frozen(self.position + there * min(1.0, free / max(far, 1e-300)))
@@ -336,15 +329,10 @@ def end_of_contour(
     blocked, `blocked_at` so many metres. The contour ends where the next ray is free for longer by `jump`,
     or so far that it meets nothing, `reach`.
     """
-    before = blocked_at
-    for step in range(len(free)):
-        ray = (first + turn * step) % len(free)
-        ahead = float(free[ray])
-        if ahead > before + jump or ahead >= reach:
-            return Gap(ray, directions[ray] * min(ahead, before + jump))
-        before = ahead
-    return None
-
-
-def _length(vector: Array) -> float:
-    return math.hypot(vector[0], vector[1])
+    rays = (first + turn * np.arange(len(free))) % len(free)
+    ahead, before = free[rays], np.append(blocked_at, free[rays[:-1]])
+    ends = np.flatnonzero((ahead > before + jump) | (ahead >= reach))
+    if not len(ends):
+        return None
+    k = ends[0]
+    return Gap(int(rays[k]), directions[rays[k]] * min(ahead[k], before[k] + jump))

@@ -26,7 +26,7 @@ from robocov.compiled import inlined_kernel, inner_kernel, kernel
 from robocov.density.base import CellEdges
 from robocov.errors import ParameterError, shown
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_RULE = np.stack(np.polynomial.legendre.leggauss(16))  # nodes and weights
 
 # length of a panel of the quadrature in τ, where s = w sinh τ: the integrand is analytic for |Im τ| < π/2,
 # and 16 nodes leave less than a rounding error
@@ -87,7 +87,7 @@ def value(edges: CellEdges, points: Array, f: Performance) -> Array:
     array([2.666667])
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    return _values(edges.start, edges.end, edges.cell, points, f.kind, f.height, _NODES, _WEIGHTS)
+    return _values(edges.start, edges.end, edges.cell, points, f.kind, f.height, _RULE)
 
 
 def gradient(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -200,14 +200,7 @@ def _arctan_rest(x: float) -> float:
 
 @kernel
 def _values(
-    start: Array,
-    end: Array,
-    cell: IntArray,
-    points: Array,
-    kind: int,
-    height: float,
-    nodes: Array,
-    weights: Array,
+    start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float, rule: Array
 ) -> Array:
     """Return the sums of ∫ f over the triangles that the points span with the edges, signed as d."""
     sums = np.zeros(len(points))
@@ -229,11 +222,11 @@ def _values(
         panels = max(int(np.ceil((stop - begin) / _PANEL)), 1)
         half = 0.5 * (stop - begin) / panels
         for panel in range(panels):
-            for node in range(len(nodes)):
-                tau = begin + half * (2 * panel + 1 + nodes[node])
+            for node in range(rule.shape[1]):
+                tau = begin + half * (2 * panel + 1 + rule[0, node])
                 foot = w * np.sinh(tau)
                 r = (foot * foot + d * d) / (height * height)
                 # log(1 + r²/h²)/r², which is 1/h² at the foot of the point
-                part = (np.log1p(r) / r if r > 0.0 else 1.0) * w * np.cosh(tau) * weights[node]
+                part = (np.log1p(r) / r if r > 0.0 else 1.0) * w * np.cosh(tau) * rule[1, node]
                 sums[i] += 0.5 * d / (height * height) * part * half
     return sums

@@ -159,9 +159,8 @@ class _Search:
         self.component = np.repeat(covered, [len(piece) for piece in pieces]).astype(np.intp)
         if len(self.component) < robots:
             room = f"there is room for about {len(self.component)}" if fit else "there is no room for any"
-            raise ParameterError(
-                f"robots: {robots} of radius {radius:g} m, but {room} in map {environment.name!r}"
-            )
+            told = f"{robots} of radius {radius:g} m, but {room} in map {environment.name!r}"
+            raise ParameterError(f"robots: {told}")
         self.places = np.concatenate(pieces)
         self.table = self._distances(site_component, np.isin(site_component, covered))
 
@@ -226,9 +225,8 @@ class Room:
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
         self.clearance, self.spacing = radius * (1.0 + START_GAP), 2.0 * radius * (1.0 + START_GAP)
-        self.parts: tuple[BaseGeometry, ...] = tuple(
-            part.buffer(-self.clearance, quad_segs=_SEGMENTS) for part in free.geoms
-        )
+        parts = [part.buffer(-self.clearance, quad_segs=_SEGMENTS) for part in free.geoms]
+        self.parts: tuple[BaseGeometry, ...] = tuple(parts)
         shapely.prepare(list(self.parts))
 
     def nearest(self, positions: Array, component: IntArray) -> Array | None:

@@ -97,14 +97,9 @@ class CoverageDemand:
 
 
 def team_places(
-    ways: GridPlanner,
-    weights: Array,
-    now: Array,
-    begin: Array,
-    fixed: BoolArray,
-    threshold: float,
-    nearby: float,
-) -> Array:
+    ways: GridPlanner, weights: Array, now: Array, begin: Array,
+    fixed: BoolArray, threshold: float, nearby: float,
+) -> Array:  # fmt: skip
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
     From `begin` (k, 2) m on, the former plan, Lloyd's iteration in turn with interchange

@@ -186,21 +186,13 @@ class GridPlanner:
         The places need not be nodes: each is joined to the roomy nodes near it that it sees.
         """
         graph, size = self._graph, len(self.nodes)
-        ends: list[IntArray] = [graph.indices.astype(np.intp)]
-        lengths: list[Array] = [graph.data]
-        counts: list[int] = []
-        for place in places:
-            near = self._closest(place, self.roomy)
-            seen = near[self.clear(place, self.nodes[near], self.blocked)]
-            # who stands in what is taken for a wall is beside it
-            seen = seen if len(seen) else near[:1]
-            ends.append(seen)
-            lengths.append(np.sqrt(((self.nodes[seen] - place) ** 2).sum(axis=1)))
-            counts.append(len(seen))
+        seen = [self._in_sight(place) for place in places]
+        counts = [len(each) for each in seen]
         if not sum(counts):
             return np.full(size, np.inf)
+        away = [np.sqrt(((self.nodes[k] - at) ** 2).sum(axis=1)) for k, at in zip(seen, places, strict=True)]
         begins = np.concatenate([graph.indptr, graph.indptr[-1] + np.cumsum(counts)])
-        parts = np.concatenate(lengths), np.concatenate(ends), begins
+        parts = np.concatenate([graph.data, *away]), np.concatenate([graph.indices, *seen]), begins
         joined = csr_array(parts, shape=(size + len(counts),) * 2)
         new = np.arange(size, size + len(counts))
         return np.asarray(dijkstra(joined, indices=new, min_only=True))[:size]
@@ -212,10 +204,15 @@ class GridPlanner:
 
     def standing(self, place: Array) -> int:
         """Return the node where somebody stands: the nearest roomy one in sight, or at all; -1 for none."""
+        seen = self._in_sight(place)
+        return int(seen[0]) if len(seen) else -1
+
+    def _in_sight(self, place: Array) -> IntArray:
+        """Return the roomy nodes in sight of those near a place; where there are none, the nearest."""
         near = self._closest(place, self.roomy)
-        if not len(near):
-            return -1
-        return int(near[self.clear(place, self.nodes[near], self.blocked).argmax()])
+        seen = near[self.clear(place, self.nodes[near], self.blocked)]
+        # who stands in what is taken for a wall is beside it
+        return seen if len(seen) else near[:1]
 
     def _closest(self, place: Array, among: BoolArray) -> IntArray:
         """Return some nodes near a place, the nearest first."""
