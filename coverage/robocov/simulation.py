@@ -353,15 +353,6 @@ def simulate_many(
 
     `starts`, (n, 2) m each, may differ in size without `team`; they, `conditions` and `seeds` are of each
     run, all else is the same for all. `start` and `seeds` say where the starts came from, for the records.
-
-    Examples
-    --------
-    >>> import robocov as rc
-    >>> rooms = rc.load_map("rooms")
-    >>> starts = [rooms.start().sample(6, seed=seed) for seed in range(3)]
-    >>> records = rc.simulate_many(rooms, rc.Rapf(), starts, 1.0)
-    >>> [record.positions.shape for record in records]
-    [(61, 6, 2), (61, 6, 2), (61, 6, 2)]
     """
     each = [None] * len(starts) if conditions is None else conditions
     own_seeds = [None] * len(starts) if seeds is None else seeds

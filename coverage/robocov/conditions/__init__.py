@@ -173,7 +173,7 @@ class Conditions:
         plain: dict[str, Any] = {key: getattr(self, name) for name, (*_, key) in LIMITS.items()}
         plain["failures"] = [{"robot": robot, "time_s": time} for robot, time in self.failures]
         plain["joins"] = [
-            {"robot": robot, "time_s": time, "place_m": None if place is None else [*place]}
+            {"robot": robot, "time_s": time, "place_m": place and [*place]}
             for robot, time, place in self.joins
         ]
         return plain | {"seed": int(self.seed)}

@@ -85,12 +85,6 @@ def generated_map(
         A map is square, or a rectangle where width and height are given.
 
     Raises ParameterError when a parameter is out of range, or no layout is found that fulfils all of them.
-
-    Examples
-    --------
-    >>> environment = generated_map(7, obstacles=4, area=0.15)
-    >>> environment.name, len(environment.obstacles), len(environment.free.geoms)
-    ('polygons 7', 4, 1)
     """
     if not is_number(seed, Integral) or seed < 0:
         raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")

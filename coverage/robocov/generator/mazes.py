@@ -137,9 +137,8 @@ def _open(walls: BoolArray, rng: np.random.Generator) -> None:
     """Take away a wall, if possible one held at both ends, which makes a way round; often at a dead end."""
     at = np.argwhere(walls)
     along = np.column_stack([at[:, 2], 1 - at[:, 2]])
-    begin, end, beside = (
-        tuple(each.T) for each in (at[:, :2], at[:, :2] + along, at[:, :2] - along[:, ::-1])
-    )
+    posts_and_cells = at[:, :2], at[:, :2] + along, at[:, :2] - along[:, ::-1]
+    begin, end, beside = (tuple(each.T) for each in posts_and_cells)
     meeting = np.zeros(walls.shape[:2], dtype=int)
     for posts in (begin, end):
         np.add.at(meeting, posts, 1)
