@@ -6,7 +6,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,8 +19,6 @@ from robocov.cost.site_paths import (
     TILE,
     CornerViews,
     CostMap,
-    Paths,
-    TilePaths,
     Tiles,
     Work,
     corner_views,
@@ -43,8 +41,6 @@ _BLOCK = 1 << 18
 _REMEMBERED = 64
 """Maps whose costs are kept: an obstacle that moves comes by the same places again."""
 
-Number = TypeVar("Number", bound=np.generic)
-
 
 @dataclass(frozen=True, eq=False)
 class Sites:
@@ -59,7 +55,7 @@ class Sites:
     cells: IntArray
     """(m,) Their numbers among all cells, ``row * lattice + column``."""
 
-    def grid(self, values: NDArray[Number]) -> NDArray[Number]:
+    def grid(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (m,) values of the sites as a picture of the whole lattice, (n, n), the lowest row first.
 
         Cells that are not free hold nan, or -1 where the values are whole numbers.
@@ -117,10 +113,7 @@ class CoverageResult(Drawable):
 
     @cached_property
     def times(self) -> Array:
-        """The time until the first robot is at each site, (m,) s, inf where none can come.
-
-        Without `speeds` every robot goes at 1 m/s.
-        """
+        """The time until the first robot is at each site, (m,) s, inf for none; without `speeds` at 1 m/s."""
         if self.speeds is None:
             return self.distances
         # where none can come, the distance is infinite whatever the speed
@@ -173,8 +166,7 @@ class CoverageCost:
     lattice : int
         Cells along a side.
     progress : callable
-        Called now and then, while what is known before the positions is computed, with the part that is
-        done. It may raise, to give up.
+        Told which part of what is known before the positions is computed. It may raise, to give up.
     geodesics : Geodesics
         The shortest paths of this very environment, where another lattice on it has found them already.
 
@@ -186,10 +178,7 @@ class CoverageCost:
     corners, weights
         As of `CoverageResult`.
 
-    Raises
-    ------
-    ParameterError
-        When `lattice` is not a whole number from 1 to 4096, or so coarse that no site is free.
+    Raises ParameterError when `lattice` is no whole number from 1 to 4096, or so coarse that no site is free.
 
     Examples
     --------
@@ -240,25 +229,17 @@ class CoverageCost:
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
 
-        Parameters
-        ----------
-        positions : (n, 2) m
-        speeds : (n,) m/s or None
-            How fast each robot goes: then not the nearest robot counts but the one that is there first, and
-            the cost is in seconds.
-
-        Raises
-        ------
-        InputError
-            When there is no robot, or one is outside the free space, or speeds are not positive numbers, one
-            for each robot; the message names it.
+        With `speeds`, (n,) m/s, not the nearest robot counts but the one that is there first, and the cost is
+        in seconds. Raises InputError when there is no robot, or one is outside the free space, or speeds are
+        not positive numbers, one for each robot; the message names it.
         """
         positions = np.array(positions, dtype=float)
         if not len(positions):
             raise InputError("positions: none, but at least one robot was wanted")
-        if speeds is None:
-            return self.of_teams(positions[None])[0]
         places, holds = self.geodesics.place(positions)
+        if speeds is None:
+            distances, ways = self._nearest(places[None], holds[None])
+            return self._result(positions, holds, distances[0], ways[0], None)
         speeds = _checked_speeds(speeds, len(positions))
         # of robots that are equally fast the nearest is first: each speed is one search among its robots
         distances, ways = np.full(len(self.points), np.inf), np.full((3, len(self.points)), -1)
@@ -277,30 +258,26 @@ class CoverageCost:
         places, holds = self.geodesics.place(positions.reshape(-1, 2))
         holds = holds.reshape(*positions.shape[:2], -1)
         found = self._nearest(places.reshape(positions.shape), holds)
-        return [self._result(*each) for each in zip(positions, holds, *found, strict=True)]
+        return [self._result(*each, None) for each in zip(positions, holds, *found, strict=True)]
 
     def _nearest(self, places: Array, holds: BoolArray) -> tuple[Array, IntArray]:
         """Return the distances of the sites from teams at (r, n, 2), (r, m) m, and the ways, (r, 3, m)."""
-        (teams, n, _), m, corners, tiles = places.shape, len(self.points), len(self.corners), self._map.tiles
-        to_corners = Paths(np.empty(corners), np.empty((corners, 3), np.int64))
-        to_sites = TilePaths(np.empty(tiles.facts[0].shape), np.empty((3, *tiles.facts[0].shape), np.int64))
-        numbers = np.empty((3, n), np.int64), np.empty((2, corners + 1), np.int64)
+        (teams, n, _), m, k = places.shape, len(self.points), len(self.corners)
+        tiles, slots = self._map.tiles.facts.shape[1:]
+        lists, queue, hidden = (np.empty(size, np.int64) for size in ((3, n), (2, k + 1), tiles))
+        to_corners = np.empty(k), np.empty((k, 3), np.int64)
+        to_sites = np.empty((tiles, slots)), np.empty((3, tiles, slots), np.int64)
         found = np.empty((teams, m)), np.empty((teams, 3, m), np.int64)
         covered = np.asarray(holds.any(axis=1))
         while True:
-            index = AngularWallIndex.room(n, BINS, self._room * n + 2 * BINS)
-            work = Work(index, *numbers, np.empty(len(tiles.boxes), np.int64), to_corners, to_sites)
+            sight = AngularWallIndex.room(n, BINS, self._room * n + 2 * BINS)
+            work = Work(sight, lists, queue, hidden, *to_corners, *to_sites)
             if site_paths(self._map, work, places, covered, self.geodesics.grid.unit, *found):
                 return found
             self._room *= 2
 
     def _result(
-        self,
-        positions: Array,
-        holds: BoolArray,
-        distances: Array,
-        ways: IntArray,
-        speeds: Array | None = None,
+        self, positions: Array, holds: BoolArray, distances: Array, ways: IntArray, speeds: Array | None
     ) -> CoverageResult:
         owner, corner, last_corner = ways
         covered = holds.any(axis=0)
@@ -313,47 +290,21 @@ class CoverageCost:
         mean = weighted_mean(reached, weights)
         time = None if speeds is None else weighted_mean(reached / speeds[whose], weights)
         return CoverageResult(
-            mean_distance=mean,
-            value=(mean if time is None else time) * mass,
-            uncovered_area=uncovered,
-            distances=distances,
-            owner=owner,
-            corner=corner,
-            last_corner=last_corner,
-            positions=positions,
-            points=self.points,
-            corners=self.corners,
-            environment=self.environment,
-            sites=self.sites,
-            weights=self.weights,
-            speeds=speeds,
-            mean_time=time,
-        )
+            mean_distance=mean, value=(mean if time is None else time) * mass, uncovered_area=uncovered,
+            distances=distances, owner=owner, corner=corner, last_corner=last_corner, positions=positions,
+            points=self.points, corners=self.corners, environment=self.environment, sites=self.sites,
+            weights=self.weights, speeds=speeds, mean_time=time,
+        )  # fmt: skip
 
-    def grid(self, values: NDArray[Number]) -> NDArray[Number]:
-        """Return (m,) values of the sites as a picture; see `Sites.grid`.
-
-        Examples
-        --------
-        >>> from robocov.environment import CircleObstacle, Environment
-        >>> square = ((0, 0), (3, 0), (3, 3), (0, 3))
-        >>> cost = CoverageCost(Environment("ring", square, (CircleObstacle((1.5, 1.5), 0.4),)), lattice=3)
-        >>> cost.grid(cost([[0.5, 0.5]]).owner)
-        array([[ 0,  0,  0],
-               [ 0, -1,  0],
-               [ 0,  0,  0]])
-        """
+    def grid(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return (m,) values of the sites as a picture; see `Sites.grid`."""
         return self.sites.grid(values)
 
     def path(self, positions: Array, point: Array) -> Array:
         """Return the shortest path from a point to the nearest of (n, 2) robots, (w, 2) way-points in metres.
 
-        Both ends are included; (0, 2) where no robot can come.
-
-        Raises
-        ------
-        InputError
-            When the point or a robot is outside the free space.
+        Both ends are included; (0, 2) where no robot can come. Raises InputError when the point or a robot is
+        outside the free space.
         """
         positions = np.asarray(positions, dtype=float)
         point = np.asarray(point, dtype=float)
@@ -365,14 +316,8 @@ class MomentaryCost:
     """The coverage cost (22) of a map at any time.
 
     Only robots count that work: one that has failed goes nowhere. Nor does one that a moving obstacle has
-    run over, until it is out again.
-
-    Parameters
-    ----------
-    cost : CoverageCost
-        Of the map as it was given, at time zero.
-    progress : callable
-        As `CoverageCost` takes it, for the maps of later moments.
+    run over, until it is out again. `cost` is that of the map as it was given, at time zero; `progress` is as
+    `CoverageCost` takes it, for the maps of later moments.
     """
 
     def __init__(self, cost: CoverageCost, progress: Callable[[float], None] | None = None) -> None:

@@ -23,7 +23,7 @@ GROUP = 16
 TILE = 4
 """Cells along a side of a tile."""
 
-SLOTS = TILE * TILE
+SLOTS = TILE**2
 
 _FEW = 12
 """Robots of which it is known from the beginning what they see, however far: each is asked of most sites."""
@@ -64,27 +64,8 @@ class CostMap(NamedTuple):
     views: CornerViews
 
 
-class Paths(NamedTuple):
-    """The shortest ways to corners."""
-
-    distance: Array
-    """(k,) grid steps, inf where none leads."""
-    ways: IntArray
-    """(k, 3) The robot where it begins, the corners where it bends first and last, -1 for none."""
-
-
-class TilePaths(NamedTuple):
-    """The shortest ways to sites."""
-
-    distance: Array
-    """(t, SLOTS) grid steps, inf where none leads."""
-    ways: IntArray
-    """(3, t, SLOTS) The robot where it begins, the corner where it bends last, -1 for none; and the robot
-    that is nearest as the crow flies."""
-
-
 class Work(NamedTuple):
-    """Room for the search from n robots."""
+    """The search from n robots: room for it, and in the end the shortest ways."""
 
     sight: AngularWallIndex
     """What each robot sees."""
@@ -94,8 +75,15 @@ class Work(NamedTuple):
     """(2, k + 1) See `relax`."""
     hidden: IntArray
     """(t,) A bit for each site of a tile: whether it does not see its nearest robot."""
-    to_corners: Paths
-    paths: TilePaths
+    to_corners: Array
+    """(k,) Length of the way to each corner, grid steps, inf where none leads."""
+    corner_ways: IntArray
+    """(k, 3) The robot where it begins, the corners where it bends first and last, -1 for none."""
+    to_sites: Array
+    """(t, SLOTS) Length of the way to each site, grid steps, inf where none leads."""
+    ways: IntArray
+    """(3, t, SLOTS) The robot where it begins, the corner where it bends last, -1 for none; and the robot
+    that is nearest as the crow flies."""
 
 
 @inner_kernel
@@ -177,7 +165,7 @@ def _paths_to_corners(known: CostMap, work: Work) -> None:
     """Write the shortest ways to the corners."""
     corners, boxes, n = known.walls.corners, known.walls.corner_boxes, len(work.sight.sources)
     everyone, some, leaves, waiting = work.lists[0], work.lists[1], len(boxes) // 2, 0
-    index, paths, queue = work.sight, work.to_corners, work.queue
+    index, queue, distance, ways = work.sight, work.queue, work.to_corners, work.corner_ways
     for k in range(len(corners)):
         if k % LEAF == 0:
             near = _perhaps_nearest(boxes, leaves + k // LEAF, index, everyone, n, some)
@@ -186,34 +174,34 @@ def _paths_to_corners(known: CostMap, work: Work) -> None:
             dx, dy = corners[k, 0] - index.sources[some[j], 0], corners[k, 1] - index.sources[some[j], 1]
             if dx * dx + dy * dy < best:
                 best, nearest = dx * dx + dy * dy, some[j]
-        paths.distance[k], paths.ways[k, 0], queue[1, k] = np.inf, n, 0
+        distance[k], ways[k, 0], queue[1, k] = np.inf, n, 0
         waiting = _straight_to_corner(known.walls, work, k, nearest, waiting)
     # few of the other robots matter once it is known how far the nearest one has to go, if not straight
-    relax(known.graph, paths.distance, paths.ways, queue, waiting)
+    relax(known.graph, distance, ways, queue, waiting)
     waiting = 0
     for k in range(len(corners)):
         if k % LEAF == 0:
             bound = 0.0
             for j in range(k, min(k + LEAF, len(corners))):
-                bound = max(bound, paths.distance[j])
+                bound = max(bound, distance[j])
             near = _within(boxes, leaves + k // LEAF, index, bound * bound, everyone, n, some)
         for j in range(near):
             waiting = _straight_to_corner(known.walls, work, k, some[j], waiting)
-    relax(known.graph, paths.distance, paths.ways, queue, waiting)
+    relax(known.graph, distance, ways, queue, waiting)
 
 
 @inlined_kernel
 def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) -> int:
     """Write the straight way from a robot to a corner if it is the shortest; return how many then wait."""
-    paths, x, y = work.to_corners, walls.corners[k, 0], walls.corners[k, 1]
+    distance, ways, x, y = work.to_corners, work.corner_ways, walls.corners[k, 0], walls.corners[k, 1]
     from_x, from_y = work.sight.sources[i, 0], work.sight.sources[i, 1]
     away = np.sqrt((x - from_x) * (x - from_x) + (y - from_y) * (y - from_y))
     if (
-        (away < paths.distance[k] or (away == paths.distance[k] and i < paths.ways[k, 0]))
+        (away < distance[k] or (away == distance[k] and i < ways[k, 0]))
         and useful(walls.corners, k, from_x, from_y)
         and sees(walls, work.sight, i, x, y)
     ):
-        paths.distance[k], paths.ways[k, 0], paths.ways[k, 1], paths.ways[k, 2] = away, i, k, -1
+        distance[k], ways[k, 0], ways[k, 1], ways[k, 2] = away, i, k, -1
         if not work.queue[1, k]:
             work.queue[0, waiting], work.queue[1, k] = k, 1
             waiting += 1
@@ -223,38 +211,33 @@ def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) 
 @inlined_kernel
 def _nearest_robots(tiles: Tiles, tile: int, count: int, work: Work) -> None:
     """Write the nearest of `count` robots to the sites of a tile as the crow flies, of equals the first."""
-    paths, sources = work.paths, work.sight.sources
+    to_sites, ways, sources = work.to_sites, work.ways, work.sight.sources
     for s in range(SLOTS):
-        paths.distance[tile, s] = np.inf
+        to_sites[tile, s] = np.inf
     for j in range(count):
         i = work.lists[2, j]
         x, y = sources[i, 0], sources[i, 1]
         for s in range(SLOTS):
             dx, dy = tiles.places[0, tile, s] - x, tiles.places[1, tile, s] - y
-            away2, best = dx * dx + dy * dy, paths.distance[tile, s]
-            paths.ways[2, tile, s] = i if away2 < best else paths.ways[2, tile, s]
-            paths.distance[tile, s] = away2 if away2 < best else best
+            away2, best = dx * dx + dy * dy, to_sites[tile, s]
+            ways[2, tile, s] = i if away2 < best else ways[2, tile, s]
+            to_sites[tile, s] = away2 if away2 < best else best
     for s in range(SLOTS):
-        i, away = paths.ways[2, tile, s], np.sqrt(paths.distance[tile, s])
-        paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = away, i, -1
+        i, away = ways[2, tile, s], np.sqrt(to_sites[tile, s])
+        to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
         sources[i, 2] = max(sources[i, 2], away)
 
 
 @inlined_kernel
 def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
     """Note which sites of a tile do not see their nearest robot; return whether there are any."""
-    tiles, paths, mask = known.tiles, work.paths, 0
+    facts, to_sites, ways, mask = known.tiles.facts, work.to_sites, work.ways, 0
     for s in range(SLOTS):
-        if not covered[tiles.facts[1, tile, s]]:
-            paths.distance[tile, s], paths.ways[0, tile, s] = np.inf, -1
-        elif tiles.facts[0, tile, s] >= 0 and not sees(
-            known.walls,
-            work.sight,
-            paths.ways[2, tile, s],
-            tiles.places[0, tile, s],
-            tiles.places[1, tile, s],
-        ):
-            paths.distance[tile, s] = np.inf
+        i, x, y = ways[2, tile, s], known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
+        if not covered[facts[1, tile, s]]:
+            to_sites[tile, s], ways[0, tile, s] = np.inf, -1
+        elif facts[0, tile, s] >= 0 and not sees(known.walls, work.sight, i, x, y):
+            to_sites[tile, s] = np.inf
             mask |= 1 << s
     work.hidden[tile] = mask
     return mask != 0
@@ -264,22 +247,22 @@ def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
 def _by_corners(known: CostMap, work: Work, tile: int) -> None:
     """Write the shortest ways to the hidden sites of a tile by a corner."""
     places, views, corners = known.tiles.places, known.views, known.walls.corners
-    to, paths, hidden, bound = work.to_corners, work.paths, work.hidden[tile], np.inf
+    to_sites, ways, hidden, bound = work.to_sites, work.ways, work.hidden[tile], np.inf
     # a row cannot be the best for any of them where another one is better for all
     for row in range(views.first[tile], views.first[tile + 1]):
         if hidden & ~views.rows[row, 1] == 0:
-            bound = min(bound, to.distance[views.rows[row, 0]] + views.spans[row, 1])
+            bound = min(bound, work.to_corners[views.rows[row, 0]] + views.spans[row, 1])
     for row in range(views.first[tile], views.first[tile + 1]):
         k, mask = views.rows[row, 0], views.rows[row, 1] & hidden
-        begin, owner = to.distance[k], to.ways[k, 0]
+        begin, owner = work.to_corners[k], work.corner_ways[k, 0]
         if mask == 0 or begin + views.spans[row, 0] > bound or begin == np.inf:
             continue
         for s in range(SLOTS):
             if (mask >> s) & 1:
                 dx, dy = places[0, tile, s] - corners[k, 0], places[1, tile, s] - corners[k, 1]
-                total, best = begin + np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
-                if total < best or (total == best and owner < paths.ways[0, tile, s]):
-                    paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = total, owner, k
+                total, best = begin + np.sqrt(dx * dx + dy * dy), to_sites[tile, s]
+                if total < best or (total == best and owner < ways[0, tile, s]):
+                    to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = total, owner, k
 
 
 @inlined_kernel
@@ -288,26 +271,26 @@ def _farthest(work: Work, tile: int) -> float:
     hidden, farthest = work.hidden[tile], 0.0
     for s in range(SLOTS):
         if (hidden >> s) & 1:
-            farthest = max(farthest, work.paths.distance[tile, s])
+            farthest = max(farthest, work.to_sites[tile, s])
     return farthest
 
 
 @inlined_kernel
 def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
     """Write the straight ways from a robot to the hidden sites of a tile where they are the shortest."""
-    paths, index, hidden = work.paths, work.sight, work.hidden[tile]
+    to_sites, ways, index, hidden = work.to_sites, work.ways, work.sight, work.hidden[tile]
     from_x, from_y = index.sources[i, 0], index.sources[i, 1]
     for s in range(SLOTS):
         if (hidden >> s) & 1:
             x, y = known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
             dx, dy = x - from_x, y - from_y
-            away, best = np.sqrt(dx * dx + dy * dy), paths.distance[tile, s]
+            away, best = np.sqrt(dx * dx + dy * dy), to_sites[tile, s]
             if (
-                (away < best or (away == best and i < paths.ways[0, tile, s]))
-                and i != paths.ways[2, tile, s]
+                (away < best or (away == best and i < ways[0, tile, s]))
+                and i != ways[2, tile, s]
                 and sees(known.walls, index, i, x, y)
             ):
-                paths.distance[tile, s], paths.ways[0, tile, s], paths.ways[1, tile, s] = away, i, -1
+                to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
 
 
 @inlined_kernel
@@ -377,15 +360,15 @@ def site_paths(
     ways : (r, 3, m)
         The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
     """
-    paths, facts = work.paths, known.tiles.facts
+    facts = known.tiles.facts
     for r in range(len(teams)):
         if not _team_paths(known, work, teams[r], covered[r]):
             return False
         for tile in range(facts.shape[1]):
             for s in range(SLOTS):
-                site, last = facts[0, tile, s], paths.ways[1, tile, s]
+                site, last = facts[0, tile, s], work.ways[1, tile, s]
                 if site >= 0:
-                    out[r, site] = paths.distance[tile, s] * unit
-                    ways[r, 0, site], ways[r, 2, site] = paths.ways[0, tile, s], last
-                    ways[r, 1, site] = work.to_corners.ways[last, 1] if last >= 0 else -1
+                    out[r, site] = work.to_sites[tile, s] * unit
+                    ways[r, 0, site], ways[r, 2, site] = work.ways[0, tile, s], last
+                    ways[r, 1, site] = work.corner_ways[last, 1] if last >= 0 else -1
     return True

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from robocov.cost import _lattice_of
+from robocov.cost import CoverageCost, _lattice_of
 from robocov.cost.site_paths import GROUP, TILE
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError
@@ -47,3 +47,9 @@ def test_tiles_are_squares_of_cells(side):
 def test_a_lattice_without_a_free_cell_is_refused():
     with pytest.raises(ParameterError, match="none of its sites is free"):
         lattice(1, CircleObstacle((4.0, 3.0), 0.5))
+
+
+def test_a_picture_of_the_whole_lattice():
+    cost = CoverageCost(lattice(4, CircleObstacle((4.5, 1.5), 0.4))[0], 4)
+    picture = cost.grid(cost([[2.5, 1.5]]).owner)
+    assert picture.tolist() == [[0, 0, -1, 0], [0] * 4, [0] * 4, [-1] * 4]
