@@ -49,9 +49,7 @@ class Drawable:
             None makes the page, which is the ``figure`` of the axes that are returned.
         backend : str or None
             See `robocov.drawing`; matplotlib by default, with these options:
-        theme : {"light", "dark"}
-        size : (width, height), px
-            Of the page.
+        theme, size : {"light", "dark"}, (width, height) of the page, px
         colours : {"paper", "robots"}
             Of a record: green starts, red trajectories, blue final positions, or a hue for each robot.
         mean_distance, mean_time : float, m, s

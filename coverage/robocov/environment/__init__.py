@@ -306,8 +306,8 @@ class Start:
 
         Where positions are given, the seed is not used. Raises StartError when the robots do not fit.
         """
-        for name, value in (("robots", n), ("seed", seed)):
-            if not is_number(value, Integral) or value < (name == "robots"):
+        for name, value, least in (("robots", n, 1), ("seed", seed, 0)):
+            if not is_number(value, Integral) or value < least:
                 raise self._error(f"{name}: {value!r}, but a whole number was wanted")
         if not 0.0 < radius < math.inf:
             raise self._error(f"radius: {radius!r} m, but a number above 0 was wanted")

@@ -92,8 +92,7 @@ class ArrayCache:
     """
 
     def __init__(self, folder: Path, limit: int = 1 << 30) -> None:
-        self.folder = folder
-        self.limit = limit
+        self.folder, self.limit = folder, limit
 
     @classmethod
     def of_user(cls) -> ArrayCache | None:

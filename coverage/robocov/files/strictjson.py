@@ -265,13 +265,8 @@ class Document(BaseModel):
 
 
 Kind = TypeVar("Kind", bound=Document)
-_WORDS = {
-    "string_type": "a text",
-    "bool_type": "true or false",
-    "list_type": "a list",
-    "dict_type": "an object",
-    "model_type": "an object",
-}
+_WORDS = {"string_type": "a text", "bool_type": "true or false", "list_type": "a list"}
+_WORDS |= dict.fromkeys(("dict_type", "model_type"), "an object")
 """Words for what was wanted, by the type of pydantic's error."""
 
 

@@ -237,17 +237,14 @@ def _content(name: str, folder: Path | None) -> bytes:
     """Return the content of a file of that name in a folder or below it."""
     if folder is None:
         raise InputError("a map that is no file has no folder, but rows of numbers were wanted")
-    outside = InputError("leaves the folder of the map, but a file in it was wanted")
     # a drive, a root or a backslash means something on some system
-    if "\0" in name or "\\" in name or PureWindowsPath(name).anchor:
-        raise outside
+    strange = "\0" in name or "\\" in name or PureWindowsPath(name).anchor
     try:
-        path = (folder / name).resolve()
-        inside = path.is_relative_to(folder.resolve())
+        path = None if strange else (folder / name).resolve()
     except (OSError, RuntimeError):  # as of links in a circle
-        inside = False
-    if not inside:
-        raise outside
+        path = None
+    if path is None or not path.is_relative_to(folder.resolve()):
+        raise InputError("leaves the folder of the map, but a file in it was wanted")
     try:
         if not path.is_file():
             raise InputError("no such file")

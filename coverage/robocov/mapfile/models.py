@@ -79,8 +79,7 @@ class Model(BaseModel):
 
     model_config = ConfigDict(extra="forbid", populate_by_name=False)
 
-    stands_for: ClassVar[Any] = None
-    """The class of what it describes; fields of the same name hold the same."""
+    stands_for: ClassVar[Any] = None  # the class of what it describes, with fields of the same names
 
     def built(self) -> Any:
         """Return what it describes."""

@@ -139,8 +139,6 @@ class Record(Drawable):
         nan where none; the nearest obstacle point that each robot sensed.
     session : dict
         Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`.
-    conditions : Conditions or None
-        None: ideal ones.
     """
 
     _drawn_as = "record"
@@ -160,7 +158,7 @@ class Record(Drawable):
     goals: Array
     obstacle_points: Array
     session: Mapping[str, Any] = field(default_factory=dict)
-    conditions: Conditions | None = None
+    conditions: Conditions | None = None  # ideal ones
 
     @cached_property
     def working(self) -> BoolArray:

@@ -221,9 +221,8 @@ def _group(group: object, path: tuple[str | int, ...], values: dict[str, float |
             raise InputError(f"{place(path)}: {unknown_name('key', str(key), ['count', *LIMITS])}")
     count = group.get("count")
     if not is_number(count, int) or not 1 <= count <= MOST_ROBOTS:
-        found = "missing" if count is None else shown(count)
-        wanted = f"a whole number from 1 to {MOST_ROBOTS}"
-        raise InputError(f"{place((*path, 'count'))}: {found}, but {wanted} was wanted")
+        found = f"{place((*path, 'count'))}: {'missing' if count is None else shown(count)}"
+        raise InputError(f"{found}, but a whole number from 1 to {MOST_ROBOTS} was wanted")
     values |= {key: _value(key, group[key], place((*path, key))) for key in LIMITS if key in group}
     known = {name: np.inf if value is None else value for name, value in values.items()}
     return Team.homogeneous(count, **known)
