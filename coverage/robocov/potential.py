@@ -55,7 +55,7 @@ def potential_forces(
     ----------
     positions, obstacle_points, goals : (n, 2) m
     reported : (m, 2) m, indptr : (n + 1,), indices : (m,), team : int
-        Who hears whom, and where; as `robocov.voronoi.clipping.cells_of` takes them.
+        Who hears whom, and where; as `robocov.voronoi.cells_of` takes them.
     k_rep, rho_0, k_att, limit : float
         N m³, m, N/m³ and N; `limit` may be infinite.
     """

@@ -1,4 +1,10 @@
-"""The bounded Voronoi partition of all robots at once: equation (1) and what equation (2) needs of it."""
+"""The bounded Voronoi partition of all robots at once: equation (1) and what equation (2) needs of it.
+
+A cell is the region, clipped by the bisectors to those who may bound it: whom the robot hears, or, where
+everybody hears everybody, its neighbours in a Delaunay triangulation. A cell clipped by too few robots is too
+large: when all masses add up to the region's area, no robot is missing. Where they do not, as when robots
+coincide, each is clipped by all others.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +16,24 @@ from typing import TypeVar
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.density.base import CellEdges, Density
+from robocov.compiled import inner_kernel, kernel
+from robocov.density.base import REGION, CellEdges, Density
 from robocov.errors import InputError, shown
 from robocov.observation import Cells
 from robocov.observation.neighbours import NOBODY, Neighbours
 from robocov.observation.region import Region
-from robocov.voronoi.clipping import cells_of
-from robocov.voronoi.delaunay import Mesh
+from robocov.voronoi.delaunay import Mesh, before, following, triangulated
 
 __all__ = ["VoronoiPartition", "partition"]
 
 _TRIANGULATE_FROM = 16
 """Size of team from which a triangulation is quicker than clipping by everybody."""
+
+_NEAREST = 6
+"""Robots by which a cell is cut in order of their distance; then it is so small that few others count."""
+
+_TOLERANCE = 1e-12
+"""Tolerance of the sum of masses, relative to the region's area."""
 
 _NOT_HEARD = np.empty((0, 2))
 _NO_MESH = np.empty((2, 0), dtype=np.int32)
@@ -147,3 +159,257 @@ def weighted(cells: _AnyCells, density: Density | None) -> _AnyCells:
     for values in (cells.generators, cells.mass, cells.centroid):
         values.setflags(write=False)
     return cells
+
+
+@kernel
+def cells_of(
+    points: Array, region: Array, heard: Array, indptr: IntArray, indices: IntArray, team: int, mesh: Mesh,
+    mass: Array, centroid: Array, edges: Array,
+) -> int:  # fmt: skip
+    """Compute mass and centroid of all cells; return how many edges they have, or -1 - i for a bad point i.
+
+    Parameters
+    ----------
+    points : (n, 2) m
+    region : (k, 5)
+        As `Region.sides`.
+    heard : (m, 2) m
+        Where robots know those they hear to be; of no length: where they are.
+    indptr : (n + 1,), indices : (m,)
+        Who hears whom; of no length: everybody hears everybody of the same team.
+    team : int
+        Every so many rows make a team.
+    mesh : (2, 8 n + 4), changed
+        As `triangulated` takes it; of no length: without a triangulation.
+    mass : (n,) m², centroid : (n, 2) m, written
+    edges : (e, 6), written
+        x, y, u, v of the ends relative to the generator (m), whose it is, and what is beyond; nothing is
+        written beyond its end.
+    """
+    n = len(points)
+    for i in range(n):
+        if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):
+            return -1 - i
+    ring = np.empty((2, len(region) + max(team, n) + 2, 4))
+    near = np.empty((max(team, n), 4))
+    total = 0
+    if mesh.shape[1]:
+        places, cotangent = np.empty((n + 3, 2)), np.empty(mesh.shape[1])
+        begins, left = np.empty(mesh.shape[1], np.intp), 0.0
+        area = _triangulated_within(points, region, mesh, places, cotangent, begins)
+        for i in range(n if area > 0.0 else 0):
+            count, side, start = _enclosed(ring, near, points, region, mesh, cotangent, begins[i], i)
+            total = _finished(ring, side, count, start, points, i, mass, centroid, edges, total)
+            left += mass[i]
+        if area > 0.0 and abs(left - area) <= _TOLERANCE * area:
+            return total
+        mesh[0, 0], total = -1, 0
+    for i in range(n):
+        found, first = 0, i - i % team
+        for k in range(indptr[i] if len(indptr) else first, indptr[i + 1] if len(indptr) else first + team):
+            j = indices[k] if len(indptr) else k
+            if len(heard):
+                found = _noted(near, found, heard[k, 0] - points[i, 0], heard[k, 1] - points[i, 1], j)
+            else:
+                found = _noted(near, found, points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], j)
+        count, side = _clipped(ring, near, found, points, region, i)
+        total = _finished(ring, side, count, 0, points, i, mass, centroid, edges, total)
+    return total
+
+
+@inner_kernel
+def _noted(near: Array, found: int, dx: float, dy: float, j: int) -> int:
+    """Note a robot by which a cell may be cut; those at the very same place do not cut each other."""
+    near[found, 0], near[found, 1], near[found, 2], near[found, 3] = dx, dy, dx * dx + dy * dy, j
+    return found + 1 if near[found, 2] > 0.0 else found
+
+
+@inner_kernel
+def _triangulated_within(
+    points: Array, region: Array, mesh: Mesh, places: Array, cotangent: Array, begins: IntArray
+) -> float:
+    """Triangulate, write a half-edge that begins at each point, return the region's area, -1 on failure."""
+    n, sides = len(points), len(region)
+    left = right = region[0, 0]
+    low = high = region[0, 1]
+    for k in range(1, sides):
+        left, right = min(left, region[k, 0]), max(right, region[k, 0])
+        low, high = min(low, region[k, 1]), max(high, region[k, 1])
+    x, y, size = 0.5 * (left + right), 0.5 * (low + high), right - left + high - low
+    for i in range(n):
+        places[i, 0], places[i, 1] = points[i, 0], points[i, 1]
+        # no sentinel then cuts a cell within the region, and all robots lie within their triangle
+        if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
+            return -1.0
+    places[n, 0], places[n, 1] = x - 8.0 * size, y - 5.0 * size
+    places[n + 1, 0], places[n + 1, 1] = x + 8.0 * size, y - 5.0 * size
+    places[n + 2, 0], places[n + 2, 1] = x, y + 9.0 * size
+    if not triangulated(mesh, places, cotangent, begins):
+        return -1.0
+    for h in range(mesh.shape[1]):
+        if h & 3 < 3:
+            begins[mesh[0, h]] = h
+    area = 0.0
+    for k in range(sides):
+        after = k + 1 if k + 1 < sides else 0
+        area += 0.5 * (
+            (region[k, 0] - x) * (region[after, 1] - y) - (region[after, 0] - x) * (region[k, 1] - y)
+        )
+    return area
+
+
+@inner_kernel
+def _enclosed(
+    ring: Array, near: Array, points: Array, region: Array, mesh: Mesh, cotangent: Array, begin: int, i: int
+) -> tuple[int, int, int]:
+    """Return number of vertices, side of `ring`, and the first vertex of the cell by the triangles around it.
+
+    These are asked for the Voronoi vertices where they all lie within the region, and for neighbours else.
+    """
+    px, py = points[i, 0], points[i, 1]
+    found, first, start, far = _around(ring, near, points, mesh, cotangent, begin, i)
+    room = np.inf
+    for k in range(len(region)):
+        room = min(room, region[k, 4] - (region[k, 2] * px + region[k, 3] * py))
+    if room > 0.0 and far < room * room:
+        return found, 0, start
+    found, _, _, _ = _around(ring, near, points, mesh, cotangent, first, i)
+    count, side = _clipped(ring, near, found, points, region, i)
+    return count, side, 0
+
+
+@inner_kernel
+def _around(
+    ring: Array, near: Array, points: Array, mesh: Mesh, cotangent: Array, begin: int, i: int
+) -> tuple[int, int, int, float]:
+    """Find neighbours and Voronoi vertices of a robot, counter-clockwise.
+
+    Returns how many; the half-edge to the neighbour with the lowest number, from which on what is computed
+    does not depend on the order of the triangles; its place among them; and the farthest vertex's squared
+    distance.
+    """
+    n, px, py = len(points), points[i, 0], points[i, 1]
+    h, found, far, lowest, first, start = begin, 0, 0.0, n, begin, 0
+    while True:
+        back = before(h)
+        j = mesh[0, following(h)]
+        if j < n:
+            if j < lowest:
+                lowest, first, start = j, h, found
+            dx, dy = points[j, 0] - px, points[j, 1] - py
+            # on the bisector, half the distance times the cotangent to the left
+            x, y = 0.5 * (dx - cotangent[h] * dy), 0.5 * (dy + cotangent[h] * dx)
+            far = max(far, x * x + y * y)
+            near[found, 0], near[found, 1], near[found, 2], near[found, 3] = dx, dy, dx * dx + dy * dy, j
+            ring[0, found, 0], ring[0, found, 1], ring[0, found, 2] = x, y, mesh[0, back]
+            found += 1
+        else:
+            far = np.inf
+        h = mesh[1, back]
+        if h == begin:
+            return found, first, start, far
+
+
+@inner_kernel
+def _clipped(ring: Array, near: Array, found: int, points: Array, region: Array, i: int) -> tuple[int, int]:
+    """Return number of vertices, and side of `ring`, of the region cut by the bisectors to `near`."""
+    count, side, security = len(region), 0, 0.0
+    for k in range(count):
+        x, y = region[k, 0] - points[i, 0], region[k, 1] - points[i, 1]
+        ring[0, k, 0], ring[0, k, 1], ring[0, k, 2] = x, y, REGION
+        security = max(security, 4.0 * (x * x + y * y))
+    for turn in range(found):
+        if turn < _NEAREST:
+            best = turn
+            for k in range(turn + 1, found):
+                if near[k, 2] < near[best, 2]:
+                    best = k
+            for k in range(4):
+                near[turn, k], near[best, k] = near[best, k], near[turn, k]
+        # a bisector lies half way to the other generator
+        if near[turn, 2] <= security:
+            size = _cut(ring, side, count, near[turn, 0], near[turn, 1], 0.5 * near[turn, 2], near[turn, 3])
+            if size >= 0:
+                count, side, security = size, 1 - side, 0.0
+                for k in range(count):
+                    security = max(security, 4.0 * (ring[side, k, 0] ** 2 + ring[side, k, 1] ** 2))
+        elif turn < _NEAREST:
+            break
+    return count, side
+
+
+@inner_kernel
+def _cut(ring: Array, old: int, count: int, dx: float, dy: float, level: float, other: float) -> int:
+    """Put what has x dx + y dy <= level of ring[old] into ring[1 - old]; return its size, -1 for all of it.
+
+    A vertex is x and y relative to the generator, what is beyond the edge that begins there, and how far it
+    is beyond the line.
+    """
+    new, worst, excess = 1 - old, -1, 0.0
+    for k in range(count):
+        beyond = ring[old, k, 0] * dx + ring[old, k, 1] * dy - level
+        ring[old, k, 3] = beyond
+        if beyond > excess:
+            worst, excess = k, beyond
+    if worst < 0:
+        return -1
+    # the vertices beyond the line follow each other but for rounding; the polygon is convex
+    first = last = worst
+    for _ in range(count):
+        after = last + 1 if last + 1 < count else 0
+        if ring[old, after, 3] <= 0.0:
+            break
+        last = after
+    else:
+        return 0
+    while ring[old, first - 1 if first else count - 1, 3] > 0.0:
+        first = first - 1 if first else count - 1
+    k, kept, size = after, after, 0
+    while k != first:
+        for c in range(3):
+            ring[new, size, c] = ring[old, k, c]
+        kept, size = k, size + 1
+        k = k + 1 if k + 1 < count else 0
+    if ring[old, kept, 3] == 0.0:
+        ring[new, size - 1, 2] = other
+    else:
+        _meet(ring, new, size, old, kept, k, other)
+        size += 1
+    if ring[old, after, 3] < 0.0:
+        _meet(ring, new, size, old, after, last, ring[old, last, 2])
+        size += 1
+    return size
+
+
+@inner_kernel
+def _meet(ring: Array, new: int, size: int, old: int, inner: int, outer: int, beyond: float) -> None:
+    """Put the place where an edge meets the line into ring[new, size]."""
+    part = ring[old, inner, 3] / (ring[old, inner, 3] - ring[old, outer, 3])
+    for c in range(2):
+        ring[new, size, c] = ring[old, inner, c] + part * (ring[old, outer, c] - ring[old, inner, c])
+    ring[new, size, 2] = beyond
+
+
+@inner_kernel
+def _finished(
+    ring: Array, side: int, count: int, start: int, points: Array, i: int, mass: Array, centroid: Array,
+    edges: Array, total: int,
+) -> int:  # fmt: skip
+    """Write what is known of one cell; return how many edges there are with its own."""
+    area = first_x = first_y = 0.0
+    k = start
+    for edge in range(total, total + count):
+        after = k + 1 if k + 1 < count else 0
+        x, y, u, v = ring[side, k, 0], ring[side, k, 1], ring[side, after, 0], ring[side, after, 1]
+        cross = x * v - u * y
+        area += cross
+        first_x += cross * (x + u)
+        first_y += cross * (y + v)
+        if edge < len(edges):
+            edges[edge, 0], edges[edge, 1], edges[edge, 2], edges[edge, 3] = x, y, u, v
+            edges[edge, 4], edges[edge, 5] = i, ring[side, k, 2]
+        k = after
+    over = 1.0 / (3.0 * area) if area > 0.0 else 0.0
+    mass[i] = max(0.5 * area, 0.0)
+    centroid[i, 0], centroid[i, 1] = points[i, 0] + first_x * over, points[i, 1] + first_y * over
+    return total + count
