@@ -33,7 +33,9 @@ from robocov.errors import ParameterError, StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
 from robocov.world.engine import (
+    Buffers,
     Engine,
+    State,
     addresses_of,
     enter,
     leave,
@@ -199,8 +201,7 @@ class World:
             limit = np.maximum(limit, self._speeds() + push * dt)
         engine.robots[:] = forces.reshape(self._runs, -1, 2)
         engine.forget_contacts()
-        buffers = engine.addresses, engine.filled, engine.forces, engine.states
-        state = _free_substep(*buffers, answer, external, dt)
+        state = _free_substep(engine.buffers, answer, external, dt)
         touching: dict[int, list[int]] = {}
         for row in self._touching():
             touching.setdefault(row // self._each, []).append(row)
@@ -349,26 +350,22 @@ class ContactSolver:
         self._robots = list(map(robot_body, team.mass.tolist(), team.radius.tolist()))
         self._members = np.array([addresses_of(body._body, disc._shape) for body, disc in self._robots])
 
-    def move(
-        self, rows: IntArray, now: tuple[Array, Array, Array, Array], dt: float, limit: Array, moved: Array
-    ) -> None:
+    def move(self, rows: IntArray, now: State, dt: float, limit: Array, moved: Array) -> None:
         """Move robots of ascending rows on by `dt` seconds, no faster in the end than (n,) m/s.
 
-        `now` are the positions, the velocities, the net forces of a run, (n, 2) each, and the motion of the
-        obstacles that move, (m, 4); into `moved`, (2, n, 2), go positions and velocities.
+        Into `moved`, (2, n, 2), go positions and velocities.
         """
-        engine, members = self._engine, self._members
-        space = engine.addresses, engine.filled, engine.states[0], engine.forces[0]
-        speed = enter(*space, members, rows, *now, self._team.mass, dt) + self._mover_speed
+        buffers, members = self._engine.buffers, self._members
+        speed = enter(buffers, members, rows, now, self._team.mass, dt) + self._mover_speed
         parts = min(_MOST_SUBSTEPS, max(1, math.ceil(speed * dt / self._travel)))
         # what moves may push robots into walls
         pushed = [self._robots[row] for row in rows.tolist()] if self._movers else []
         for _ in range(parts if pushed else 1):
             before = [body.position for body, _ in pushed]
-            substeps(engine.addresses, engine.filled, 0, 1 if pushed else parts, dt / parts)
+            substeps(buffers, 0, 1 if pushed else parts, dt / parts)
             self._keep_before_walls(pushed, before)
         before = [body.position for body, _ in pushed]
-        leave(*space, members, rows, limit, moved, dt / parts)
+        leave(buffers, members, rows, limit, moved, dt / parts)
         if pushed:
             self._keep_before_walls(pushed, before)
             moved[0, rows] = [body.position for body, _ in pushed]
@@ -434,22 +431,15 @@ def response(team: Team, dt: float) -> Array:
 
 
 @kernel
-def _free_substep(
-    addresses: IntArray,
-    filled: IntArray,
-    forces: Array,
-    states: Array,
-    answer: Array,
-    external: Array,
-    dt: float,
-) -> Array:
+def _free_substep(buffers: Buffers, answer: Array, external: Array, dt: float) -> Array:
     """Return the state after a substep as if nothing touched; make net forces of the controllers'.
 
     The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
     dt; then acceleration and speed are limited, in this order: projecting onto the disc of speeds brings a
     velocity no farther from the old one, which is in it.
     """
-    each = len(answer) // len(addresses)
+    _, _, forces, states = buffers
+    each = len(answer) // len(states)
     begin = states.shape[1] - 1 - each
     for i in range(len(answer)):
         run, row = i // each, begin + i % each
@@ -464,8 +454,8 @@ def _free_substep(
         if len(external):
             forces[run, row, 0] += external[i, 0]
             forces[run, row, 1] += external[i, 1]
-    for run in range(len(addresses)):
-        observed_step(addresses, filled, run, dt)
+    for run in range(len(states)):
+        observed_step(buffers, run, dt)
     moved = np.empty((2, len(answer), 2))
     for i in range(len(answer)):
         for k in range(2):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pymunk
@@ -15,7 +15,7 @@ from robocov.compiled import call_c, inner_kernel, kernel
 
 SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER = range(7)
 ADD_BODY, ADD_SHAPE, REMOVE_BODY, REMOVE_SHAPE, FORCES, STATES, CONTACTS = range(7, 14)
-"""Columns of `Engine.addresses`."""
+"""Columns of the addresses."""
 _FUNCTIONS = (
     *("cpSpaceStep", "cpSpaceEachBody"),
     *("pmSpaceBodySetIteratorFuncBatched", "pmSpaceBodyGetIteratorFuncBatched"),
@@ -31,40 +31,44 @@ if [(name, member.offset) for name, member in ffi.typeof("pmFloatArray").fields]
 _STATE = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 
+Buffers: TypeAlias = tuple[IntArray, IntArray, Array, Array]
+"""Addresses, (spaces, 14), of C functions and of what they are called with; how far forces, first, and
+states, fifth, have been gone through, (spaces, 8); the forces and states of an `Engine`."""
+State: TypeAlias = tuple[Array, Array, Array, Array]
+"""Positions and velocities of all robots, net forces on those of a run, motion of the obstacles, (m, 4)."""
+
 
 class Engine:
     """The bodies of spaces: obstacles that move, robots as they were added, and the static body.
 
-    `forces`, (spaces, bodies, 2) N, among them those of the `robots`, are forgotten by pymunk after a step;
-    `states`, (spaces, bodies, 4) m and m/s, are positions and velocities, written or read. `addresses` are of
-    C functions and of what they are called with; `filled`, (spaces, 8), says how far forces, first, and
-    states, fifth, have been gone through.
+    Forces, (spaces, bodies, 2) N, among them those of the `robots`, are forgotten by pymunk after a step;
+    `states`, (spaces, bodies, 4) m and m/s, are positions and velocities, written or read.
     """
 
     def __init__(self, spaces: list[pymunk.Space], movers: int, robots: int) -> None:
         count, bodies = len(spaces), movers + robots + 1
-        self.forces, self.states = np.zeros((count, bodies, 2)), np.zeros((count, bodies, 4))
-        self.robots = self.forces[:, movers:-1]
+        forces, self.states = np.zeros((count, bodies, 2)), np.zeros((count, bodies, 4))
+        self.robots = forces[:, movers:-1]
         floats, batches = ffi.new("pmFloatArray[]", 2 * count), ffi.new("pmBatchedData[]", 3 * count)
         self._touching = ffi.gc(lib.pmIntArrayNew(0), lib.pmIntArrayFree)
-        self.filled: Any = np.frombuffer(ffi.buffer(floats), dtype=np.intc).reshape(count, 8)
+        filled: Any = np.frombuffer(ffi.buffer(floats), dtype=np.intc).reshape(count, 8)
         addresses = []
         for k, space in enumerate(spaces):
             first, each = floats + 2 * k, batches + 3 * k
-            for j, values in enumerate((self.forces[k], self.states[k])):
+            for j, values in enumerate((forces[k], self.states[k])):
                 # C must not make the array of numpy's longer, which it does as soon as it is full
                 first[j].arr, first[j].max = ffi.from_buffer("double[]", values), 2**30
             for j, fields in enumerate((batch.BodyFields.FORCE, _STATE, _BODIES)):
                 each[j].fields = fields.value
                 each[j].floatArray, each[j].intArray = first + j % 2, self._touching
             addresses.append(addresses_of(space._space, *_FUNCTIONS, each, each + 1, each + 2))
-        self.addresses = np.array(addresses)
+        self.buffers: Buffers = np.array(addresses), filled, forces, self.states
         # what is only pointed to
         self._spaces, self._floats, self._batches = spaces, floats, batches
 
     def write(self, k: int = 0) -> None:
         """Set `states` of space k."""
-        transfer(self.addresses, self.filled, k, SET_BODY, STATES)
+        transfer(self.buffers, k, SET_BODY, STATES)
 
     def forget_contacts(self) -> None:
         """Begin anew with what `touching` returns."""
@@ -82,25 +86,28 @@ def addresses_of(*pointers: Any) -> IntArray:
 
 
 @kernel
-def transfer(addresses: IntArray, filled: IntArray, k: int, direction: int, values: int) -> None:
+def transfer(buffers: Buffers, k: int, direction: int, values: int) -> None:
     """Set or get the forces or states of all bodies of space k."""
+    addresses, filled, _, _ = buffers
     filled[k, 0] = filled[k, 4] = 0
     call_c(addresses[k, EACH_BODY], (addresses[k, SPACE], addresses[k, direction], addresses[k, values]))
 
 
 @kernel
-def substeps(addresses: IntArray, filled: IntArray, k: int, count: int, dt: float) -> None:
+def substeps(buffers: Buffers, k: int, count: int, dt: float) -> None:
     """Make substeps of space k under the same forces."""
+    addresses = buffers[0]
     for _ in range(count):
-        transfer(addresses, filled, k, SET_BODY, FORCES)
+        transfer(buffers, k, SET_BODY, FORCES)
         call_c(addresses[k, STEP], (addresses[k, SPACE], dt))
 
 
 @kernel
-def observed_step(addresses: IntArray, filled: IntArray, k: int, dt: float) -> None:
-    """Make a step of space k under `Engine.forces`, read its states, and note who touched."""
-    substeps(addresses, filled, k, 1, dt)
-    transfer(addresses, filled, k, GET_BODY, STATES)
+def observed_step(buffers: Buffers, k: int, dt: float) -> None:
+    """Make a step of space k under the forces, read its states, and note who touched."""
+    addresses = buffers[0]
+    substeps(buffers, k, 1, dt)
+    transfer(buffers, k, GET_BODY, STATES)
     noting = (addresses[k, SPACE], addresses[k, GET_ARBITER], addresses[k, CONTACTS])
     call_c(addresses[k, EACH_ARBITER], noting)
 
@@ -113,21 +120,10 @@ def shortening(x: float, y: float, limit: float) -> float:
 
 
 @kernel
-def enter(
-    addresses: IntArray,
-    filled: IntArray,
-    states: Array,
-    forces: Array,
-    members: IntArray,
-    rows: IntArray,
-    positions: Array,
-    velocities: Array,
-    net: Array,
-    motion: Array,
-    mass: Array,
-    dt: float,
-) -> float:
+def enter(buffers: Buffers, members: IntArray, rows: IntArray, now: State, mass: Array, dt: float) -> float:
     """Add robots to the space of contacts; return the largest speed, in m/s, now or under the net forces."""
+    addresses, forces, states = buffers[0], buffers[2][0], buffers[3][0]
+    positions, velocities, net, motion = now
     square, space, last = 0.0, addresses[0, SPACE], len(motion) + len(rows)
     begin = rows[0] // len(net) * len(net)
     states[: len(motion)] = motion
@@ -141,29 +137,20 @@ def enter(
             reached = speed + force * (dt / mass[row])
             before, after = before + speed * speed, after + reached * reached
         square = max(square, before, after)
-    transfer(addresses, filled, 0, SET_BODY, STATES)
+    transfer(buffers, 0, SET_BODY, STATES)
     for row in rows:
         call_c(addresses[0, ADD_SHAPE], (space, members[row, 1]))
     return math.sqrt(square)
 
 
 @kernel
-def leave(
-    addresses: IntArray,
-    filled: IntArray,
-    states: Array,
-    forces: Array,
-    members: IntArray,
-    rows: IntArray,
-    limit: Array,
-    moved: Array,
-    dt: float,
-) -> None:
+def leave(buffers: Buffers, members: IntArray, rows: IntArray, limit: Array, moved: Array, dt: float) -> None:
     """Read where robots are after contacts, and how fast, and remove them from the space of contacts."""
+    addresses, forces, states = buffers[0], buffers[2][0], buffers[3][0]
     space, first = addresses[0, SPACE], len(states) - 1 - len(members)
     for row in rows:
         call_c(addresses[0, REMOVE_SHAPE], (space, members[row, 1]))
-    transfer(addresses, filled, 0, GET_BODY, STATES)
+    transfer(buffers, 0, GET_BODY, STATES)
     for k in range(len(rows)):
         # impulses of a contact may exceed what a robot can do by itself
         scale = shortening(states[first + k, 2], states[first + k, 3], limit[rows[k]])
@@ -172,9 +159,9 @@ def leave(
             forces[first + k, axis] = 0.0
     # what is left is the push out of an overlap that pymunk has decided but not yet applied
     states[: first + len(rows), 2:] = 0.0
-    transfer(addresses, filled, 0, SET_BODY, STATES)
-    substeps(addresses, filled, 0, 1, dt)
-    transfer(addresses, filled, 0, GET_BODY, STATES)
+    transfer(buffers, 0, SET_BODY, STATES)
+    substeps(buffers, 0, 1, dt)
+    transfer(buffers, 0, GET_BODY, STATES)
     for k in range(len(rows)):
         for axis in range(2):
             moved[0, rows[k], axis] = states[first + k, axis]
