@@ -22,13 +22,7 @@ FOLLOWING = 0.1
 
 
 def checked_action(action: str) -> Action:
-    """Return the kind of action that is meant.
-
-    Raises
-    ------
-    ParameterError
-        When there is none of that name.
-    """
+    """Return the kind of action that is meant; raises ParameterError when there is none of that name."""
     for known in ACTIONS:
         if action == known:
             return known
@@ -54,15 +48,8 @@ def action_limit(action: Action, team: Team) -> Array:
 def driving_forces(action: Action, values: Array, velocities: Array, team: Team) -> Array:
     """Return the forces of actions, (n, 2) N.
 
-    A velocity u asks for ``F = nu u + m (u - q') / FOLLOWING``: against the viscosity of (28), and towards u.
-
-    Parameters
-    ----------
-    action : {"force", "velocity"}
-    values : (n, 2) N or m/s
-    velocities : (n, 2) m/s
-        Of the robots now.
-    team : Team
+    A velocity u of `values`, (n, 2), asks for ``F = nu u + m (u - q') / FOLLOWING``, where q' are the
+    `velocities` now, (n, 2) m/s: against the viscosity of (28), and towards u.
     """
     if action == "force":
         return values

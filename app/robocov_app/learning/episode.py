@@ -63,17 +63,12 @@ class Learner:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of one action of the team.
-
-    Attributes
-    ----------
-    rewards : (n,)
-    contact : (n,) s
-        How long each robot touched a wall or another robot.
-    """
+    """What came of one action of the team."""
 
     rewards: Array
+    """(n,)"""
     contact: Array
+    """(n,) s, how long each robot touched a wall or another robot."""
 
 
 def drawn_episode(
@@ -85,23 +80,12 @@ def drawn_episode(
 ) -> Episode:
     """Return a new episode, by chance where the options leave it to chance.
 
-    Parameters
-    ----------
-    task : CoverageTask
-    scenarios : Scenarios
-        Of the task's maps.
-    rng : numpy Generator
-    options : dict or None
-        ``map``: a map, its name or path. ``start``: the name of one of its starts. ``start_seed``: the
-        seed of the positions, as that of `robocov run`. ``positions``: the positions themselves, (n, 2) m.
-        ``conditions_seed``: the seed of the task's conditions. Other keys mean nothing here.
-    place : Place or None
-        Beside the episodes of others, where these are on the same map.
+    The options: ``map``: a map, its name or path. ``start``: the name of one of its starts. ``start_seed``:
+    the seed of the positions, as that of `robocov run`. ``positions``: the positions themselves, (n, 2) m.
+    ``conditions_seed``: the seed of the task's conditions. Other keys mean nothing here. `place`: beside the
+    episodes of others, where these are on the same map.
 
-    Raises
-    ------
-    InputError
-        When a map cannot be read or a team has no room at its start.
+    Raises InputError when a map cannot be read or a team has no room at its start.
     """
     options = options or {}
     environment = scenarios.draw(rng)
@@ -129,16 +113,9 @@ def drawn_episode(
 
 
 class SharedSimulation:
-    """One simulation for the episodes of several learning environments on one map, moved on together.
+    """One simulation for `count` episodes of learning environments on one map, moved on together.
 
-    Parameters
-    ----------
-    task : CoverageTask
-        Without conditions, and not recording.
-    environment : Environment
-        In which nothing moves.
-    count : int
-        Of episodes.
+    The task is without conditions, and not recording; in the map nothing moves.
     """
 
     def __init__(self, task: CoverageTask, environment: Environment, count: int) -> None:
@@ -186,45 +163,27 @@ Place: TypeAlias = "tuple[SharedSimulation, int]"
 
 
 class Episode:
-    """A team in one map from one start.
+    """A team in one map, of which `cost` is the coverage cost, from one start.
 
-    Parameters
-    ----------
-    task : CoverageTask
-    environment : Environment
-    cost : CoverageCost
-        Of the environment.
-    positions : (n, 2) m
-    conditions : Conditions or None
-    start : str, seed : int
-        Where the positions came from, for the record.
-    place : Place or None
-        Where the team is moved together with others.
+    `start` and `seed` say where the positions, (n, 2) m, came from, for the record; `place` is where the team
+    is moved together with others.
 
     Attributes
     ----------
-    simulation : Simulation
+    simulation, cost, task, team
     working : (n,) bool
         Which robots are there and have not failed.
-    result : CoverageResult
-        The coverage cost when it was last evaluated, of the robots that work.
-    initial : CoverageResult
-        At the beginning.
+    result, initial : CoverageResult
+        The coverage cost of the robots that work, when it was last evaluated and at the beginning.
     reference : float, m
         The unit of rewards.
     trail : list of (n, 2) m
         The positions at each decision so far, from the start on.
-    cost : CoverageCost
-        Of the map as it was given.
     shared : SharedSimulation or None
         In which the team is moved together with others.
 
-    Raises
-    ------
-    StartError
-        When a robot would start in a wall or in another robot.
-    ParameterError
-        When the lattice of the cost is too coarse for the map.
+    Raises StartError when a robot would start in a wall or in another robot; ParameterError when the lattice
+    of the cost is too coarse for the map.
     """
 
     def __init__(
@@ -239,7 +198,7 @@ class Episode:
         seed: int | None = None,
         place: Place | None = None,
     ) -> None:
-        self.task, self.team = task, task.whole_team
+        self.task, self.team, self.environment = task, task.whole_team, environment
         if len(positions) != len(self.team):
             raise StartError(
                 f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
@@ -274,11 +233,6 @@ class Episode:
         self._moments: list[Snapshot] = []
 
     @property
-    def environment(self) -> Environment:
-        """The map."""
-        return self.simulation.environment
-
-    @property
     def positions(self) -> Array:
         """Centres of the robots, (n, 2) m."""
         return self.simulation.positions[self._rows]
@@ -297,11 +251,6 @@ class Episode:
     def cycle(self) -> int:
         """How many actions there were."""
         return len(self.trail) - 1
-
-    @property
-    def normalised_cost(self) -> float:
-        """The mean distance in units of the reference distance."""
-        return self.result.mean_distance / self.reference
 
     def observations(self) -> Rows:
         """Return what each robot is told now, (n, size)."""
@@ -333,10 +282,7 @@ class Episode:
     def advance(self, actions: Array, *, last: bool = False) -> Outcome:
         """Hold actions, (n, 2) N or m/s, for the time of one decision; the last one is rewarded in any case.
 
-        Raises
-        ------
-        ParameterError
-            When they are not finite numbers of that shape; the message names the robot.
+        Raises ParameterError when they are not finite numbers of that shape; the message names the robot.
         """
         keep = self._moments if self.task.recording else None
         contact = held(self.task, self.simulation, checked_actions(actions, len(self.team)), keep)
@@ -389,10 +335,7 @@ class Episode:
     def record(self) -> Record:
         """Return the episode so far as a record, with the forces that the actions gave; none at its end.
 
-        Raises
-        ------
-        ParameterError
-            When the task does not say `recording`.
+        Raises ParameterError when the task does not say `recording`.
         """
         if not self.task.recording:
             raise ParameterError("record: a task with recording=True was wanted")
@@ -440,10 +383,7 @@ def _touching(simulation: Simulation, each: int) -> BoolArray:
 def checked_actions(actions: Any, count: int) -> Array:
     """Return the actions of so many robots, (count, 2).
 
-    Raises
-    ------
-    ParameterError
-        When they are not finite numbers of that shape; the message names the robot.
+    Raises ParameterError when they are not finite numbers of that shape; the message names the robot.
     """
     array = np.asarray(actions, dtype=np.float64)
     if array.shape != (count, 2):

@@ -52,11 +52,8 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Parameters
     ----------
     task : CoverageTask or None
-    render_mode : {"rgb_array", "human"} or None
-        ``human`` opens a window; it needs a display.
-    size : (width, height), px
-        Of pictures.
-    theme : {"light", "dark"}
+    render_mode, size, theme
+        See `robocov_app.learning.pictures.Pictures`.
     scenarios : Scenarios or None
         Of the task, to be shared by several environments.
     **changes
@@ -72,10 +69,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     outcome : Outcome or None
         Of the next action, where it was carried out together with others.
 
-    Raises
-    ------
-    InputError
-        When the task makes no sense or a map cannot be read.
+    Raises InputError when the task makes no sense or a map cannot be read.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -109,15 +103,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Rows, dict[str, Any]]:
-        """Begin an episode.
-
-        Parameters
-        ----------
-        seed : int or None
-            Without one the random numbers go on.
-        options : dict or None
-            See `robocov_app.learning.episode.drawn_episode`.
-        """
+        """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
         super().reset(seed=seed)
         self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
         self._pictures.shown(self.episode)
@@ -127,10 +113,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(self, action: Any) -> tuple[Rows, float, bool, bool, dict[str, Any]]:
         """Let the team act, and return observation, reward, termination, truncation and info.
 
-        Raises
-        ------
-        ParameterError
-            When the action is not finite numbers of shape (n, 2).
+        Raises ParameterError when the action is not finite numbers of shape (n, 2).
         """
         episode = self._present()
         outcome, self.outcome = self.outcome or episode.advance(action), None
@@ -170,20 +153,9 @@ class CoverageVectorEnv(SyncVectorEnv):
 
     Each environment is what it is alone, bit for bit: with ``reset(seed=s)`` that of the seed s + k.
     Those on one map without conditions and moving obstacles are moved on together, others one by one.
+    `autoreset_mode` says when an episode that is over is followed by the next one; `changes` are of the task.
 
-    Parameters
-    ----------
-    num_envs : int
-    task : CoverageTask or None
-    autoreset_mode : gymnasium.vector.AutoresetMode
-        When an episode that is over is followed by the next one.
-    **changes
-        Of the task.
-
-    Raises
-    ------
-    InputError
-        When the task makes no sense or a map cannot be read.
+    Raises InputError when the task makes no sense or a map cannot be read.
     """
 
     def __init__(
@@ -209,10 +181,7 @@ class CoverageVectorEnv(SyncVectorEnv):
     def step(self, actions: Any) -> Any:
         """Let all teams act, and return observations, rewards, terminations, truncations and infos.
 
-        Raises
-        ------
-        ParameterError
-            When the actions are not finite numbers of shape (num_envs, n, 2).
+        Raises ParameterError when the actions are not finite numbers of shape (num_envs, n, 2).
         """
         begun_now = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         values, together = np.zeros((self.num_envs, self.task.robots, 2)), {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robocov.compiled import kernel
 from robocov.controllers.base import cells_seen
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, checked, shown
 from robocov.observation.scans import MOST_RAYS
 
 if TYPE_CHECKING:
@@ -56,10 +56,7 @@ class ObservationLayout:
     centroid : bool
         The one number that a robot has to compute of the others: what Lloyd's algorithm steers to.
 
-    Raises
-    ------
-    ParameterError
-        When a number is out of range.
+    Raises ParameterError when a number is out of range.
 
     Examples
     --------
@@ -74,12 +71,7 @@ class ObservationLayout:
 
     def __post_init__(self) -> None:
         for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
-            value = getattr(self, name)
-            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-            if not whole or not 0 <= value <= most:
-                raise ParameterError(
-                    f"observation.{name}: {shown(value)}, but a whole number from 0 to {most} was wanted"
-                )
+            checked(f"observation.{name}", getattr(self, name), 0, most, whole=True)
         if not isinstance(self.centroid, bool):
             raise ParameterError(
                 f"observation.centroid: {shown(self.centroid)}, but true or false was wanted"
@@ -88,14 +80,8 @@ class ObservationLayout:
     @cached_property
     def blocks(self) -> dict[str, slice]:
         """Where in a row each block is, in their order; only those that it has."""
-        counts = {
-            "position": 2,
-            "velocity": 2,
-            "obstacle": 3,
-            "neighbour": 3 * self.neighbours,
-            "rays": self.rays,
-            "centroid": 2 * self.centroid,
-        }
+        counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
+        counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
         places: dict[str, slice] = {}
         begin = 0
         for name, count in counts.items():
@@ -122,20 +108,9 @@ class ObservationLayout:
         return low, np.ones(self.size, dtype=np.float32)
 
     def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
-        """Return what each robot is told, (n, size).
+        """Return what each robot is told, (n, size), with the latest scans, by default those of `seen`.
 
-        Parameters
-        ----------
-        seen : Observations
-        team : Team
-            For its largest speeds and its sensing ranges.
-        scans : Scans or None
-            The latest; by default those of `seen`.
-
-        Raises
-        ------
-        ParameterError
-            When rays are wanted and there is no scan of so many.
+        Raises ParameterError when rays are wanted and there is no scan of so many.
         """
         n, unit = len(seen.positions), seen.region.diameter
         reach = sensing_unit(team, seen.region)[:, None]

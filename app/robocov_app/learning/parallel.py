@@ -37,11 +37,8 @@ class CoverageParallelEnv(ParallelEnv):
     Parameters
     ----------
     task : CoverageTask or None
-    render_mode : {"rgb_array", "human"} or None
-        ``human`` opens a window; it needs a display.
-    size : (width, height), px
-        Of pictures.
-    theme : {"light", "dark"}
+    render_mode, size, theme
+        See `robocov_app.learning.pictures.Pictures`.
     max_cycles : int or None
         Actions until an episode is truncated, in place of the task's duration.
     **changes
@@ -57,10 +54,7 @@ class CoverageParallelEnv(ParallelEnv):
     state_space : Box
         Of `state`.
 
-    Raises
-    ------
-    InputError
-        When the task makes no sense or a map cannot be read.
+    Raises InputError when the task makes no sense or a map cannot be read.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -111,14 +105,7 @@ class CoverageParallelEnv(ParallelEnv):
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, Rows], dict[str, dict[str, Any]]]:
-        """Begin an episode.
-
-        Parameters
-        ----------
-        seed : int or None
-        options : dict or None
-            See `robocov_app.learning.episode.drawn_episode`.
-        """
+        """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
         self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
@@ -132,18 +119,11 @@ class CoverageParallelEnv(ParallelEnv):
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[
-        dict[str, Rows],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, dict[str, Any]],
+        dict[str, Rows], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
         """Let every robot act, and return observations, rewards, terminations, truncations and infos.
 
-        Raises
-        ------
-        ParameterError
-            When a robot has no action, or one that is not two finite numbers.
+        Raises ParameterError when a robot has no action, or one that is not two finite numbers.
         """
         episode = self._present()
         values = np.zeros((self.task.robots, 2))

@@ -24,16 +24,10 @@ FRAMES_PER_SECOND = 10
 class Pictures:
     """Draws an episode as runs are drawn everywhere.
 
-    Parameters
-    ----------
-    mode : {"rgb_array", "human"} or None
-    size : (width, height), px
-    theme : {"light", "dark"}
+    The mode is ``rgb_array``, ``human``, which opens a window and needs a display, or None; `size` is width
+    and height in pixels, `theme` light or dark.
 
-    Raises
-    ------
-    ParameterError
-        On another mode or theme, or a size that is none.
+    Raises ParameterError on another mode or theme, or a size that is none.
     """
 
     def __init__(self, mode: str | None, size: tuple[int, int], theme: str = "light") -> None:

@@ -31,21 +31,14 @@ _SOON = 5e-7
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What the robots remember of their policy.
-
-    Attributes
-    ----------
-    team : Team
-        Their limits, in which observations are told.
-    actions : (n, 2) N or m/s, or None
-        The last ones; None before the first.
-    due : float, s
-        When the next ones are.
-    """
+    """What the robots remember of their policy."""
 
     team: Team
+    """Their limits, in which observations are told."""
     actions: Array | None = None
+    """The last ones, (n, 2) N or m/s; None before the first."""
     due: float = -np.inf
+    """When the next ones are, s."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +68,8 @@ class PolicyController:
     period : float, s
         For which an action is held, `CoverageTask.period` in training.
 
-    Raises
-    ------
-    ParameterError
-        When an attribute makes no sense, or the policy gives something else than two numbers.
+    Raises ParameterError when an attribute makes no sense, or the policy gives something else than two
+    numbers.
 
     Examples
     --------

@@ -19,13 +19,7 @@ REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
 
 
 def checked_reward(reward: str) -> Reward:
-    """Return the kind of reward that is meant.
-
-    Raises
-    ------
-    ParameterError
-        When there is none of that name.
-    """
+    """Return the kind of reward that is meant; raises ParameterError when there is none of that name."""
     for known in REWARDS:
         if reward == known:
             return known
@@ -48,17 +42,10 @@ def reference_distance(area: float, robots: int) -> float:
 def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: float) -> Array:
     """Return what each robot gets for what became of the mean distance, (n,) m.
 
-    Parameters
-    ----------
-    reward : {"shared", "own", "level"}
-        ``shared``: its decrease, the same for all; summed over a run it is the whole decrease. ``own``: the
-        part of the decrease that the robot's own move made, by the gradients of the cost before and after
-        (the trapezoidal rule); what these leave over is divided equally, so that all parts sum up to the
-        decrease. ``level``: less the mean distance itself, times `part`.
-    before, after : CoverageResult
-        Of all robots.
-    part : float
-        Of the run that has gone by in between.
+    ``shared``: its decrease, the same for all; summed over a run it is the whole decrease. ``own``: the part
+    of the decrease that the robot's own move made, by the gradients of the cost before and after (the
+    trapezoidal rule); what these leave over is divided equally, so that all parts sum up to the decrease.
+    ``level``: less the mean distance itself, times the `part` of the run that has gone by in between.
     """
     n = len(after.positions)
     if reward == "level":

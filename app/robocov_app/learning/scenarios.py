@@ -56,10 +56,7 @@ class GeneratedMaps:
     def __call__(self, seed: int) -> Environment:
         """Return the map of a seed, or where `seeds` are given that of ``seeds[seed % len(seeds)]``.
 
-        Raises
-        ------
-        ParameterError
-            As `robocov.generated_map`.
+        Raises ParameterError as `robocov.generated_map`.
         """
         from robocov.generator import generated_map
 
@@ -68,18 +65,9 @@ class GeneratedMaps:
 
 
 class Scenarios:
-    """Draws maps, and keeps the coverage costs of some, which take time to build.
+    """Draws maps, and keeps the coverage costs of some, on lattices of so many cells a side.
 
-    Parameters
-    ----------
-    maps : MapSource or sequence of them
-    lattice : int
-        Of the coverage cost.
-
-    Raises
-    ------
-    InputError
-        When a map cannot be read, or something is no map at all.
+    Raises InputError when a map cannot be read, or something is no map at all.
     """
 
     def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
@@ -117,10 +105,7 @@ class Scenarios:
 def map_of(given: object, seed: int) -> Environment:
     """Return a map: itself, that of a name or path, or what somebody's function makes of the seed.
 
-    Raises
-    ------
-    InputError
-        When there is none, or a function gives something else.
+    Raises InputError when there is none, or a function gives something else.
     """
     source = _source(given, "map")
     if isinstance(source, Environment):

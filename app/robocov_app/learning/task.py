@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.conditions import Conditions
-from robocov.errors import ParameterError, counted, shown, unknown_name
+from robocov.errors import ParameterError, checked, counted, shown, unknown_name
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.learning.driving import FOLLOWING, Action, checked_action
@@ -60,10 +60,7 @@ class CoverageTask:
     recording : bool
         Keep what `Episode.record` needs: some 2 MB a minute for six robots.
 
-    Raises
-    ------
-    ParameterError
-        When a value is out of range.
+    Raises ParameterError when a value is out of range.
 
     Examples
     --------
@@ -90,9 +87,8 @@ class CoverageTask:
 
     def __post_init__(self) -> None:
         check_dt(self.dt)
-        _check_whole("robots", self.robots, MOST_ROBOTS)
-        _check_whole("repeat", self.repeat, 100_000)
-        _check_whole("reward_every", self.reward_every, 100_000)
+        for name, most in (("robots", MOST_ROBOTS), ("repeat", 100_000), ("reward_every", 100_000)):
+            checked(name, getattr(self, name), 1, most, whole=True)
         if not np.isfinite(self.duration) or self.duration < self.period - 5e-7:
             raise ParameterError(
                 f"duration: {shown(self.duration)} s, but at least the time of one action, "
@@ -146,10 +142,8 @@ class CoverageTask:
 def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> CoverageTask:
     """Return a task with some of its attributes changed; None is the usual one.
 
-    Raises
-    ------
-    ParameterError
-        When there is no attribute of that name, with the nearest one, or a value is out of range.
+    Raises ParameterError when there is no attribute of that name, with the nearest one, or a value is out of
+    range.
     """
     known = [each.name for each in fields(CoverageTask)]
     for name in changes:
@@ -160,9 +154,3 @@ def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Cover
     # the number of robots goes with the team, and would else be that of the old one
     team: dict[str, Any] = {"team": None} if "robots" in changes else {}
     return replace(task, **(team | dict(changes)))
-
-
-def _check_whole(name: str, value: object, most: int) -> None:
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or not 1 <= value <= most:  # type: ignore[operator]
-        raise ParameterError(f"{name}: {shown(value)}, but a whole number from 1 to {most} was wanted")

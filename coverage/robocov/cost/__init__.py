@@ -13,17 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, frozen, weighted_mean
-from robocov.cost.site_paths import (
-    GROUP,
-    SLOTS,
-    TILE,
-    CornerViews,
-    CostMap,
-    Tiles,
-    Work,
-    corner_views,
-    site_paths,
-)
+from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
@@ -400,7 +390,7 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     tile = along_z_curve(cells % side // TILE, cells // side // TILE)
     order = np.argsort(tile, kind="stable")
     begin = beginnings(tile[order])
-    slots = np.arange(SLOTS)
+    slots = np.arange(TILE**2)
     empty = slots >= np.diff(begin, append=len(order))[:, None]
     chosen = order[np.where(empty, 0, slots) + begin[:, None]]
     places = np.ascontiguousarray(np.moveaxis(grid.snap(sites.points[chosen]), -1, 0))
