@@ -493,8 +493,7 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     wide is none, and nor is an acute corner.
     """
     search = _Search(free)
-    low_x, low_y, high_x, high_y = search.free.bounds
-    largest = math.hypot(high_x - low_x, high_y - low_y)
+    largest = math.dist(search.free.bounds[:2], search.free.bounds[2:])
     best: Gap | None = None
     below, reach = _CRACK / 2, largest / 4096
     # most maps have a gap far narrower than the map is wide: look near first
@@ -579,8 +578,7 @@ class _Search:
     def _leads_on(self, corner: int, edge: int, q: Array, width: float) -> bool:
         """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
-        A cut between two rings separates nothing: the way round is another one. A cut from a ring
-        to itself separates the part that the ring sweeps between the two points.
+        A cut between two rings separates nothing; one from a ring to itself separates what the ring encloses.
         """
         ring = self.ring[corner]
         if ring != self.ring[edge]:
@@ -597,9 +595,8 @@ class _Search:
 def _without_cracks(free: MultiPolygon) -> MultiPolygon:
     """Return `free` without the parts that are narrower than `_CRACK`.
 
-    What touches there becomes one wall, and stays apart by a nanometre so that it does not touch
-    in a point again. Corners of less than a degree are cut, vertices that bend a wall by less than
-    a micrometre go, everything else comes back as it was.
+    What touches there becomes one wall, and stays apart by a nanometre so that it does not touch in a point
+    again. Corners of less than a degree are cut, vertices that bend a wall by less than a micrometre go.
     """
     for distance in (-_CRACK / 2, _CRACK / 2 - 1e-9):
         free = free.buffer(distance, join_style="mitre", mitre_limit=100.0)

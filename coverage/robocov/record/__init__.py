@@ -366,11 +366,7 @@ class Recorder:
 
 
 def nearest_moments(time: Array, rate: float) -> IntArray:
-    """Return which times, (T,) s, are the nearest to multiples of 1/rate from the first; and the last.
-
-    >>> nearest_moments(np.arange(8) * 0.1, rate=4.0).tolist()
-    [0, 2, 5, 7]
-    """
+    """Return which times, (T,) s, are nearest (of two, the earlier) to multiples of 1/rate; and the last."""
     last = len(time) - 1
     if float(np.diff(time).min(initial=np.inf)) * rate >= 1.0:
         return np.arange(last + 1)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -88,18 +88,17 @@ class Team:
 
     def __post_init__(self) -> None:
         size = np.atleast_1d(np.asarray(self.radius, dtype=float)).shape[0]
-        for field in fields(self):
-            values = frozen(np.atleast_1d(np.asarray(getattr(self, field.name), dtype=float)))
-            low, high, infinite = LIMITS[field.name]
+        for name, (low, high, infinite) in LIMITS.items():
+            values = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=float)))
             if values.shape != (size,):
                 what = f"{values.shape} values, but one for each of {size} robots was wanted"
-                raise ParameterError(f"team.{field.name}: {what}")
+                raise ParameterError(f"team.{name}: {what}")
             good = (values >= low) & (values <= high) | (infinite & (values == np.inf))
             if not good.all():
-                found = f"{shown(float(values[~good][0]))} {UNITS[field.name]}"
+                found = f"{shown(float(values[~good][0]))} {UNITS[name]}"
                 wanted = f"a number from {low:g} to {high:g}{' or null for no limit' if infinite else ''}"
-                raise ParameterError(f"team.{field.name}: {found}, but {wanted} was wanted")
-            object.__setattr__(self, field.name, values)
+                raise ParameterError(f"team.{name}: {found}, but {wanted} was wanted")
+            object.__setattr__(self, name, values)
 
     @classmethod
     def homogeneous(
@@ -125,8 +124,7 @@ class Team:
         """Return the robots of several teams as one team, in their order."""
         if not teams:
             raise ParameterError("robots: 0, but a whole number of at least 1 was wanted")
-        columns = [[getattr(team, field.name) for team in teams] for field in fields(cls)]
-        return cls(*(np.concatenate(column) for column in columns))
+        return cls(*(np.concatenate([getattr(team, name) for team in teams]) for name in LIMITS))
 
     @property
     def mixed_speeds(self) -> bool:
@@ -135,26 +133,26 @@ class Team:
 
     def __getitem__(self, robots: slice | IntArray) -> Team:
         """Return some of the robots as a team."""
-        return Team(*(getattr(self, field.name)[robots] for field in fields(self)))
+        return Team(*(getattr(self, name)[robots] for name in LIMITS))
 
     def __len__(self) -> int:
         return int(self.radius.shape[0])
 
     def __repr__(self) -> str:
         parts = []
-        for field in fields(self):
-            values = getattr(self, field.name)
+        for name, unit in UNITS.items():
+            values = getattr(self, name)
             low, high = float(values.min()), float(values.max())
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-            parts.append(f"{field.name} {span} {UNITS[field.name]}")
+            parts.append(f"{name} {span} {unit}")
         return f"<Team of {counted(len(self), 'robot')}: {', '.join(parts)}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the team as plain JSON: None is no limit, and a value that all share is written once."""
         plain: dict[str, Any] = {"robots": len(self)}
-        for field in fields(self):
-            values = [None if np.isinf(x) else float(x) for x in getattr(self, field.name)]
-            plain[json_key(field.name)] = values[0] if len(set(values)) == 1 else values
+        for name in LIMITS:
+            values = [None if np.isinf(x) else float(x) for x in getattr(self, name)]
+            plain[json_key(name)] = values[0] if len(set(values)) == 1 else values
         return plain
 
     @classmethod
