@@ -49,7 +49,6 @@ if TYPE_CHECKING:  # isort: off
     from robocov.voronoi import VoronoiPartition, partition
     from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
-# fmt: on
 
 __version__ = "0.1.0"
 
@@ -86,7 +85,6 @@ _NAMES = {
 
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
-# fmt: off
 __all__ = [
     "CONTROLLERS", "GENERATORS", "ArrayCache", "Atlas", "AtlasShared", "CircleObstacle", "Conditions",
     "Controller", "CoverageCost", "CoverageResult", "Decision", "Density", "DiscStart", "Environment",

@@ -64,7 +64,6 @@ class MapError(InputError):
     """
 
     MOST_LISTED = 20  # to find the line of each takes as long as reading the file
-
     mistakes: tuple[Mistake, ...] = ()
     unlisted: int = 0
     where: str = ""

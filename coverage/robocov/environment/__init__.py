@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from numbers import Integral
-from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 import shapely
@@ -25,7 +25,6 @@ from robocov.errors import StartError, counted, is_number, unknown_name
 from robocov.observation.region import Region
 from robocov.robots import DEFAULT_RADIUS
 
-Key = TypeVar("Key")
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
@@ -427,8 +426,8 @@ def swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 
 
 def in_the_way(
-    area: BaseGeometry, others: Mapping[Key, BaseGeometry], inside: BaseGeometry | None = None
-) -> tuple[dict[Key, BaseGeometry], BaseGeometry | None]:
+    area: BaseGeometry, others: Mapping[Any, BaseGeometry], inside: BaseGeometry | None = None
+) -> tuple[dict[Any, BaseGeometry], BaseGeometry | None]:
     """Return what of an area the others take, by more than a touch, and what of it is not `inside`."""
     shared = {name: area.intersection(shape) for name, shape in others.items()}
     met = {name: part for name, part in shared.items() if part.area > _LEAST_OVERLAP}

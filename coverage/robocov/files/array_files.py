@@ -52,9 +52,8 @@ def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dic
             # a stream ends where its entry says, whatever there may be in it
             total = sum(entry.file_size for entry in entries)
             if total > min(most_bytes, max(_MODEST, _MOST_SQUEEZED * size)):
-                raise ValueError(
-                    f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB are too many"
-                )
+                found = f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB"
+                raise ValueError(f"{found} are too many")
             for name, times in Counter(entry.filename for entry in entries).most_common(1):
                 if times > 1:
                     raise ValueError(f"{name!r} is in it {times} times")

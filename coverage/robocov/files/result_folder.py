@@ -48,11 +48,9 @@ class ResultFolder:
     """A folder while its result is being made: the files go to the hidden folder `new`."""
 
     def __init__(self, path: Path, owned: set[str], *, replaces: bool, part: str = "") -> None:
-        self.path = path
-        self.new = path / _STAGING / part
+        self.path, self.new = path, path / _STAGING / part
         self._prefix = f"{part}/" if part else ""
-        self._owned = owned
-        self._replaces = replaces
+        self._owned, self._replaces = owned, replaces
         with _telling(path):
             self.new.mkdir(parents=True)
 
@@ -242,8 +240,8 @@ def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
     if not os.path.lexists(folder / name):
         real = Path(os.path.realpath(folder))  # which takes links that go round in circles
         with suppress(InputError):
-            listing = _listing(real.parent / name)
-            if listing is not None and any(each.startswith(f"{real.name}/") for each in listing[0]):
+            files, _ = _listing(real.parent / name) or ((), ())
+            if any(each.startswith(f"{real.name}/") for each in files):
                 return real.parent, real.name
     return folder, ""
 
@@ -254,8 +252,7 @@ def _owned(folder: Path) -> set[str] | None:
     Without a manifest that can be read, as in a copy without hidden files, those that have the names of ours.
     """
     with suppress(InputError):  # one that is damaged still says whose folder it is
-        manifest = _listing(folder / _MANIFEST)
-        if manifest is not None:
+        if manifest := _listing(folder / _MANIFEST):
             return manifest[0]
     kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json", f"{kind}.json")), None)
     if kind is None and not os.path.lexists(folder / _MANIFEST):

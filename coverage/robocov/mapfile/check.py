@@ -55,9 +55,7 @@ def check_rules(environment: Environment, where: str) -> None:
     if isinstance(environment.density, WeightedPolygons):
         for k, area in enumerate(environment.density.areas):
             found += _polygon_mistakes(("density", "areas", k), area)
-    if not found:
-        found = list(_space_mistakes(environment))
-    if found:
+    if found := found or list(_space_mistakes(environment)):
         raise MapError.of(where, found)
 
 
