@@ -26,23 +26,12 @@ import numpy as np
 import pymunk
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import kernel
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation.neighbours import close_pairs
 from robocov.robots import Team
-from robocov.world.engine import (
-    Buffers,
-    Engine,
-    State,
-    addresses_of,
-    enter,
-    leave,
-    observed_step,
-    shortening,
-    substeps,
-)
+from robocov.world.engine import Engine, State, addresses_of, enter, free_substep, leave, response, substeps
 from robocov.world.relocation import nearest_free
 from robocov.world.solid import Mover, movers, solid_pieces
 
@@ -201,7 +190,7 @@ class World:
             limit = np.maximum(limit, self._speeds() + push * dt)
         engine.robots[:] = forces.reshape(self._runs, -1, 2)
         engine.forget_contacts()
-        state = _free_substep(engine.buffers, answer, external, dt)
+        state = free_substep(engine.buffers, answer, external, dt)
         touching: dict[int, list[int]] = {}
         for row in self._touching():
             touching.setdefault(row // self._each, []).append(row)
@@ -416,49 +405,3 @@ def motion(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
         here = mover.path.shift(time)
         state[row] = *here, *((mover.path.shift(time + dt) - here) / dt)
     return state
-
-
-def response(team: Team, dt: float) -> Array:
-    """Return how robots answer to forces for `dt` seconds, (n, 5): see `_free_substep`.
-
-    The columns: part of the velocity that viscosity takes (28), velocity by force in m/s/N, force by change
-    of velocity in N/(m/s), most change of velocity and most speed in m/s.
-    """
-    rate = team.viscosity / team.mass
-    decay = -np.expm1(-rate * dt)
-    drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / team.mass
-    return np.column_stack([decay, drive, team.mass / dt, team.max_acceleration * dt, team.max_speed])
-
-
-@kernel
-def _free_substep(buffers: Buffers, answer: Array, external: Array, dt: float) -> Array:
-    """Return the state after a substep as if nothing touched; make net forces of the controllers'.
-
-    The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
-    dt; then acceleration and speed are limited, in this order: projecting onto the disc of speeds brings a
-    velocity no farther from the old one, which is in it.
-    """
-    _, _, forces, states = buffers
-    each = len(answer) // len(states)
-    begin = states.shape[1] - 1 - each
-    for i in range(len(answer)):
-        run, row = i // each, begin + i % each
-        vx, vy = states[run, row, 2], states[run, row, 3]
-        decay, drive = answer[i, 0], answer[i, 1]
-        dx, dy = drive * forces[run, row, 0] - decay * vx, drive * forces[run, row, 1] - decay * vy
-        scale = shortening(dx, dy, answer[i, 3])
-        ux, uy = vx + dx * scale, vy + dy * scale
-        scale = shortening(ux, uy, answer[i, 4])
-        forces[run, row, 0] = (ux * scale - vx) * answer[i, 2]
-        forces[run, row, 1] = (uy * scale - vy) * answer[i, 2]
-        if len(external):
-            forces[run, row, 0] += external[i, 0]
-            forces[run, row, 1] += external[i, 1]
-    for run in range(len(states)):
-        observed_step(buffers, run, dt)
-    moved = np.empty((2, len(answer), 2))
-    for i in range(len(answer)):
-        for k in range(2):
-            moved[0, i, k] = states[i // each, begin + i % each, k]
-            moved[1, i, k] = states[i // each, begin + i % each, 2 + k]
-    return moved

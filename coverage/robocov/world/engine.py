@@ -1,4 +1,4 @@
-"""The bodies of pymunk spaces as arrays, and the engine's C functions called from kernels."""
+"""The bodies of pymunk spaces as arrays, and kernels that move them by the engine's C functions."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import call_c, inner_kernel, kernel
+from robocov.robots import Team
 
 SPACE, STEP, EACH_BODY, SET_BODY, GET_BODY, EACH_ARBITER, GET_ARBITER = range(7)
 ADD_BODY, ADD_SHAPE, REMOVE_BODY, REMOVE_SHAPE, FORCES, STATES, CONTACTS = range(7, 14)
@@ -75,7 +76,7 @@ class Engine:
         self._touching.num = 0
 
     def touching(self) -> list[int]:
-        """Return the ids of the bodies in contact, in pairs, in the observed steps."""
+        """Return the ids of the bodies in contact, in pairs, in free substeps."""
         return ffi.unpack(self._touching.arr, self._touching.num) if self._touching.num else []
 
 
@@ -102,21 +103,60 @@ def substeps(buffers: Buffers, k: int, count: int, dt: float) -> None:
         call_c(addresses[k, STEP], (addresses[k, SPACE], dt))
 
 
-@kernel
-def observed_step(buffers: Buffers, k: int, dt: float) -> None:
-    """Make a step of space k under the forces, read its states, and note who touched."""
-    addresses = buffers[0]
-    substeps(buffers, k, 1, dt)
-    transfer(buffers, k, GET_BODY, STATES)
-    noting = (addresses[k, SPACE], addresses[k, GET_ARBITER], addresses[k, CONTACTS])
-    call_c(addresses[k, EACH_ARBITER], noting)
-
-
 @inner_kernel
 def shortening(x: float, y: float, limit: float) -> float:
     """Return by what to multiply a vector so that it is no longer than `limit`."""
     square = x * x + y * y
     return limit / math.sqrt(square) if square > limit * limit else 1.0
+
+
+def response(team: Team, dt: float) -> Array:
+    """Return how robots answer to forces for `dt` seconds, (n, 5): see `free_substep`.
+
+    The columns: part of the velocity that viscosity takes (28), velocity by force in m/s/N, force by change
+    of velocity in N/(m/s), most change of velocity and most speed in m/s.
+    """
+    rate = team.viscosity / team.mass
+    decay = -np.expm1(-rate * dt)
+    drive = np.where(rate > 0, decay / np.where(rate > 0, rate, 1.0), dt) / team.mass
+    return np.column_stack([decay, drive, team.mass / dt, team.max_acceleration * dt, team.max_speed])
+
+
+@kernel
+def free_substep(buffers: Buffers, answer: Array, external: Array, dt: float) -> Array:
+    """Return the state after a substep as if nothing touched; note who did; make net forces of controllers'.
+
+    The linear equation m q'' = F - nu q' is solved exactly over the substep, so viscosity is stable at any
+    dt; then acceleration and speed are limited, in this order: projecting onto the disc of speeds brings a
+    velocity no farther from the old one, which is in it.
+    """
+    addresses, _, forces, states = buffers
+    each = len(answer) // len(states)
+    begin = states.shape[1] - 1 - each
+    for i in range(len(answer)):
+        run, row = i // each, begin + i % each
+        vx, vy = states[run, row, 2], states[run, row, 3]
+        decay, drive = answer[i, 0], answer[i, 1]
+        dx, dy = drive * forces[run, row, 0] - decay * vx, drive * forces[run, row, 1] - decay * vy
+        scale = shortening(dx, dy, answer[i, 3])
+        ux, uy = vx + dx * scale, vy + dy * scale
+        scale = shortening(ux, uy, answer[i, 4])
+        forces[run, row, 0] = (ux * scale - vx) * answer[i, 2]
+        forces[run, row, 1] = (uy * scale - vy) * answer[i, 2]
+        if len(external):
+            forces[run, row, 0] += external[i, 0]
+            forces[run, row, 1] += external[i, 1]
+    for run in range(len(states)):
+        substeps(buffers, run, 1, dt)
+        transfer(buffers, run, GET_BODY, STATES)
+        noting = (addresses[run, SPACE], addresses[run, GET_ARBITER], addresses[run, CONTACTS])
+        call_c(addresses[run, EACH_ARBITER], noting)
+    moved = np.empty((2, len(answer), 2))
+    for i in range(len(answer)):
+        for k in range(2):
+            moved[0, i, k] = states[i // each, begin + i % each, k]
+            moved[1, i, k] = states[i // each, begin + i % each, 2 + k]
+    return moved
 
 
 @kernel
