@@ -219,7 +219,6 @@ def changes(draw, sketch):
         lambda: booleans.united(sketch, selection),
         lambda: booleans.subtracted(sketch, selection),
         lambda: booleans.intersected(sketch, selection),
-        lambda: booleans.excluded(sketch, selection),
         lambda: booleans.divided(sketch, selection),
         lambda: booleans.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
         lambda: booleans.clipped(sketch, selection),
@@ -230,7 +229,6 @@ def changes(draw, sketch):
         lambda: arranging.aligned(sketch, selection, side, to_boundary=True),
         lambda: arranging.distributed(sketch, selection, axis),
         lambda: arranging.distributed(sketch, selection, axis, gap=0.5),
-        lambda: arranging.distributed_centres(sketch, selection, axis),
         lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),
     ]
     try:

@@ -202,15 +202,6 @@ class History:
         twin._bytes, twin.thinned = sum(twin._sizes), self.thinned
         return twin
 
-    def coarsest(self, first: int = 0) -> int:
-        """Return the least power of two whose multiples, as steps from moment `first` on, are all there."""
-        steps = np.array(self._steps[first:])
-        stride = 1
-        # what was touched is kept at any step: gaps alone do not tell
-        while (steps % stride == 0).sum() < steps[-1] // stride - (steps[0] - 1) // stride:
-            stride *= 2
-        return stride
-
     def _thin(self) -> None:
         """Leave at most `_KEPT`: all of the newest, ever fewer of what is older."""
         count = len(self._moments)

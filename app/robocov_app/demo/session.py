@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.demo.clock import speed_words
 from robocov_app.demo.lane import Wanted
 from robocov_app.demo.scenario import MOST_PANES, gain_words
 from robocov_app.demo.touches import Touches
@@ -176,9 +175,3 @@ class Session(Touches):
     def summary(self) -> Mapping[int, float]:
         """Return the newest mean distance of each lane, m, by its number."""
         return {lane.number: lane.curve.at(self.time) for lane in self.lanes}
-
-
-def speed_after(session: Session) -> str:
-    """Return the speed in words, and whether the machine keeps up with it."""
-    words = speed_words(session.clock.speed)
-    return f"{words}, as fast as it goes" if session.clock.behind else words

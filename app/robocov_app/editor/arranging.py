@@ -76,21 +76,6 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float 
     return _spread(sketch, selection, by)
 
 
-def distributed_centres(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
-    """Spread three or more selected things so that the middles of their boxes are equally far apart.
-
-    The first and the last stay where they are.
-    """
-    a = _axis(axis)
-    boxes = _in_order(sketch, selection, 3, lambda box: (box[a] + box[a + 2], box[a]))
-    first, last = ((box[a] + box[a + 2]) / 2 for box in (boxes[0][1], boxes[-1][1]))
-    by: dict[Owner, Point] = {}
-    for k, (owner, box) in enumerate(boxes):
-        off = first + (last - first) * k / (len(boxes) - 1) - (box[a] + box[a + 2]) / 2
-        by[owner] = (off, 0.0) if a == 0 else (0.0, off)
-    return _spread(sketch, selection, by)
-
-
 def _aligned_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
     places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
     if len(places) < 2:

@@ -155,22 +155,6 @@ def turned(background: Background, degrees: float, about: Point) -> Background:
     return replace(background, corner=corner, turn=turn)
 
 
-def levelled(background: Background, a: Point, b: Point) -> Background:
-    """Return the picture turned about `a` so that the line from there to `b` is level or upright.
-
-    It takes the shorter way: for plans that were scanned askew.
-
-    Raises
-    ------
-    MapError
-        When the places are the same.
-    """
-    if math.dist(a, b) < 2 * background.scale:
-        raise MapError("click two points of the picture that are farther apart")
-    askew = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
-    return turned(background, -math.remainder(askew, 90.0), a)
-
-
 def shifted(background: Background, a: Point, b: Point) -> Background:
     """Return the picture moved so that what lay at `a` lies at `b`, m."""
     corner = background.corner[0] + b[0] - a[0], background.corner[1] + b[1] - a[1]

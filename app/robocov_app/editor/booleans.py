@@ -56,14 +56,6 @@ def intersected(sketch: Sketch, selection: Selection) -> Change:
     return _in_place(sketch, items, [common], words, "they have nothing in common")
 
 
-def excluded(sketch: Sketch, selection: Selection) -> Change:
-    """Keep what is covered by an odd number of the selected obstacles."""
-    items = _chosen(sketch, selection, "exclude")
-    odd = reduce(_difference_either_way, (item.geometry for item in items))
-    words = f"overlap of {counted(len(items), 'obstacle')} left out"
-    return _in_place(sketch, items, [odd], words, "nothing is left: they cover the same")
-
-
 def divided(sketch: Sketch, selection: Selection) -> Change:
     """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
     lowest, *uppers = _chosen(sketch, selection, "divide")
@@ -151,10 +143,6 @@ def _union(items: Sequence[Item]) -> BaseGeometry:
 
 def _intersection(a: BaseGeometry, b: BaseGeometry) -> BaseGeometry:
     return shapely.intersection(a, b, grid_size=GRID)
-
-
-def _difference_either_way(a: BaseGeometry, b: BaseGeometry) -> BaseGeometry:
-    return shapely.symmetric_difference(a, b, grid_size=GRID)
 
 
 def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:

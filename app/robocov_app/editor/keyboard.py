@@ -24,8 +24,6 @@ _OF_NUMBERS = frozenset("0123456789.,-+@<*/%°×x; ")
 _GOES_ON = frozenset("mcm'\"rad")
 """What may follow in a number: units."""
 
-_OPENS = frozenset({"open", "recent", "save", "save:as", "background", "quit", "new"})
-
 
 class Keyboard(DemoKeyboard):
     """Turns events of the keyboard into actions, or letters for whatever is open."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -234,8 +234,3 @@ def held(aim: Aim, origin: Point | None) -> Point:
     if aim.shift and origin is not None:
         return straightened(origin, aim.raw)
     return aim.point
-
-
-def without_keys(aim: Aim) -> Aim:
-    """Return the aim as if nothing were held down."""
-    return replace(aim, shift=False, alt=False, ctrl=False)

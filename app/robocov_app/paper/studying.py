@@ -31,8 +31,6 @@ MARK = "paper.json"
 
 _HEAD = {"format": "robocov-paper", "version": 1}
 
-_BEST_NOT_KNOWN = {"rapf": RAPF_SHARED, "rpf": RAPF_SHARED}
-
 
 class Stopped(Exception):  # noqa: N818 - it is no error
     """Somebody has pressed Ctrl-C."""

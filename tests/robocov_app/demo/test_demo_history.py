@@ -222,32 +222,6 @@ def test_a_history_of_its_own_leaves_the_other_as_it_is():
     assert twin.dt == history.dt
 
 
-@given(st.sets(st.integers(0, 60), min_size=1), st.integers(0, 10))
-def test_the_coarsest_stride_is_the_least_that_is_all_there(steps, first):
-    history = History(DT)
-    for step in sorted(steps):
-        history.add(moment(step))
-    first = min(first, len(history) - 1)
-    low, high = history.steps[first], history.last.step
-
-    def all_there(stride):
-        return all(step in steps for step in range(low, high + 1) if step % stride == 0)
-
-    stride = history.coarsest(first)
-    assert powers_of_two([stride])
-    assert all_there(stride)
-    assert stride == 1 or not all_there(stride // 2)
-
-
-def test_the_coarsest_stride_of_a_thinned_past_that_was_touched():
-    touched = {step: circumstances() for step in range(0, 4000, 301)}
-    history = filled(4000, 200 * ONE, lambda step: touched[step - step % 301])
-    stride = history.coarsest()
-    assert stride >= 16
-    assert set(range(0, 4000, stride)) <= set(history.steps)
-    assert history.coarsest(len(history) - 10) == 1
-
-
 def test_failed_robots_are_solid():
     there = circumstances({2: (1.0, 1.0), 5: (2.0, 3.0)})
     assert circumstances().solid is HALL

@@ -10,7 +10,6 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov_app.demo.editing import without_obstacle
 from robocov_app.demo.scenario import MOST_PANES, Limits
-from robocov_app.demo.session import speed_after
 
 # panes
 
@@ -127,10 +126,3 @@ def test_the_newest_cost_of_each_pane():
     session.lanes[0].curve.add(0.0, 2.0)
     assert session.summary()[0] == 2.0
     assert np.isnan(session.summary()[1])
-
-
-def test_the_speed_in_words():
-    session = begun()
-    assert speed_after(session) == "1×"
-    session.clock.behind = True
-    assert speed_after(session) == "1×, as fast as it goes"

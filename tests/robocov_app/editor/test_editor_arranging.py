@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart
 from robocov.errors import MapError
-from robocov_app.editor.arranging import SIDES, aligned, distributed, distributed_centres
+from robocov_app.editor.arranging import SIDES, aligned, distributed
 from robocov_app.editor.document import BOUNDARY, Sketch
 from robocov_app.editor.edits import bounds_of
 from robocov_app.editor.selection import Selection, Vertex, place_of
@@ -67,9 +67,6 @@ def test_gaps_become_equal(sketch, axis):
     np.testing.assert_allclose(after[:, 1 - a], before[order, 1 - a], atol=1e-9)
     given_gap = boxes(distributed(sketch, Selection.of(*keys), axis, gap=0.25).sketch, keys)[order]
     np.testing.assert_allclose(given_gap[1:, a] - given_gap[:-1, a + 2], 0.25, atol=4e-4)
-    centres = boxes(distributed_centres(sketch, Selection.of(*keys), axis).sketch, keys)
-    steps = np.diff(np.sort(LEVELS["centre" if a == 0 else "middle"](centres)))
-    np.testing.assert_allclose(steps, steps.mean(), atol=4e-4)
 
 
 def test_starts_are_aligned_too_and_the_boundary_stays(sketch):
@@ -106,7 +103,6 @@ def test_single_vertices_are_aligned(sketch):
         (lambda s: distributed(s, Selection.of(0, 1), "x"), "three or more"),
         (lambda s: distributed(s, Selection.of(0), "x", gap=1.0), "two or more"),
         (lambda s: distributed(s, Selection.of(0, 1, 2), "z"), "an axis"),
-        (lambda s: distributed_centres(s, Selection.of(0, 1), "x"), "three or more"),
     ],
 )
 def test_what_cannot_be_arranged_is_said(sketch, deed, words):

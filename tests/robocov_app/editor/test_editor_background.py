@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from robocov.errors import MapError
 from robocov_app.editor.background import (
     Background,
-    levelled,
     picture_laid,
     shifted,
     to_scale,
@@ -95,8 +94,6 @@ def test_what_gives_no_scale_is_said():
     ]:
         with pytest.raises(MapError, match=words):
             to_scale(PLAN, a, b, metres)
-    with pytest.raises(MapError, match="farther apart"):
-        levelled(PLAN, (1.0, 1.0), (1.0, 1.0))
 
 
 @given(backgrounds, anywhere, st.floats(-720, 720))
@@ -108,23 +105,6 @@ def test_turning_keeps_the_point_and_the_lengths(background, about, degrees):
     assert -180.0 <= after.turn <= 180.0
     a, b = background.place_of((0, 0)), after.place_of((0, 0))
     assert math.dist(a, about) == pytest.approx(math.dist(b, about), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("b", "level"),
-    [((9.0, 1.5), "x"), ((1.5, 9.0), "y"), ((-9.0, 0.2), "x"), ((0.5, -9.0), "y")],
-)
-def test_a_plan_that_was_scanned_askew_becomes_level(b, level):
-    a = (1.0, 1.0)
-    background = replace(PLAN, turn=12.0)
-    after = levelled(background, a, b)
-    first, second = (after.place_of(background.pixel_at(place)) for place in (a, b))
-    assert first == pytest.approx(a)
-    k = 1 if level == "x" else 0
-    assert second[k] == pytest.approx(first[k], abs=1e-9)
-    assert abs(math.remainder(after.turn - background.turn, 360.0)) <= 45.0
-    # and it points the same way as before
-    assert (second[1 - k] > first[1 - k]) == (b[1 - k] > a[1 - k])
 
 
 def test_it_is_moved_by_two_points():

@@ -27,14 +27,13 @@ def box(x, y, width, height):
 WANTED = {
     "united": lambda counts: counts >= 1,
     "intersected": lambda counts: counts.min(axis=0) == counts.max(axis=0),
-    "excluded": lambda counts: counts % 2 == 1,
 }
 
 
 @settings(max_examples=150)
 @given(
     st.lists(sound_shapes(), min_size=2, max_size=4),
-    st.sampled_from(["united", "subtracted", "intersected", "excluded", "divided"]),
+    st.sampled_from(["united", "subtracted", "intersected", "divided"]),
 )
 def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shapes, name):
     sketch, keys = Sketch("n", boundary=HALL).added(shapes)
@@ -46,10 +45,6 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
         "intersected": shapely.intersection_all(raw),
         "divided": first,
     }
-    if name == "excluded":
-        wanted[name] = raw[0]
-        for shape in raw[1:]:
-            wanted[name] = wanted[name] ^ shape
     perimeter = sum(shape.length for shape in raw)
     try:
         change = getattr(booleans, name)(sketch, Selection.of(*keys))
@@ -81,7 +76,6 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
         "united": inside.any(axis=0),
         "subtracted": inside[0] & ~inside[1:].any(axis=0),
         "intersected": inside.all(axis=0),
-        "excluded": inside.sum(axis=0) % 2 == 1,
         "divided": inside[0],
     }[name]
     np.testing.assert_array_equal(shapely.contains(covered(change.sketch), points), expected)
@@ -135,7 +129,6 @@ def test_the_result_takes_the_place_of_the_lowest():
         ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(2.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
         ("intersected", [box(0.0, 0.0, 1.0, 1.0), box(1.0, 0.0, 1.0, 1.0)], "they have nothing in common"),
         ("subtracted", [box(0.2, 0.2, 0.5, 0.5), box(0.0, 0.0, 1.0, 1.0)], "nothing is left of polygon"),
-        ("excluded", [box(0.0, 0.0, 1.0, 1.0)] * 2, "nothing is left: they cover the same"),
         ("united", [box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)], "the wall covers nothing"),
     ],
 )
