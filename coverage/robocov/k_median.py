@@ -27,10 +27,7 @@ _TRIED = 4  # so many ways to put them back are tried to the end
 
 
 def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
-    """Return (count,) sources, the nearest to targets drawn with chances in proportion to their distances.
-
-    That is k-means++ (Arthur and Vassilvitskii 2007), with distances for squares.
-    """
+    """Return (count,) sources by k-means++ (Arthur and Vassilvitskii 2007), with distances for squares."""
     chosen: list[int] = []
     nearest = np.ones(len(table))
     taken = np.zeros(table.shape[1], dtype=bool)
@@ -49,10 +46,7 @@ def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
 def lloyd_iterations(
     table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Beat = lambda: None
 ) -> IntArray:
-    """Return (k,) sources after Lloyd's iteration: targets go to the nearest, sources to the best for theirs.
-
-    Those that are `fixed` stay.
-    """
+    """Return (k,) sources after Lloyd's iteration; those that are `fixed` stay."""
     stay = np.zeros(len(sources), dtype=bool) if fixed is None else fixed
     former, total = sources, np.inf
     while True:

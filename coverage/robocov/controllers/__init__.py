@@ -119,8 +119,7 @@ def make_controller(
 ) -> Controller:
     """Return the controller called `name` with the given gains, all others at their defaults.
 
-    `source` is as in `controller_kind`. A ParameterError names an unknown controller or gain (with
-    the nearest name), or a gain out of range.
+    A ParameterError names an unknown controller or gain (with the nearest name), or a gain out of range.
 
     >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
     0.3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,8 +38,7 @@ _STAGGERED = 0.5  # part of the period in which all robots make their first plan
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class RestTracker:
+class RestTracker(NamedTuple):
     """Since when (s) each of some (k,) robots has been at (k, 2) m, to within `STILL_WITHIN`."""
 
     robots: IntArray

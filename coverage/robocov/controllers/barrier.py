@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,7 @@ _ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe di
 _TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to be
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Heard:
+class Heard(NamedTuple):
     """Reported positions of the robots that were near."""
 
     time: float  # s
@@ -89,10 +89,7 @@ class Barrier(Law):
     def certified(
         self, seen: Observations, memory: BarrierMemory, wanted: Array
     ) -> tuple[Array, BarrierMemory]:
-        """Return the certified accelerations nearest to the wanted ones, (n, 2) m/s², and what to remember.
-
-        The memory is what `begin`, or this method the last time, returned.
-        """
+        """Return the certified accelerations nearest to the wanted ones, (n, 2) m/s², and the new memory."""
         team = memory.team
         returns = last_returns(seen, memory.returns)
         robots, heard = self._robots(seen, memory)

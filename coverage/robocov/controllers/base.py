@@ -70,10 +70,7 @@ def information_of(controller: Any) -> Information:
 
 
 def informed(controller: Controller, environment: Environment) -> Controller:
-    """Return the controller as it decides on one map: one that goes by the whole map gets to know it.
-
-    A ParameterError tells of a law that asks for the map and does not say so.
-    """
+    """Return the controller, told the map if it goes by it; a ParameterError if it asks, unannounced."""
     information, tell = information_of(controller), getattr(controller, "informed", None)
     if tell is None:
         return controller

@@ -19,19 +19,13 @@ def approach(offset: Array, k_prop: float, speed: Array) -> Array:
 
 
 def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -> Array:
-    """Return the forces (n, 2) N with which velocities follow the wanted ones, (n, 2) m/s.
-
-    They do so with the time constant `response_time` in s; viscosity is compensated for.
-    """
+    """Return the forces (n, 2) N that track wanted velocities (n, 2) m/s with a time constant (s)."""
     change = (wanted - seen.velocities) * (team.mass / response_time)[:, None]
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
 
 
 def last_returns(seen: Observations, before: Array | None) -> Array | None:
-    """Return the points that each robot's last scan met, (n, rays, 2) m, nan where a ray met nothing.
-
-    Between two scans a robot goes on with the points of the last one, which this function returned `before`.
-    """
+    """Return the points that each robot's last scan met, (n, rays, 2) m, or nan; else those `before`."""
     scans = seen.scans
     if scans is None:
         return before
@@ -40,10 +34,7 @@ def last_returns(seen: Observations, before: Array | None) -> Array | None:
 
 
 def with_nearest(seen: Observations, returns: Array | None) -> Array:
-    """Return the obstacle points that each robot knows of, (n, k, 2) m, nan where none.
-
-    The closest one, which is sensed at every step, comes first, then those of the last scan.
-    """
+    """Return the closest obstacle point and those that the last scan met, (n, k, 2) m, nan where none."""
     nearest = seen.obstacle_points[:, None]
     return nearest if returns is None else np.concatenate([nearest, returns], axis=1)
 
@@ -101,9 +92,8 @@ def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array
     in the interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3,
     incremental linear programming, with this objective).
 
-    The wanted points are (n, 2), the normals (n, m, 2), of length 1 or nan for no constraint, the offsets
-    (n, m), the radii (n,). Return the best points, (n, 2), and whether there is any, (n,); else they mean
-    nothing.
+    Normals, (n, m, 2), are of length 1, or nan for no constraint; offsets are (n, m), radii (n,). Return the
+    best points, (n, 2), and whether there is any, (n,).
     """
     best = np.empty(wanted.shape)
     feasible = np.ones(len(wanted), dtype=np.bool_)

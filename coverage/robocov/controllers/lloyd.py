@@ -18,11 +18,11 @@ from robocov.voronoi.disc_cells import disc_limited, disc_polygons
 class Lloyd(Law):
     """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
 
-    Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the
-    last metres so that its deceleration stays within the limits. The drive tracks that velocity
-    and makes up for viscosity. Another `target` than the centroid is the optimum of the cell for
-    another locational cost (4). Obstacles are not known to the law: the robot slides along them.
-    With `cells` by time, where robots are not equally fast, the goal may lie outside of the cell.
+    Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the last metres so
+    that its deceleration stays within the limits. The drive tracks that velocity and makes up for viscosity.
+    Another `target` than the centroid is the optimum of the cell for another locational cost (4). Obstacles
+    are not known to the law: the robot slides along them. With `cells` by time, where robots are not equally
+    fast, the goal may lie outside of the cell.
     """
 
     name = "lloyd"
@@ -53,8 +53,7 @@ class RangeLimited(Law):
     to the centroid of that part descends the locational cost with f = min(|q - p|², (r/2)²), which is
     what a team can descend that hears no farther: two times the part's mass times the way to its
     centroid is the gradient, (12) with the limited cell (the paper's own section on limited-range
-    interactions). Where everybody's cell lies within r/2 it is Lloyd's algorithm, and it is driven as
-    that is.
+    interactions). Where everybody's cell lies within r/2 it is Lloyd's algorithm.
 
     The centroid is exact with density 1; another density is integrated over a polygon, whose chords
     stand for the arcs (see `robocov.voronoi.disc_cells`).

@@ -46,10 +46,8 @@ def targets(cells: Cells, density: Density | None, target: str, height: float) -
 
     Centroid and median count how far away places are, f = 1/(r²+h²) counts what is within a few h: in a cell
     that is large against h it gives up the far ends, for h well above the size of the cells it is the
-    centroid. Where nothing is in the way that hardly changes the coverage cost (22). Walls magnify it: a goal
-    behind a wall holds a robot in front of it when the goal's foot on the wall lies between the wall's ends,
-    and where it lies beyond one of them, the robot gets round. Centimetres between two targets then decide
-    how a run ends, mostly against "sensing" with h of a metre or less.
+    centroid. Where nothing is in the way that hardly changes the coverage cost (22). Walls magnify it:
+    whether a robot gets round one depends on centimetres of its goal, mostly against "sensing" with low h.
 
     The `target` is one of `TARGETS`, the `height` (m) h of equation (14), for "sensing". A ParameterError
     tells of another target, or a height that is not above 0.

@@ -112,11 +112,7 @@ def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
 
 @inner_kernel
 def _seen(start: Array, end: Array, k: int, x: float, y: float) -> tuple[float, float, float, float, float]:
-    """Return an edge's outward normal and length, and where it is as seen from a point.
-
-    That is the distance d from the point to the edge's line along the normal, negative where the point is
-    beyond it; and s₁, where the edge begins, from the foot of the perpendicular along it.
-    """
+    """Return an edge's outward normal and length, d from a point, negative for one beyond it, and s₁."""
     along_x, along_y = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
     over = 1.0 / max(length, 1e-300)

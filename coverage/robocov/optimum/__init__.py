@@ -139,10 +139,7 @@ def _rank(result: CoverageResult) -> tuple[float, float]:
 
 
 class _Search:
-    """Shared by all restarts: the room for the robots, places, and the table of distances.
-
-    This, (m, c) m, holds the sums of the geodesic distances from the sites of each target, by their weights.
-    """
+    """Shared by all restarts: room, places, and the table, (m, c) m, of distances from groups of sites."""
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
         self.cost, self.robots = cost, robots
@@ -216,11 +213,10 @@ def _spread(part: BaseGeometry, spacing: float) -> Array:
 
 
 class Room:
-    """Free configuration space of robots of some radius (m).
+    """Free configuration space of robots of some radius (m), a part for each component of the free space.
 
     They keep from walls (`clearance`), and from each other (`spacing`, m), the distance that starts leave as
-    well: their radius (their diameter), and `robocov.environment.START_GAP` of it. There is a part for each
-    component of the free space, empty where no robot fits.
+    well: their radius (their diameter), and `START_GAP` of it.
     """
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
@@ -279,7 +275,7 @@ def descended(
     back into the room, halved until the cost falls enough (Armijo). The cost is only piecewise smooth,
     as sites change owners and ways, and a wall may stop a robot: where the learnt direction does not lead
     down, the scaled slope alone is followed and the curvature learnt anew. No robot leaves its `component`
-    of the free space. `beat` is called once a step; it may raise, to give up.
+    of the free space.
     """
     result = cost(positions)
     slope = _slope(result)

@@ -73,13 +73,10 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class DiscoveredMap:
-    """Occupancy grid of a robot: `UNKNOWN`, `FREE`, `PRESUMED` or `WALL` for each cell.
-
-    The state is (rows, columns), the lowest row first. Immutable: whatever adds to it gives another map.
-    """
+    """Occupancy grid of a robot. Immutable: whatever adds to it gives another map."""
 
     raster: Raster
-    state: NDArray[np.uint8]
+    state: NDArray[np.uint8]  # (rows, columns), the lowest row first: `UNKNOWN`, `FREE`, `PRESUMED` or `WALL`
 
     def __post_init__(self) -> None:
         self.state.setflags(write=False)
@@ -98,10 +95,7 @@ class DiscoveredMap:
         return np.asarray((self.state >= PRESUMED) | self.raster.outside)
 
     def scanned(self, position: Array, distances: Array, hit: BoolArray) -> DiscoveredMap:
-        """Return the map with one scan more; the same one where the scan tells nothing new.
-
-        It was taken at a position (2,) m; its (rays,) distances and hits are as in `Scans`.
-        """
+        """Return the map with one scan more, taken at (2,) m; the same one where it tells nothing new."""
         state = self.state.copy()
         # beyond the region there is nothing to know
         far = np.minimum(distances, self.raster.region.diameter)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +68,7 @@ class CoverageDemand:
         """Return where to look at what may matter most, of the unknown patches in a robot's own cell.
 
         At stake is what a patch is expected to add to the cost: an inside of an obstacle hardly adds
-        anything. The place is a free cell on the border of the patch, chosen by stake over one metre plus
-        the way.
+        anything. The place is a free cell on its border, chosen by stake over one metre plus the way.
 
         Distances, (m,) m, are those of the nodes of its own cell from its goal, 0 for others (`mine`), and
         of all nodes from where it is (`home`). It cannot be in `tight` cells, (h, w); from the `former`
@@ -143,8 +143,7 @@ def team_places(
     return places
 
 
-@dataclass(frozen=True, eq=False)
-class OwnPlace:
+class OwnPlace(NamedTuple):
     """The best place for one robot, the others being where they are."""
 
     goal: Array  # (2,) m
@@ -156,14 +155,12 @@ class OwnPlace:
 def own_place(
     ways: GridPlanner, weights: Array, others: Array, begin: int, former: Array, rest: float, steps: int = 6
 ) -> OwnPlace:
-    """Return a local minimum of the cost by the place of one robot alone, for given places of the others.
+    """Return a local minimum of the cost by the place of one robot alone, the others being at (k, 2) m.
 
-    From a node on, as long as a neighbouring node is better; then the minimum of the parabolas, in x and
-    in y, through the costs of the node and those beside it. The former goal is kept where the new one is
-    better by less than a part `rest` of what its own cell costs.
-
-    The others are at (k, 2) m, the former goal is (2,) m, nan for none; from the node `begin` the place moves
-    on by `steps` nodes at most.
+    From the node `begin` on, by at most `steps` nodes, as long as a neighbouring one is better; then the
+    minimum of the parabolas, in x and in y, through the costs of the node and those beside it. The former
+    goal, (2,) m, nan for none, is kept where the new one is better by less than a part `rest` of what its own
+    cell costs.
     """
     first = ways.distances(begin)
     target = np.flatnonzero(np.isfinite(first) & (weights > 0.0))

@@ -181,10 +181,7 @@ class GridPlanner:
         return np.asarray(dijkstra(self._graph, indices=nodes))
 
     def from_places(self, places: Array) -> Array:
-        """Return the distances of all nodes from the nearest of (k, 2) places, (m,) m; without any, infinite.
-
-        The places need not be nodes: each is joined to the roomy nodes near it that it sees.
-        """
+        """Return the distances of all nodes, (m,) m, from the nearest of (k, 2) places between them."""
         graph, size = self._graph, len(self.nodes)
         seen = [self._in_sight(place) for place in places]
         counts = [len(each) for each in seen]
