@@ -53,6 +53,6 @@ def weighted_mean(values: Array, weights: Array | None = None) -> float:
     2.0
     """
     if weights is None:
-        return float(values.mean()) if len(values) else np.nan
+        return float(values.sum()) / len(values) if len(values) else np.nan
     total = float(weights.sum())
     return float((weights * values).sum()) / total if total > 0.0 else np.nan

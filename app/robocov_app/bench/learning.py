@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, InTurn, Row
+from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
 if TYPE_CHECKING:
@@ -74,11 +74,8 @@ def _rows(quick: bool) -> Iterator[Row]:
     }
     # processor time: a step of many is long enough to be interrupted by other programs
     taken = InTurn(calls, clock=process_time).rounds(20 if quick else 200)
-    step, yardstick = "a step with reward", (YARDSTICK, taken["plain"])
-    rate = f"{taken['plain'] / taken['single']:.2f} times its steps a second"
-    yield Row(
-        "learning", step, {"environments": 1}, taken["single"], *yardstick, 1 / 0.7, note=rate, before=10.0
-    )
-    each = taken["many"] / TOGETHER
-    rate = f"{taken['plain'] / each:.2f} times its steps a second"
-    yield Row("learning", step, {"environments": TOGETHER}, each, *yardstick, 1 / 4, note=rate, before=10.0)
+    for name, count, goal in (("single", 1, 0.7), ("many", TOGETHER, 4.0)):
+        size: Parameters = {"environments": count}
+        each, yardstick = taken[name] / count, (YARDSTICK, taken["plain"], 1 / goal)
+        rate = f"{taken['plain'] / each:.2f} times its steps a second"
+        yield Row("learning", "a step with reward", size, each, *yardstick, note=rate, before=10.0)

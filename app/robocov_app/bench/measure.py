@@ -10,52 +10,31 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 Call: TypeAlias = Callable[[], object]
-
 Parameters: TypeAlias = dict[str, int | str]
-"""Names and values, like ``{"robots": 50}``."""
-
 Case: TypeAlias = Callable[[], Iterable["Row"]]
 """Something to measure, which may give several rows."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One time, and its yardstick if there is one.
-
-    Attributes
-    ----------
-    part : str
-        ``step``, ``cost``, ``learning``, ``sweep``, ``render``, ``window`` or ``start``.
-    name : str
-        What is timed: ``one step``.
-    parameters : dict
-        What varies: ``{"robots": 50}``.
-    seconds : float
-        Median.
-    yardstick : str or None
-        What it is compared with.
-    yardstick_seconds : float or None
-        Median, in the same run.
-    goal : float or None
-        Largest ratio that is wanted.
-    goal_seconds : float or None
-        Longest time that is wanted.
-    note : str
-        The time in other words: ``95 x real time``.
-    before : float or None
-        About the ratio in the last version without compiled kernels (commit 8838167).
-    """
+    """One time, and its yardstick if there is one."""
 
     part: str
     name: str
     parameters: Parameters
+    """What varies: ``{"robots": 50}``."""
     seconds: float
+    """Median, as of the yardstick in the same run."""
     yardstick: str | None = None
     yardstick_seconds: float | None = None
     goal: float | None = None
+    """Largest ratio that is wanted,"""
     goal_seconds: float | None = None
+    """and longest time."""
     note: str = ""
+    """The time in other words: ``95 x real time``."""
     before: float | None = None
+    """About the ratio in the last version without compiled kernels (commit 8838167)."""
 
     @property
     def ratio(self) -> float | None:
@@ -75,9 +54,9 @@ class Row:
     @property
     def case(self) -> str:
         """The parameters in words."""
+        words = {"lattice": "{0} x {0}", "map": "{0}"}
         return ", ".join(
-            f"{value} {name}" if isinstance(value, int) and name != "lattice" else _worded(name, value)
-            for name, value in self.parameters.items()
+            words.get(name, "{0} " + name).format(value) for name, value in self.parameters.items()
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -86,24 +65,13 @@ class Row:
         return plain | {"ratio": self.ratio, "met": self.met}
 
 
-def _worded(name: str, value: int | str) -> str:
-    return f"{value} x {value}" if name == "lattice" else str(value)
-
-
 @dataclass
 class InTurn:
     """The median times of calls that are made in turn.
 
     The moods of a shared machine then fall on all alike, and the ratio of two medians holds although
-    neither time does. Garbage is not collected meanwhile.
-
-    Parameters
-    ----------
-    calls : by name
-    clock : callable
-        Returns seconds.
-    before : callable
-        Called before every round; it takes no time.
+    neither time does. Garbage is not collected meanwhile. `before` is called before every round; it takes no
+    time.
     """
 
     calls: Mapping[str, Call]

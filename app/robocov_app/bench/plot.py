@@ -35,17 +35,10 @@ HEADINGS = {
 
 
 def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
-    """Draw every ratio and every goal on logarithmic axes, and write them as PNG, SVG or PDF.
-
-    Raises
-    ------
-    OutputError, ParameterError
-        As `save_figure`.
-    """
+    """Draw every ratio and every goal on logarithmic axes, and write them as `save_figure` does."""
     rows = [row for row in rows if row.ratio is not None]
     parts = [(part, list(group)) for part, group in groupby(rows, key=lambda row: row.part)]
-    below = sum(GAP + ROW * len(group) + 16 for _, group in parts)
-    height = ABOVE + below
+    height = ABOVE + sum(GAP + ROW * len(group) + 16 for _, group in parts)
     with plain_style():
         page = Page((WIDTH, height), theme, scale=1.0)
         page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
@@ -117,7 +110,3 @@ def _ticks(low: float, high: float) -> list[float]:
 def _round_numbers(leading: tuple[int, ...]) -> Iterator[float]:
     for power in range(-4, 6):
         yield from (float(f"{digit}e{power}") for digit in leading)
-
-
-def _number(row: Row, name: str) -> int:
-    return int(row.parameters[name])
