@@ -15,7 +15,7 @@ import pymunk
 
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.compiled import call_c, kernel
-from robocov.observation.scans import headings
+from robocov.observation import headings
 from robocov.world import obstacle_space
 from robocov.world.engine import addresses_of
 from robocov.world.solid import Mover

@@ -18,9 +18,17 @@ from robocov.controllers.base import Controller
 from robocov.controllers.user_modules import fault_of
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
-from robocov.observation import Decision, Observations, Snapshot, checked_decision, detached, given_forces
+from robocov.observation import (
+    Decision,
+    Observations,
+    Scanning,
+    Scans,
+    Snapshot,
+    checked_decision,
+    detached,
+    given_forces,
+)
 from robocov.observation.neighbours import Neighbours
-from robocov.observation.scans import Scanning, Scans
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor

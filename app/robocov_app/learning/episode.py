@@ -10,9 +10,8 @@ import numpy as np
 from robocov.cost import MomentaryCost
 from robocov.errors import ParameterError, StartError, shown
 from robocov.metrics import TOUCHING
-from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import close_pairs
-from robocov.observation.scans import Scanning
 from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import Simulation

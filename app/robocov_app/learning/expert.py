@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from robocov.controllers import informed
-from robocov.observation.scans import Scans
+from robocov.observation import Scans
 from robocov_app.learning.driving import actions_of
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.controllers.base import Controller
-    from robocov.observation.scans import Scanning
+    from robocov.observation import Scanning
     from robocov_app.learning.episode import Episode
 
 

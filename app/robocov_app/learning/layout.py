@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from robocov.compiled import kernel
 from robocov.controllers.base import cells_seen
 from robocov.errors import ParameterError, checked, shown
-from robocov.observation.scans import MOST_RAYS
+from robocov.observation import MOST_RAYS
 
 if TYPE_CHECKING:
     from robocov.arrays import Array, IntArray
-    from robocov.observation import Observations
+    from robocov.observation import Observations, Scans
     from robocov.observation.region import Region
-    from robocov.observation.scans import Scans
     from robocov.robots import Team
 
 Rows: TypeAlias = NDArray[np.float32]

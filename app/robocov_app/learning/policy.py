@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from robocov.controllers.gains import gain, validate_gains
 from robocov.errors import ParameterError, shown
-from robocov.observation import Decision
-from robocov.observation.scans import Scanning
+from robocov.observation import Decision, Scanning
 from robocov_app.learning.driving import Action, checked_action, driving_forces
 from robocov_app.learning.layout import ObservationLayout
 

@@ -17,9 +17,8 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, SOON, Conditions
 from robocov.conditions.draws import Draws
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
-from robocov.observation.scans import Scans
 from robocov.robots import Team
 
 NEVER = -1

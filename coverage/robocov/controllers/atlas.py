@@ -12,9 +12,8 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law
 from robocov.controllers.driving import approach, avoid, drive, last_returns, neighbour_offsets, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
-from robocov.observation.scans import Scanning
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.placement import CoverageDemand, OwnPlace, own_place, team_places
 from robocov.planning.wayfinding import GridPlanner, Window

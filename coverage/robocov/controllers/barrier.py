@@ -11,8 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations
-from robocov.observation.scans import Scanning
+from robocov.observation import Decision, Observations, Scanning
 from robocov.potential import separation
 from robocov.robots import Team
 

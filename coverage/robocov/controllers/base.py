@@ -34,7 +34,7 @@ class Controller(Protocol):
     Optional are
 
     - the class variable ``information``, one of `Information`, "own" where it is not stated,
-    - the attribute ``scanning``, a `robocov.observation.scans.Scanning`, of laws that want ray scans, and
+    - the attribute ``scanning``, a `robocov.observation.Scanning`, of laws that want ray scans, and
     - the method ``informed(environment) -> Controller``, which only laws with the whole map have: it
       returns the law that knows that map, with the same gains.
     """

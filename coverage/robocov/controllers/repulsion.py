@@ -11,10 +11,9 @@ from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import NOBODY
 from robocov.observation.region import Region
-from robocov.observation.scans import Scanning
 from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
 from robocov.robots import Team
 from robocov.voronoi.delaunay import Mesh

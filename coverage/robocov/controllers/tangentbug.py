@@ -14,8 +14,7 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations
-from robocov.observation.scans import Scanning, headings
+from robocov.observation import Decision, Observations, Scanning, headings
 from robocov.robots import Team
 
 _GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met

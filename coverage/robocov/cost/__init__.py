@@ -19,7 +19,8 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, ParameterError, checked, counted, shown
 from robocov.geodesic import BINS, Geodesics
-from robocov.geodesic.walls import AngularWallIndex, along_z_curve, box_tree
+from robocov.geodesic.visibility import AngularWallIndex
+from robocov.geodesic.walls import along_z_curve, box_tree
 
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""

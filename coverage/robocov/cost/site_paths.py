@@ -14,17 +14,8 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, inner_kernel
 from robocov.geodesic import Graph, relax
-from robocov.geodesic.walls import (
-    LEAF,
-    AngularWallIndex,
-    Walls,
-    beyond_horizon,
-    enter_walls,
-    near2,
-    sees,
-    skipped,
-    useful,
-)
+from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
+from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
 
 GROUP = 16
 """Tiles that are looked at together first."""

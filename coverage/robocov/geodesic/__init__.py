@@ -19,19 +19,8 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inner_kernel
 from robocov.environment import GRID, Environment
 from robocov.errors import InputError
-from robocov.geodesic.walls import (
-    LEAF,
-    AngularWallIndex,
-    Grid,
-    Walls,
-    beyond_horizon,
-    enter_walls,
-    locate,
-    sees,
-    skipped,
-    useful,
-    walls_of,
-)
+from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
+from robocov.geodesic.walls import LEAF, Grid, Walls, locate, skipped, useful, walls_of
 
 BINS, CORNER_BINS = 128, 256
 """Angular bins of a source; a corner looks at many targets."""

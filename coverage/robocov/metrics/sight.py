@@ -17,7 +17,8 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inner_kernel
-from robocov.geodesic.walls import AngularWallIndex, Grid, enter_walls, pseudo_angle, walls_of
+from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle
+from robocov.geodesic.walls import Grid, walls_of
 
 _BINS = 512
 """Angular bins of a robot's view."""

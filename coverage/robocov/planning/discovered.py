@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, kernel
+from robocov.observation import headings
 from robocov.observation.region import Region
-from robocov.observation.scans import headings
 
 UNKNOWN, FREE, PRESUMED, WALL = 0, 1, 2, 3
 """What is known of a cell, the more the higher."""

@@ -30,17 +30,10 @@ _FLIPS = 16
 
 @inner_kernel
 def triangulated(mesh: Mesh, points: Array, cotangent: Array, stack: IntArray) -> bool:
-    """Make `mesh` Delaunay, from what it is where that is a triangulation still; return whether it is.
+    """Make `mesh`, (2, 8 n + 4), Delaunay, from what it is where that is a triangulation still; tell success.
 
-    Parameters
-    ----------
-    mesh : (2, 8 n + 4), changed
-        ``mesh[0, 0]`` is -1 where there is none yet.
-    points : (n + 3, 2) m
-    cotangent : (8 n + 4,), written
-        Of the angle opposite of each half-edge.
-    stack : (8 n + 4,)
-        To work with.
+    ``mesh[0, 0]`` is -1 where there is none yet. The last three of the points, (n + 3, 2) m, are sentinels.
+    Written are the cotangents, (8 n + 4,), of the angles opposite of each half-edge; the stack is as long.
     """
     n, count, flips, home = len(points) - 3, mesh.shape[1], 0, 0
     if mesh[0, 0] >= 0:

@@ -15,10 +15,9 @@ from robocov.conditions.perception import Inbox, Perception
 from robocov.controllers import CONTROLLERS, Controller, informed
 from robocov.environment import Environment
 from robocov.errors import InputError
-from robocov.observation import Observations
+from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.scans import Scans
 from robocov.robots import Team
 from robocov.voronoi import partition
 

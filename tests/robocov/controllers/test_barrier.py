@@ -14,10 +14,9 @@ from robocov.controllers.barrier import BarrierMemory
 from robocov.controllers.driving import nearest_allowed
 from robocov.environment import Environment
 from robocov.mapfile import load_map
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.scans import Scanning
 from robocov.robots import Team
 from robocov.simulation import Simulation
 

@@ -27,10 +27,9 @@ from robocov.controllers import (
 from robocov.controllers.gains import Gain, Option, choice, gain
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.scans import Scans
 from robocov.robots import Team
 
 REGION = Region(np.array([[0.0, 0.0], [11.0, -1.0], [12.0, 8.0], [3.0, 10.0]]))

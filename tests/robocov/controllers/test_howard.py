@@ -8,9 +8,8 @@ import pytest
 from robocov.controllers import Howard
 from robocov.controllers.driving import last_returns, with_nearest
 from robocov.environment import Environment
-from robocov.observation import Observations
+from robocov.observation import Observations, Scans, headings
 from robocov.observation.neighbours import Neighbours
-from robocov.observation.scans import Scans, headings
 from robocov.robots import Team
 from robocov.simulation import Simulation
 

@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov.metrics import settled_at
-from robocov.observation.scans import headings
+from robocov.observation import headings
 from robocov.robots import Team
 from robocov.simulation import Simulation
 

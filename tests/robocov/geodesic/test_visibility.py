@@ -6,7 +6,7 @@ import shapely
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.geodesic import Geodesics
-from robocov.geodesic.walls import AngularWallIndex, enter_walls, pseudo_angle, sees
+from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle, sees
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 

@@ -5,8 +5,7 @@ import pytest
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.observation import Decision, Observations
-from robocov.observation.scans import Scanning, headings
+from robocov.observation import Decision, Observations, Scanning, headings
 from robocov.sensor import RangeSensor
 from robocov.simulation import Simulation
 from robocov.world.solid import solid_pieces

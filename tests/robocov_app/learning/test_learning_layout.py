@@ -6,10 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov.observation import Observations
+from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.scans import Scans
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.learning import ObservationLayout

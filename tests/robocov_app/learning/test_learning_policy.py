@@ -14,10 +14,9 @@ from robocov.controllers import Lloyd, Rapf, make_controller
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.metrics import clearances, contacts
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.scans import Scanning
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.cli import main
