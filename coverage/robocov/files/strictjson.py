@@ -110,8 +110,7 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
 
 def require_json(value: object, where: str) -> None:
     """Raise `MapError` unless `value` is made of what JSON has: finite numbers, text, lists and objects."""
-    mistake = _first_mistake(value, ())
-    if mistake is not None:
+    if mistake := _first_mistake(value, ()):
         raise MapError.of(where, [mistake])
 
 

@@ -47,7 +47,7 @@ def load_map(source: str | Path) -> Environment:
 
 
 def map_file(source: str | Path) -> Path:
-    """Return the file of the map that `load_map` returns for the same source; it need not be there."""
+    """Return the file of the map of `load_map`, which may be missing; raise MapError for unknown names."""
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
     known = bundled_maps()
@@ -67,7 +67,7 @@ def bundled_maps() -> dict[str, Path]:
 
 
 def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
-    """Return the map in the JSON `text`; messages call it `where`, and `folder` holds its pictures."""
+    """Return the map in the JSON `text`, called `where`, with pictures in `folder`; raises as `load_map`."""
     document = parse(text, where)
     try:
         return _environment(document, one_line(where), folder)
@@ -124,7 +124,7 @@ def to_json(environment: Environment) -> dict[str, Any]:
 
 
 def save_map(environment: Environment, path: str | Path) -> None:
-    """Write `environment` to `path`, whole or not at all; raise MapError when it breaks a rule."""
+    """Write `environment` to `path`, whole or not at all; raise MapError where a rule is broken."""
     exact = to_json(environment)
     document = _shortened(exact)
     if document == exact and environment.density is None:

@@ -217,7 +217,7 @@ class Record(Drawable):
         return Snapshot(seen, Decision(forces=self.forces[k], goals=goals, cells=cells), working=working)
 
     def at(self, time: float) -> Snapshot:
-        """Return the moment nearest to `time`, s, which may be a control period outside of the run."""
+        """Return the moment nearest to `time`, s; raise ParameterError far outside of the run."""
         first, last = float(self.time[0]), float(self.time[-1])
         if not first - self.dt <= time <= last + self.dt:
             wanted = f"a number from {first:g} to {last:g} s"
@@ -225,14 +225,14 @@ class Record(Drawable):
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
     def until(self, time: float) -> Record:
-        """Return the run up to `time`, s, that moment included: the record of a run that was stopped then."""
+        """Return the run up to `time`, s, inclusive; raise ParameterError when that is before it."""
         # half a microsecond forgives the rounding of sums of steps
         if not time >= self.time[0] - 5e-7:
             raise ParameterError(f"time: {shown(time)} s, but a number from {self.time[0]:g} s was wanted")
         return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
 
     def thinned(self, rate: float) -> Record:
-        """Return the record at `rate`, Hz, see `nearest_moments`; 0 leaves the first moment and the last."""
+        """Return the `nearest_moments` at a rate, Hz (0: the ends); raise ParameterError when negative."""
         if not 0.0 <= rate < np.inf:
             raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
         return self._only(nearest_moments(self.time, rate))
@@ -282,7 +282,7 @@ class Record(Drawable):
     def save(
         self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> None:
-        """Write ``record.npz`` and ``run.json`` to a folder, made where missing; each whole or not at all."""
+        """Write ``record.npz`` and ``run.json`` to a folder, each whole or not at all; raise OutputError."""
         folder = Path(folder)
         settle(folder)
         try:
@@ -298,7 +298,7 @@ class Record(Drawable):
 
     @classmethod
     def load(cls, folder: Path | str) -> Record:
-        """Return the record that `save` wrote to `folder`; the controller is not loaded, only named."""
+        """Return the record that `save` wrote, its controller only named; raise InputError on others."""
         folder = Path(folder)
         settle(folder)
         for file in ("run.json", "record.npz"):

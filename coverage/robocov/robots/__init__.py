@@ -182,6 +182,7 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
     """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
 
     What a group leaves open is as in `defaults`, then `Team.homogeneous`; None is a range without limit.
+    Raises InputError with the file, the key, the value and what was wanted.
     """
     path = Path(path)
     where, content = one_line(path), read_bytes(path)
