@@ -146,6 +146,14 @@ class Canvas:
         for k in range(0, sides, 2 if dashed else 1):
             self.line(corners[k], corners[k + 1], colour, width)
 
+    def swatch(self, x: float, y: float, fill: Colour | None, edge: Colour) -> None:
+        """Draw a small square with an edge for the legend, around a pixel."""
+        size = 11 * self.scale
+        box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
+        if fill is not None:
+            pygame.draw.rect(self.surface, fill, box)
+        pygame.draw.rect(self.surface, edge, box, self.width(1.0))
+
     def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
         """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)

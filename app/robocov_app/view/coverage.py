@@ -85,10 +85,7 @@ class Distances(_Picture):
             canvas.surface.blit(_coloured(strip), (round(x - wide / 2), round(y - high / 2)))
 
         def closed(canvas: Canvas, x: float, y: float) -> None:
-            size = round(11 * canvas.scale)
-            box = pygame.Rect(round(x - size / 2), round(y - size / 2), size, size)
-            pygame.draw.rect(canvas.surface, canvas.theme.unreached, box)
-            pygame.draw.rect(canvas.surface, canvas.theme.obstacle_edge, box, canvas.width(1.0))
+            canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
 
         if scene.field is None:
             return []

@@ -126,11 +126,8 @@ class Cells(Layer):
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
-            size = 11 * canvas.scale
-            box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
-            if not self._lines_only(canvas, scene):
-                pygame.draw.rect(canvas.surface, canvas.theme.cell(0), box)
-            pygame.draw.rect(canvas.surface, canvas.theme.cell_edge, box, canvas.width(canvas.theme.line))
+            fill = None if self._lines_only(canvas, scene) else canvas.theme.cell(0)
+            canvas.swatch(x, y, fill, canvas.theme.cell_edge)
 
         return [LegendEntry("Voronoi cell", glyph)] if scene.cells else []
 
@@ -236,10 +233,7 @@ class Obstacles(Layer):
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
-            size = 11 * canvas.scale
-            box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
-            pygame.draw.rect(canvas.surface, canvas.theme.obstacle, box)
-            pygame.draw.rect(canvas.surface, canvas.theme.obstacle_edge, box, canvas.width(1.0))
+            canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 
         found = not scene.environment.blocked.is_empty
         return [LegendEntry("obstacle (unknown to robots)", glyph)] if found else []
