@@ -1,7 +1,6 @@
-"""The range sensor: nearest obstacle point and ray scan, both asked of pymunk.
+"""The range sensor, all that robots know of obstacles by: nearest point and ray scan, both asked of pymunk.
 
-A robot knows of obstacles only what comes out of here. The queries go to a space of their own that
-holds the solid pieces and nothing else, so robots neither hide obstacles nor are taken for some.
+The space that is asked holds no robots that work: they neither hide obstacles nor are taken for some.
 """
 
 from __future__ import annotations

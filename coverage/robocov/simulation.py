@@ -38,10 +38,8 @@ from robocov.world.solid import movers, solid_pieces
 
 DEFAULT_DT = 1 / 60
 """Control period in seconds where nothing else is said."""
-_LARGEST_TEAM = 15
-"""From 16 robots on cells come off a triangulation, and a step of one team alone is as quick."""
-_AT_ONCE = 64
-"""Runs that are moved on together."""
+_LARGEST_TEAM = 15  # from 16 robots on cells come off a triangulation, and a step of one team is as quick
+_AT_ONCE = 64  # runs that are moved on together
 
 
 class Simulation:
@@ -320,10 +318,8 @@ class Simulation:
     ) -> Simulation:
         """Return a simulation that goes on from here with something else; this one stays as it is.
 
-        What the controller remembers is kept as long as neither it nor the number of robots changes; the
-        messages that robots have, as long as neither that number nor the conditions do.
-
-        Raises StartError and ParameterError as `Simulation`; robots may touch.
+        What the controller remembers is kept as long as neither it nor the number of robots changes, messages
+        as long as neither that nor the conditions do. Raises as `Simulation` does; robots may touch.
         """
         twin = Simulation(
             self.environment if environment is None else environment,

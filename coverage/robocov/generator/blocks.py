@@ -80,13 +80,13 @@ def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
         if wide == 0.0:
             return None
         wide = wide / 2.0 if wide > request.step else 0.0
-    trims = [_trim(rng) for _ in cells]
-    for number, cell in enumerate(cells):
-        if not all(_stout(_block(cell, wider, corner, trims[number])) for wider in (narrow, wide)):
-            trims[number] = None
+    trims = [(cell, _trim(rng)) for cell in cells]
+    for number, (cell, trim) in enumerate(trims):
+        if not all(_stout(_block(cell, wider, corner, trim)) for wider in (narrow, wide)):
+            trims[number] = cell, None
 
     def blocks(wider: float) -> tuple[list[Polygon], float]:
-        found = [_block(cell, wider, corner, trim) for cell, trim in zip(cells, trims, strict=True)]
+        found = [_block(cell, wider, corner, trim) for cell, trim in trims]
         return found, sum(block.area for block in found)
 
     if blocks(narrow)[1] < request.blocked:

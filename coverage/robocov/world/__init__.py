@@ -35,8 +35,7 @@ from robocov.world.engine import Engine, State, addresses_of, enter, free_subste
 from robocov.world.relocation import nearest_free
 from robocov.world.solid import Mover, movers, solid_pieces
 
-LONGEST_SUBSTEP = 0.02
-"""Longest substep in seconds."""
+LONGEST_SUBSTEP = 0.02  # s
 MAX_MASS_RATIO = 1000.0
 """Heaviest robot by the lightest; beyond it contacts cannot be resolved."""
 MAX_PENETRATION = 1e-3
@@ -48,23 +47,16 @@ _WALLS = pymunk.ShapeFilter(mask=0b1)
 _NO_WALL = pymunk.ShapeFilter(categories=pymunk.ShapeFilter.ALL_CATEGORIES() & ~0b1)
 _NONE = np.zeros((0, 2))
 
+Robot: TypeAlias = tuple[pymunk.Body, pymunk.Circle]
 Obstacles: TypeAlias = tuple[tuple[Array, ...], tuple[Mover, ...], Array | None]
 """Solid pieces, obstacles that move, robots that have failed: as `World` takes them."""
 
 
 class World:
-    """Bodies of a team among solid pieces.
+    """Bodies of a team, by default at rest, among solid pieces, as of `solid.solid_pieces`.
 
-    Parameters
-    ----------
-    pieces : convex polygons, (k, 2) m each
-        As of `solid.solid_pieces`.
-    positions : (n, 2) m
-    velocities : (n, 2) m/s, at rest by default
-    failed_robots : (w, 3) m or None
-        x, y and radius of robots that have failed, and stand in the way.
-    runs : int
-        In so many worlds at once, each with its part of the robots, which never meet those of the others.
+    Of `failed_robots`, which stand in the way, x, y and radius are given, (w, 3) m. There may be several runs
+    at once, each with an equal part of the robots, which never meet those of the others.
 
     Raises ParameterError when a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
     """
@@ -234,8 +226,7 @@ class ChangingWorld:
     """A world whose robots fail and join: that of those that are there, made anew whenever that changes.
 
     It has a row for every robot that ever is. One that failed is an obstacle from then on; one that has not
-    joined yet is nowhere, its position where it would start, or is to join. To make the world anew changes
-    nothing for the others, which go on the same from their positions and velocities alone.
+    joined yet is nowhere, its position where it would start, or is to join. For the others nothing changes.
     """
 
     def __init__(
@@ -359,9 +350,7 @@ class ContactSolver:
             self._keep_before_walls(pushed, before)
             moved[0, rows] = [body.position for body, _ in pushed]
 
-    def _keep_before_walls(
-        self, robots: list[tuple[pymunk.Body, pymunk.Circle]], before: list[pymunk.Vec2d]
-    ) -> None:
+    def _keep_before_walls(self, robots: list[Robot], before: list[pymunk.Vec2d]) -> None:
         """Leave robots that were pushed into a wall, from some places, in front of the wall."""
         for (body, disc), place in zip(robots, before, strict=True):
             if self._space.segment_query_first(place, body.position, 0.0, _WALLS) is not None:
@@ -390,7 +379,7 @@ def obstacle_space(obstacles: Obstacles) -> pymunk.Space:
     return space
 
 
-def robot_body(mass: float, radius: float) -> tuple[pymunk.Body, pymunk.Circle]:
+def robot_body(mass: float, radius: float) -> Robot:
     """Return a frictionless disc that does not turn."""
     body = pymunk.Body(mass, math.inf)
     disc = pymunk.Circle(body, radius)

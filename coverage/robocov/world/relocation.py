@@ -17,10 +17,7 @@ _ROUNDS = 300  # after so many the robots that push each other are taken to have
 
 
 def relocated(environment: Environment, positions: Array, team: Team) -> Array:
-    """Return places, (n, 2) m, where all robots fit: where they are, unless they do not fit, or are pushed.
-
-    Raises StartError when there is no room; the message names a robot.
-    """
+    """Return places, (n, 2) m, where all robots fit, near where they are; StartError where there is none."""
     places = np.array(positions, dtype=float)
     room = {radius: _room(environment, radius) for radius in np.unique(team.radius).tolist()}
     for radius, inset in room.items():
@@ -51,9 +48,9 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
 def nearest_free(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
-    """Return the place nearest to a point, m, where a robot fits beside others, (n, 2) m, who stay.
+    """Return the place nearest to a point where a robot fits beside others, (n, 2) m, by default of its radius.
 
-    Their radii, (n,) m, are by default the robot's. Raises StartError when there is none.
+    Raises StartError when there is none.
     """
     beside = np.full(len(others), radius) if radii is None else radii
     apart = np.hypot(*(others - point).T)
@@ -73,10 +70,7 @@ def nearest_free(
 def check_starts(
     environment: Environment, positions: Array, team: Team, slack: float, there: BoolArray | None = None
 ) -> None:
-    """Raise StartError when a robot, (n, 2) m, is in a wall or in another one by more than `slack` metres.
-
-    Only those that are `there`, (n,), count; by default all.
-    """
+    """Raise StartError when a robot that is there is in a wall or another one by more than `slack` metres."""
     there = np.ones(len(positions), dtype=bool) if there is None else there
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
         raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
