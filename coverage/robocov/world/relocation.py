@@ -48,7 +48,7 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
 def nearest_free(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
-    """Return the place nearest to a point where a robot fits beside others, (n, 2) m, by default of its radius.
+    """Return the place nearest to a point where a robot fits beside others, (n, 2) m, by default as large.
 
     Raises StartError when there is none.
     """
