@@ -115,7 +115,7 @@ class ArrayCache:
 
     def load(self, key: str) -> dict[str, NDArray[Any]] | None:
         """Return the arrays that were saved under a key, read-only, None if there are none that are whole."""
-        path = self._path(key)
+        path = self.folder / f"{key}{_SUFFIX}"
         # what was written whole can be read, except by a numpy that knows less than the writer's
         with suppress(OSError, InputError):
             if path.stat().st_size > self.limit:
@@ -143,12 +143,9 @@ class ArrayCache:
             return
         with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
-            with written(self._path(key), durable=False) as path:
+            with written(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
                 path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
             self._tidy()
-
-    def _path(self, key: str) -> Path:
-        return self.folder / f"{key}{_SUFFIX}"
 
     def _tidy(self) -> None:
         """Remove what was not used for the longest time beyond the limit, and what was left half-written."""

@@ -120,10 +120,9 @@ def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterat
 
 def _is_at(descriptor: int, path: Path) -> bool:
     """Return whether an open file still has its name, which whoever had the lock before may have removed."""
-    try:
+    with suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), path.lstat())
-    except OSError:
-        return False
+    return False
 
 
 if sys.platform == "win32":
