@@ -12,7 +12,7 @@ from robocov_app.plots.runs import save_figure
 from robocov_app.view.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from matplotlib.axes import Axes
@@ -101,12 +101,8 @@ def _ticks(low: float, high: float) -> list[float]:
     [0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
     """
     for leading in ((1, 2, 5), (1, 3), (1,)):
-        found = [tick for tick in _round_numbers(leading) if low <= tick <= high]
+        numbers = [float(f"{digit}e{power}") for power in range(-4, 6) for digit in leading]
+        found = [tick for tick in numbers if low <= tick <= high]
         if len(found) <= 7:
             break
     return found
-
-
-def _round_numbers(leading: tuple[int, ...]) -> Iterator[float]:
-    for power in range(-4, 6):
-        yield from (float(f"{digit}e{power}") for digit in leading)

@@ -242,11 +242,6 @@ class Episode:
         return self.cycle * self.task.repeat * self.task.dt
 
     @property
-    def snapshot(self) -> Snapshot:
-        """The present state, and what is seen in it."""
-        return self.simulation.snapshot
-
-    @property
     def cycle(self) -> int:
         """How many actions there were."""
         return len(self.trail) - 1
@@ -344,7 +339,7 @@ class Episode:
             seed=self._seed,
             conditions=self.simulation.conditions,
         )
-        for moment in (*self._moments, self.snapshot):
+        for moment in (*self._moments, self.simulation.snapshot):
             recorder.add(moment)
         return recorder.record()
 

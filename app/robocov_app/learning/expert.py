@@ -24,12 +24,6 @@ class ControllerPolicy:
     ``repeat=1`` an episode is the same as a run, bit for bit. Scans that it wants are taken for it, without
     the noise of any conditions.
 
-    Parameters
-    ----------
-    controller : Controller
-
-    Examples
-    --------
     ::
 
         expert = ControllerPolicy(rc.Rapf())
@@ -50,12 +44,7 @@ class ControllerPolicy:
         """Return the actions of a team: by agent for a parallel environment, else (n, 2) N or m/s.
 
         What the controller remembers begins anew with each episode. Asked twice about the same moment it
-        says the same.
-
-        Parameters
-        ----------
-        env : CoverageParallelEnv or CoverageEnv
-            It may be wrapped.
+        says the same. The environment, `CoverageParallelEnv` or `CoverageEnv`, may be wrapped.
         """
         bare = env.unwrapped
         actions = self._decided(bare.episode)
@@ -71,7 +60,7 @@ class ControllerPolicy:
             self._law = informed(self.controller, episode.environment)
             self._memory = self._law.begin(episode.environment.region, episode.team)
         if self._asked_at != episode.cycle or self._actions is None:
-            seen = replace(episode.snapshot.seen, scans=self._scanned(episode))
+            seen = replace(episode.simulation.snapshot.seen, scans=self._scanned(episode))
             decision = self._law.decide(seen, self._memory)
             self._memory, self._asked_at = decision.memory, episode.cycle
             self._actions = actions_of(episode.task.action, decision.forces, seen.velocities, episode.team)

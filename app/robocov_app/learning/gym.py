@@ -49,20 +49,14 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     An episode is truncated after `CoverageTask.duration`, and ends when no robot is left. The same seed and
     actions give the same episode, bit for bit.
 
-    Parameters
-    ----------
-    task : CoverageTask or None
-    render_mode, size, theme
-        See `robocov_app.learning.pictures.Pictures`.
-    scenarios : Scenarios or None
-        Of the task, to be shared by several environments.
-    **changes
-        Of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``.
+    The `changes` are of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``; for `render_mode`,
+    `size` and `theme` see `robocov_app.learning.pictures.Pictures`. Several environments may share the
+    `scenarios` of their task.
 
     Attributes
     ----------
     task : CoverageTask
-    episode : Episode
+    episode : Episode or None
         The present one; None before the first ``reset``.
     place : Place or None
         Where its team is moved together with those of other environments; see `CoverageVectorEnv`.
@@ -137,10 +131,9 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _rows(self) -> Rows:
         episode = self._present()
-        if episode.shared is not None:
-            return episode.observations()
         rows = episode.observations()
-        rows[~episode.working] = 0.0
+        if episode.shared is None:
+            rows[~episode.working] = 0.0
         return rows
 
     def _info(self, contact: Array) -> dict[str, Any]:

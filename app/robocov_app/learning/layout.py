@@ -47,15 +47,8 @@ class ObservationLayout:
     ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
     =============  ==================  =====================================================================
 
-    Attributes
-    ----------
-    neighbours : int
-    rays : int
-        0 for no scan; each one costs a query of the physics.
-    centroid : bool
-        The one number that a robot has to compute of the others: what Lloyd's algorithm steers to.
-
-    Raises ParameterError when a number is out of range.
+    Each ray costs a query of the physics. The centroid is the one number that a robot has to compute of the
+    others: what Lloyd's algorithm steers to. Raises ParameterError when a number is out of range.
 
     Examples
     --------
@@ -140,7 +133,7 @@ class ObservationLayout:
             cells = cells_seen(seen, "distance", None)
             rows[:, places["centroid"]] = (cells.centroid - seen.positions) / unit
         # what is believed of places may be off by more than there is
-        return np.clip(rows, -1.0, 1.0).astype(np.float32)
+        return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
 
 
 def sensing_unit(team: Team, region: Region) -> Array:

@@ -34,25 +34,10 @@ class CoverageParallelEnv(ParallelEnv):
     An episode is truncated after `CoverageTask.duration`. The same seed and actions give the same episode,
     bit for bit; ``reset()`` without a seed goes on with the random numbers.
 
-    Parameters
-    ----------
-    task : CoverageTask or None
-    render_mode, size, theme
-        See `robocov_app.learning.pictures.Pictures`.
-    max_cycles : int or None
-        Actions until an episode is truncated, in place of the task's duration.
-    **changes
-        Of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``.
-
-    Attributes
-    ----------
-    task : CoverageTask
-    episode : Episode
-        The present one; None before the first ``reset``.
-    agents, possible_agents : list of str
-    max_cycles : int
-    state_space : Box
-        Of `state`.
+    The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``; `max_cycles`
+    actions until an episode is truncated are in place of its duration. For `render_mode`, `size` and `theme`
+    see `robocov_app.learning.pictures.Pictures`. `episode` is the present one, None before the first
+    ``reset``; `state_space` is that of `state`.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
@@ -143,13 +128,8 @@ class CoverageParallelEnv(ParallelEnv):
         if over:
             self.agents = []
         self._pictures.shown(episode)
-        return (
-            observations,
-            {agent: rewards[agent] for agent in told},
-            ended,
-            truncated,
-            {agent: infos[agent] for agent in told},
-        )
+        rewards, infos = ({agent: each[agent] for agent in told} for each in (rewards, infos))
+        return observations, rewards, ended, truncated, infos
 
     def state(self) -> Rows:
         """Return where all robots are and how fast, for critics: see `Episode.state`."""

@@ -74,7 +74,7 @@ class Pictures:
         scene = Scene.of(
             episode.environment,
             episode.team,
-            episode.snapshot,
+            episode.simulation.snapshot,
             starts=trail[0],
             trail=trail,
             trail_time=np.arange(float(len(trail))) * episode.task.period,

@@ -58,14 +58,8 @@ class PolicyController:
 
     and ``robocov run rooms --controller mine.py:MyPolicy``.
 
-    Attributes
-    ----------
-    policy : callable or None
-        From an observation, (size,) float32, to an action, (2,) in N or m/s; None where a subclass has `act`.
-    layout : ObservationLayout
-    action : {"force", "velocity"}
-    period : float, s
-        For which an action is held, `CoverageTask.period` in training.
+    `policy` makes an action, (2,) in N or m/s, of an observation, (size,) float32, and is None where a
+    subclass has `act`; `period` is the time for which an action is held, `CoverageTask.period` in training.
 
     Raises ParameterError when an attribute makes no sense, or the policy gives something else than two
     numbers.

@@ -30,14 +30,9 @@ _KEPT = 64
 class GeneratedMaps:
     """Makes a map of a seed by `robocov.generated_map`, to learn on many.
 
-    Attributes
-    ----------
-    kind : str
-        See `robocov.GENERATORS`.
-    seeds : sequence of int or None
-        The maps that there are, as in ``range(1000)``; others can then be kept for the test. None: any.
-    parameters : dict
-        Further ones of `robocov.generated_map`: ``obstacles``, ``area``, ``gap``, ``side``, ...
+    The `seeds` are the maps that there are, as in ``range(1000)``; others can then be kept for the test.
+    None: any. The `parameters` are further ones of `robocov.generated_map`: ``obstacles``, ``area``, ``gap``,
+    ...
 
     Examples
     --------
