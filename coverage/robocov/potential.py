@@ -51,13 +51,9 @@ def potential_forces(
     The parts are the attraction to the goal (27), the sum of (24) over the robots within `rho_0` that it
     hears, and (24) from the closest obstacle point, zero where that is nan.
 
-    Parameters
-    ----------
-    positions, obstacle_points, goals : (n, 2) m
-    reported : (m, 2) m, indptr : (n + 1,), indices : (m,), team : int
-        Who hears whom, and where; as `robocov.voronoi.cells_of` takes them.
-    k_rep, rho_0, k_att, limit : float
-        N m³, m, N/m³ and N; `limit` may be infinite.
+    Places are in metres; `reported`, `indptr`, `indices` and `team`, who hears whom, and where, are as
+    `robocov.voronoi.cells_of` takes them. k_rep, rho_0, k_att and the limit, which may be infinite, are in
+    N m³, m, N/m³ and N.
     """
     n = len(positions)
     forces = np.zeros((4, n, 2))

@@ -1,11 +1,5 @@
 """The density φ: how much each place of the region counts, and its integrals over cells.
 
-    Density
-    ├── Uniform           every place the same
-    ├── Gaussians         hot spots over a floor
-    ├── WeightedPolygons  piecewise constant: rooms that count more, or not at all
-    └── Raster            a picture, piecewise constant or bilinear
-
 Every density integrates over all Voronoi cells at once, in closed form or exactly by quadrature: by the
 divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
 """

@@ -89,15 +89,10 @@ def _moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
 
 
 class Density(ABC):
-    """How much each place counts: φ of equation (4), dimensionless, never negative. Immutable.
-
-    Attributes
-    ----------
-    kind : str
-        As map files call it.
-    """
+    """How much each place counts: φ of equation (4), dimensionless, never negative. Immutable."""
 
     kind: ClassVar[str]
+    """As map files call it."""
 
     @property
     @abstractmethod

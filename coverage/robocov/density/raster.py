@@ -29,21 +29,14 @@ Interpolation: TypeAlias = Literal["cells", "bilinear"]
 
 @dataclass(frozen=True, eq=False)
 class Raster(Density):
-    """A picture of the density. Its integrals are exact.
-
-    Attributes
-    ----------
-    values : (rows, columns)
-        From 0, **the lowest row first**, read-only.
-    extent : (x_min, y_min, x_max, y_max) m
-        What the picture covers. Beyond it, its nearest border counts.
-    interpolation : {"bilinear", "cells"}
-    """
+    """A picture of the density. Its integrals are exact."""
 
     kind: ClassVar[str] = "raster"
 
     values: Array = field(repr=False)
+    """(rows, columns) From 0, **the lowest row first**, read-only."""
     extent: tuple[float, float, float, float]
+    """(x_min, y_min, x_max, y_max) m, what the picture covers. Beyond it, its nearest border counts."""
     interpolation: Interpolation = "bilinear"
 
     def __post_init__(self) -> None:

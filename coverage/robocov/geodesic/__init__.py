@@ -99,16 +99,10 @@ def _corner_links(
 def relax(graph: Graph, distance: Array, ways: IntArray, queue: IntArray, waiting: int) -> None:
     """Lower the distances of the corners from the sources to those by way of other corners.
 
-    Of equally short ways that from the source of lowest number is taken.
-
-    Parameters
-    ----------
-    distance : (k,) grid steps, changed
-        In direct view; inf where there is none.
-    ways : (k, at least 3), changed
-        The source, the corner where the way from it bends first, the corner before this one.
-    queue : (2, k + 1)
-        In the first row `waiting` corners to begin with; of all corners, in the second, whether they wait.
+    Of equally short ways that from the source of lowest number is taken. The distances, (k,) grid steps, are
+    those in direct view, inf where there is none. The ways, (k, at least 3), are the source, the corner where
+    the way from it bends first, and the corner before this one. The queue, (2, k + 1), begins with `waiting`
+    corners in its first row; the second says of all corners whether they wait.
     """
     size = queue.shape[1]
     head, tail = 0, waiting
@@ -175,15 +169,8 @@ class Geodesics:
 
     `beat` is called now and then while what is needed is computed. It may raise, to give up.
 
-    Attributes
-    ----------
-    grid : Grid
-    free : MultiPolygon, walls : Walls
-        In grid coordinates; the free space has one polygon a component.
-    graph : Graph
-    size : float, m
-        Side of the square over the region's bounding box.
-    corners : (k, 2) m
+    The free space, one polygon a component, and the walls are in coordinates of the grid. In metres are the
+    corners, (k, 2), and the size, the side of the square over the region's bounding box.
     """
 
     def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:

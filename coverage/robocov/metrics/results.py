@@ -133,19 +133,16 @@ class Results:
 
     def _repr_html_(self) -> str:
         """Show the first rows in notebooks."""
-        head = self.dataset.head(_SHOWN_ROWS).to_pylist()
-        names = "".join(f"<th>{escape(name)}</th>" for name in self.columns)
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{escape(_cell(row[name]))}</td>" for name in self.columns) + "</tr>"
-            for row in head
-        )
-        count = len(self)
+        head, count = self.dataset.head(_SHOWN_ROWS).to_pylist(), len(self)
+        cells = [[f"<th>{escape(name)}</th>" for name in self.columns]]
+        cells += [[f"<td>{escape(_cell(row[name]))}</td>" for name in self.columns] for row in head]
+        rows = [f"<tr>{''.join(row)}</tr>" for row in cells]
         caption = f"{counted(count, 'run')} of {escape(str(self.folder))}"
         if count > len(head):
             caption += f"; the first {len(head)}"
         return (
             f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
-            f"<thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table></div>"
+            f"<thead>{rows[0]}</thead><tbody>{''.join(rows[1:])}</tbody></table></div>"
         )
 
 

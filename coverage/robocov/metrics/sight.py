@@ -86,10 +86,8 @@ def _meeting(walls: Array, angles: Array) -> Array:
     """Return where rays from the origin at (m,) angles meet the lines of (m, 4) walls, within the walls."""
     x, y, along = np.cos(angles), np.sin(angles), walls[:, 2:] - walls[:, :2]
     across = x * along[:, 1] - y * along[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (walls[:, 0] * y - walls[:, 1] * x) / across
-    s = np.where(np.isfinite(s), np.clip(s, 0.0, 1.0), 0.0)
-    return np.asarray(walls[:, :2] + s[:, None] * along)
+    s = (walls[:, 0] * y - walls[:, 1] * x) / np.where(across == 0.0, np.inf, across)
+    return np.asarray(walls[:, :2] + s.clip(0.0, 1.0)[:, None] * along)
 
 
 class Covered(NamedTuple):

@@ -72,12 +72,13 @@ def partition(
 ) -> VoronoiPartition:
     """Return the Voronoi cells of `generators` within `region`; obstacles play no part.
 
+    Raises InputError when the generators are not (n, 2) finite numbers.
+
     Parameters
     ----------
     generators : (n, 2) m
         They may lie on the region's boundary or outside. Those at the very same place do not cut
         each other: they get the same cell.
-    region : Region
     neighbours : Neighbours or None
         Who hears whom. Cell i is cut only by the bisectors to the robots that i hears, and depends,
         to the last bit, on nothing else. None: everybody hears everybody.
@@ -92,13 +93,6 @@ def partition(
     density : Density or None
         φ of mass, centroid and moments; the cells are the same. None: 1 everywhere.
 
-    Raises
-    ------
-    InputError
-        When the generators are not (n, 2) finite numbers.
-
-    Examples
-    --------
     >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
     >>> halves = partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
     >>> halves.mass, halves.adjacency
@@ -168,23 +162,11 @@ def cells_of(
 ) -> int:  # fmt: skip
     """Compute mass and centroid of all cells; return how many edges they have, or -1 - i for a bad point i.
 
-    Parameters
-    ----------
-    points : (n, 2) m
-    region : (k, 5)
-        As `Region.sides`.
-    heard : (m, 2) m
-        Where robots know those they hear to be; of no length: where they are.
-    indptr : (n + 1,), indices : (m,)
-        Who hears whom; of no length: everybody hears everybody of the same team.
-    team : int
-        Every so many rows make a team.
-    mesh : (2, 8 n + 4), changed
-        As `triangulated` takes it; of no length: without a triangulation.
-    mass : (n,) m², centroid : (n, 2) m, written
-    edges : (e, 6), written
-        x, y, u, v of the ends relative to the generator (m), whose it is, and what is beyond; nothing is
-        written beyond its end.
+    The region is `Region.sides`. Rows `indptr` and `indices` say who hears whom, and `heard`, (m, 2) m, where
+    they know the others to be; arrays of no length stand for everybody of the same team of so many rows, and
+    for where they are. The mesh is as `triangulated` takes it, of no length for none, and is changed. Written
+    are mass, (n,) m², centroid, (n, 2) m, and as many edges, (e, 6), as there is room for: x, y, u, v of the
+    ends relative to the generator (m), whose it is, and what is beyond.
     """
     n = len(points)
     for i in range(n):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
-from robocov.voronoi.arcs import chords, moments, rings
+from robocov.voronoi.weighted_cells import chords, moments, rings
 
 seeds = st.integers(0, 2**32 - 1)
 
