@@ -211,7 +211,7 @@ class World:
         radius, begin = self.team.radius[all_rows], all_rows.start
         resolved = np.zeros(self._each, dtype=bool)
         while True:
-            solver.move(rows, (self.positions, self.velocities, net, self._moving), dt, limit, free)
+            solver.move(rows, (self.positions, self.velocities, net), self._moving, dt, limit, free)
             resolved[rows - begin] = True
             first, second, distance = close_pairs(free[0, all_rows], 2.0 * float(radius.max()))
             reached = resolved[first] & ~resolved[second] & (distance < radius[first] + radius[second])
@@ -330,12 +330,13 @@ class ContactSolver:
         self._robots = list(map(robot_body, team.mass.tolist(), team.radius.tolist()))
         self._members = np.array([addresses_of(body._body, disc._shape) for body, disc in self._robots])
 
-    def move(self, rows: IntArray, now: State, dt: float, limit: Array, moved: Array) -> None:
+    def move(self, rows: IntArray, now: State, motion: Array, dt: float, limit: Array, moved: Array) -> None:
         """Move robots of ascending rows on by `dt` seconds, no faster in the end than (n,) m/s.
 
-        Into `moved`, (2, n, 2), go positions and velocities.
+        The motion of obstacles is (m, 4); into `moved`, (2, n, 2), go positions and velocities.
         """
         buffers, members = self._engine.buffers, self._members
+        self._engine.states[0, : len(motion)] = motion
         speed = enter(buffers, members, rows, now, self._team.mass, dt) + self._mover_speed
         parts = min(_MOST_SUBSTEPS, max(1, math.ceil(speed * dt / self._travel)))
         # what moves may push robots into walls

@@ -35,8 +35,8 @@ _BODIES = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
 Buffers: TypeAlias = tuple[IntArray, IntArray, Array, Array]
 """Addresses, (spaces, 14), of C functions and of what they are called with; how far forces, first, and
 states, fifth, have been gone through, (spaces, 8); the forces and states of an `Engine`."""
-State: TypeAlias = tuple[Array, Array, Array, Array]
-"""Positions and velocities of all robots, net forces on those of a run, motion of the obstacles, (m, 4)."""
+State: TypeAlias = tuple[Array, Array, Array]
+"""Positions and velocities of all robots, net forces on those of a run, (n, 2) each."""
 
 
 class Engine:
@@ -163,13 +163,13 @@ def free_substep(buffers: Buffers, answer: Array, external: Array, dt: float) ->
 def enter(buffers: Buffers, members: IntArray, rows: IntArray, now: State, mass: Array, dt: float) -> float:
     """Add robots to the space of contacts; return the largest speed, in m/s, now or under the net forces."""
     addresses, forces, states = buffers[0], buffers[2][0], buffers[3][0]
-    positions, velocities, net, motion = now
-    square, space, last = 0.0, addresses[0, SPACE], len(motion) + len(rows)
-    begin = rows[0] // len(net) * len(net)
-    states[: len(motion)] = motion
-    states[last] = forces[last] = 0.0
+    positions, velocities, net = now
+    square, space, first = 0.0, addresses[0, SPACE], len(states) - 1 - len(members)
+    begin, last = rows[0] // len(net) * len(net), first + len(rows)
+    for axis in range(2):
+        states[last, axis] = states[last, 2 + axis] = forces[last, axis] = 0.0
     for k in range(len(rows)):
-        row, at, before, after = rows[k], len(motion) + k, 0.0, 0.0
+        row, at, before, after = rows[k], first + k, 0.0, 0.0
         call_c(addresses[0, ADD_BODY], (space, members[row, 0]))
         for axis in range(2):
             speed, force = velocities[row, axis], net[row - begin, axis]
@@ -178,8 +178,8 @@ def enter(buffers: Buffers, members: IntArray, rows: IntArray, now: State, mass:
             before, after = before + speed * speed, after + reached * reached
         square = max(square, before, after)
     transfer(buffers, 0, SET_BODY, STATES)
-    for row in rows:
-        call_c(addresses[0, ADD_SHAPE], (space, members[row, 1]))
+    for k in range(len(rows)):
+        call_c(addresses[0, ADD_SHAPE], (space, members[rows[k], 1]))
     return math.sqrt(square)
 
 
@@ -188,8 +188,8 @@ def leave(buffers: Buffers, members: IntArray, rows: IntArray, limit: Array, mov
     """Read where robots are after contacts, and how fast, and remove them from the space of contacts."""
     addresses, forces, states = buffers[0], buffers[2][0], buffers[3][0]
     space, first = addresses[0, SPACE], len(states) - 1 - len(members)
-    for row in rows:
-        call_c(addresses[0, REMOVE_SHAPE], (space, members[row, 1]))
+    for k in range(len(rows)):
+        call_c(addresses[0, REMOVE_SHAPE], (space, members[rows[k], 1]))
     transfer(buffers, 0, GET_BODY, STATES)
     for k in range(len(rows)):
         # impulses of a contact may exceed what a robot can do by itself
@@ -198,7 +198,8 @@ def leave(buffers: Buffers, members: IntArray, rows: IntArray, limit: Array, mov
             moved[1, rows[k], axis] = states[first + k, 2 + axis] * scale
             forces[first + k, axis] = 0.0
     # what is left is the push out of an overlap that pymunk has decided but not yet applied
-    states[: first + len(rows), 2:] = 0.0
+    for k in range(first + len(rows)):
+        states[k, 2] = states[k, 3] = 0.0
     transfer(buffers, 0, SET_BODY, STATES)
     substeps(buffers, 0, 1, dt)
     transfer(buffers, 0, GET_BODY, STATES)
