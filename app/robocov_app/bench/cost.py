@@ -7,6 +7,7 @@ It is not exact and cannot tell whose a site is. The robots move by up to a quar
 from __future__ import annotations
 
 from functools import partial
+from importlib.util import find_spec
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -25,22 +26,15 @@ LATTICES = (64, 128, 256, 512)
 ROBOTS = (6, 50, 200)
 
 GOALS = {
-    (128, 200, 50): 0.75,
-    (256, 200, 50): 0.45,
-    (512, 200, 50): 0.25,
-    (128, 200, 6): 1.0,
-    (256, 200, 6): 0.65,
-    (512, 200, 6): 0.45,
-    (256, 1000, 50): 0.9,
-}
+    (128, 200, 50): 0.75, (256, 200, 50): 0.45, (512, 200, 50): 0.25, (256, 1000, 50): 0.9,
+    (128, 200, 6): 1.0, (256, 200, 6): 0.65, (512, 200, 6): 0.45,
+}  # fmt: skip
 """Wanted ratios, by lattice, vertices and robots."""
 
 BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
 """Wanted seconds for what is computed once for a map, by lattice and vertices."""
 
 YARDSTICK = "scikit-fmm, order 2"
-
-SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 
 def cases(*, quick: bool = False) -> list[Case]:
@@ -51,11 +45,7 @@ def cases(*, quick: bool = False) -> list[Case]:
 
 def has_yardstick() -> bool:
     """Return whether scikit-fmm is installed."""
-    try:
-        import skfmm  # noqa: F401
-    except ImportError:
-        return False
-    return True
+    return find_spec("skfmm") is not None
 
 
 def random_map(vertices: int, seed: int = 0) -> Environment:
@@ -69,7 +59,7 @@ def random_map(vertices: int, seed: int = 0) -> Environment:
         ring = rng.random(2) + radius * rng.uniform(1.0, 1.5) * steps
         if shapely.Polygon(ring).area > 0.3 * radius**2:
             obstacles.append(PolygonObstacle(tuple((float(x), float(y)) for x, y in ring)))
-    return Environment("random", SQUARE, tuple(obstacles))
+    return Environment("random", ((0, 0), (1, 0), (1, 1), (0, 1)), tuple(obstacles))
 
 
 def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:

@@ -79,10 +79,6 @@ def _travelled(name: str, n: int) -> Record:
 
 def _scene_at(record: Record, k: int) -> Scene:
     """Return what is drawn of moment `k`."""
-    return Scene.of(
-        *(record.environment, record.team, record.snapshot(k)),
-        starts=record.positions[0],
-        trail=record.positions[: k + 1],
-        trail_time=record.time[: k + 1],
-        label=record.label,
-    )
+    drawn = record.environment, record.team, record.snapshot(k)
+    trail, time = record.positions[: k + 1], record.time[: k + 1]
+    return Scene.of(*drawn, starts=trail[0], trail=trail, trail_time=time, label=record.label)

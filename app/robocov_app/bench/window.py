@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pygame
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Parameters, Row
+from robocov_app.bench.measure import Case, Row
 from robocov_app.demo.costs import LATTICE, WorkerCosts
 from robocov_app.demo.desk import Desk
 from robocov_app.demo.opening import display
@@ -26,11 +26,8 @@ if TYPE_CHECKING:
 
 SIZE = (1280, 720)
 
-DRAWING_GOAL = {50: 4e-3}
-"""Wanted seconds for the drawing of a frame, by number of robots."""
-
-FRAME_GOALS = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
-"""Wanted seconds for everything that a frame takes."""
+DRAWING_GOAL, FRAME_GOALS = {50: 4e-3}, {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
+"""Wanted seconds for the drawing of a frame and for everything that it takes, by number of robots."""
 
 LONGEST = 50e-3
 """Seconds that no frame may exceed."""
@@ -58,15 +55,12 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
         finally:
             desk.costs.close()
         bare = _bare(len(frames))
-    size: Parameters = {"robots": n}
-    yardstick = "clear and flip", bare
-    note = f"{answers / seconds:.0f} costs a second"
-    yield Row(
-        "window", "all of a frame", size, median(frames), *yardstick, goal_seconds=FRAME_GOALS[n], note=note
-    )
-    yield Row("window", "drawing", size, median(drawing), *yardstick, goal_seconds=DRAWING_GOAL.get(n))
-    longest = f"of {len(frames)} frames"
-    yield Row("window", "the longest", size, max(frames), *yardstick, goal_seconds=LONGEST, note=longest)
+    for name, took, goal, note in (
+        ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
+        ("drawing", median(drawing), DRAWING_GOAL.get(n), ""),
+        ("the longest", max(frames), LONGEST, f"of {len(frames)} frames"),
+    ):
+        yield Row("window", name, {"robots": n}, took, "clear and flip", bare, goal_seconds=goal, note=note)
 
 
 def _played(window: Window, seconds: float) -> tuple[list[float], list[float], int]:
