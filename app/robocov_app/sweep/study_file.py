@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
 from robocov.errors import InputError, one_line, place, shown, unknown_name
-from robocov.files.strictjson import read_bytes
+from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep.gain_choices import NO_LIMIT, Method, Range, Sampling, Scale, once
 from robocov_app.sweep.study import ALL, MOST_RUNS, Study, StudyMap
@@ -165,16 +164,7 @@ def read_study(path: Path | str) -> Study:
     """
     path = Path(path)
     where = one_line(path)
-    content = read_bytes(path)
-    try:
-        document = tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
-    except ValueError as error:  # of TOML, or of a whole number with thousands of digits
-        raise InputError(f"{where}: not TOML: {_lowered(one_line(error))}") from None
-    except RecursionError:
-        raise InputError(f"{where}: nested too deeply") from None
-    return study_of(document, path.parent, where)
+    return study_of(parse_toml(read_bytes(path), where), path.parent, where)
 
 
 def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
@@ -301,7 +291,3 @@ def _keys(parent: tuple[str | int, ...]) -> list[str]:
     }
     model = tables.get(len(parent), {}).get(parent, RangeModel)
     return list(model.model_fields)
-
-
-def _lowered(text: str) -> str:
-    return text[:1].lower() + text[1:]

@@ -1,6 +1,6 @@
 """JSON as files should be: UTF-8, finite numbers, no key twice, no absurd depth; errors name the place.
 
-Files that robocov wrote itself are read back through models, `Document`.
+TOML files are read as strictly, and those that robocov wrote itself through models, `Document`.
 
 Parsing forgets where values were, so that valid files cost nothing; after an error the text is
 walked again along the path to the place, and what lies beside that path is skipped by the parser.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +22,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from robocov.errors import JsonPath, MapError, Mistake, one_line, place, reason, shown, shown_json
+from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, place, reason, shown, shown_json
 
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 32
@@ -92,6 +93,19 @@ def parse(text: str | bytes, where: str) -> Any:
     except MapError as error:
         raise located(error, text, where) from None
     return value
+
+
+def parse_toml(content: bytes, where: str) -> dict[str, Any]:
+    """Return what a TOML file holds; raise `InputError`, in which the file is called `where`."""
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
+    except ValueError as error:  # of TOML, or of a whole number with thousands of digits
+        text = one_line(error)
+        raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
+    except RecursionError:
+        raise InputError(f"{where}: nested too deeply") from None
 
 
 def located(error: MapError, text: str | bytes, where: str) -> MapError:

@@ -108,6 +108,7 @@ _RING = ("a list of at least 3 points [x, y]", *_POINT)
 _LINE = ("a list of at least 2 points [x, y]", *_POINT)
 _PLACES = ("a list of at least 1 point [x, y]", *_POINT)
 _MATRIX = ("[[xx, xy], [xy, yy]] in m²", "two numbers", "a number from -1e8 to 1e8 (m²)")
+# examples
 _CORNERS = [[1, 1], [2, 1], [2, 3]]
 _YARDS = [[[1.4, 1.2], [1.8, 1.2], [1.8, 2]]]
 _PATH = {"points": [[2, 1], [8, 1]], "speed": 0.5}

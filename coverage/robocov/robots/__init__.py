@@ -14,7 +14,6 @@ Team files, TOML or JSON, list groups of robots that are alike:
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,7 @@ from robocov.errors import (
     shown_json,
     unknown_name,
 )
-from robocov.files.strictjson import parse, read_bytes
+from robocov.files.strictjson import parse, parse_toml, read_bytes
 
 DEFAULT_RADIUS = 0.1
 """Radius of a robot in metres where nothing else is said."""
@@ -186,7 +185,7 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
     """
     path = Path(path)
     where, content = one_line(path), read_bytes(path)
-    document = parse(content, where) if path.suffix.lower() == ".json" else _toml(content, where)
+    document = parse(content, where) if path.suffix.lower() == ".json" else parse_toml(content, where)
     if not isinstance(document, dict):
         raise InputError(f"{where}: {shown(document)}, but an object with a list group was wanted")
     for key in document:
@@ -237,15 +236,3 @@ def _value(name: str, value: object, where: str) -> float | None:
     except ParameterError as error:
         raise InputError(f"{where}: {str(error).partition(': ')[2]}") from None
     return float(value)
-
-
-def _toml(content: bytes, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
-    except ValueError as error:  # of TOML, or of a whole number with thousands of digits
-        text = one_line(error)
-        raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
-    except RecursionError:
-        raise InputError(f"{where}: nested too deeply") from None
