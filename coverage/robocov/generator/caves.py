@@ -22,14 +22,11 @@ from robocov.generator.request import AREA_TOLERANCE, Request
 _WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber
 # steps of the mesh: in the side of a usual chamber, at most in the longer side of the map, but at least
 _FINENESS, _MOST, _COARSEST = 12, 160, 6
-# least thickness of rock at the boundary, in shorter sides of the map; a start's disc keeps more
-_RIM = 0.012
+_RIM = 0.012  # least thickness of rock at the boundary, in shorter sides of the map
 _SHORE, _RAISED = 0.35, 3.0  # belt where rock is likelier, in sides of a usual chamber, and how much
 _HALL, _LOWERED = 0.35, 1.5  # radius around the start where it is less likely, and how much
-# walls are simplified by so much: in sides of a usual chamber, and at most in shorter sides of the map
-_FINE, _FINEST = 0.008, 0.0027
-# least area of a part of the field that becomes a chamber, and of a pillar, in squares of usual chambers
-_CHAMBER, _PILLAR = 0.03, 0.02
+_FINE, _FINEST = 0.008, 0.0027  # walls are simplified by so many sides of a usual chamber, and of the map
+_CHAMBER, _PILLAR = 0.03, 0.02  # least areas of a chamber, and of a pillar, in squares of usual chambers
 _SPIKE = 0.05  # spikes of rock of half that thickness are rounded off, in sides of a usual chamber
 _BEND = 0.25  # tunnels bend by at most so much of their length
 _USUAL, _WIDEST = 1.2, 2.0  # radius by which the level is chosen, and the largest, in the least ones

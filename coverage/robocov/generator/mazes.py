@@ -27,8 +27,7 @@ from robocov.generator.request import AREA_TOLERANCE, Request
 Cell: TypeAlias = tuple[int, int]
 Post: TypeAlias = tuple[int, int]
 
-# what cells that are longer than wide count, against a number of cells that is not the one asked for
-_OBLONG = 0.5
+_OBLONG = 0.5  # what oblong cells count, against a number of cells that is not the one asked for
 _NEWEST = 0.6, 0.98  # least and largest chance with which a maze grows from its newest cell
 # least and largest part of the walls that are opened, and the most where the blocked area wants it
 _OPENED, _MOST_OPENED = (0.04, 0.12), 0.4

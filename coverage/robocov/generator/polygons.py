@@ -15,13 +15,11 @@ MIX = {"convex": 0.6, "L": 0.2, "U": 0.2}
 """Chances of the shapes. A U that would be too narrow for the gap becomes an L."""
 
 _SPREAD = 0.5, 1.5  # least and largest area of an obstacle, as parts of the mean
-# part of the map that obstacles fill at most, with the gaps around them counted half: more find no place
-_DENSEST = 0.7
+_DENSEST = 0.7  # part of the map that obstacles fill at most, with the gaps around them counted half
 _MOVES = 12  # obstacles that are moved so that others find a place, before that is given up
 _OUTLINES, _PLACES = 8, 128  # outlines that are tried for one obstacle, and places for each of them
 _REDRAWS = 8  # draws of a shape that is better than the first, or possible at all
-# least area of a convex polygon in parts of a circle of the same length; a regular triangle has 0.6
-_ROUND = 0.52
+_ROUND = 0.52  # least area of a convex polygon, in circles of the same length; a regular triangle has 0.6
 
 
 def scattered(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:

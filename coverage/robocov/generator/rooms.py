@@ -24,15 +24,12 @@ _LOOPS = 0.3  # chance of a door that is not needed
 _STUB = 0.05  # least length of a piece of wall beside a door, in sides of a usual room
 # part of the blocked area that walls take: the least, the most, and the most where rooms are small
 _WALLS = 0.3, 0.5, 0.9
-# sides of usual rooms that are small, and very small, in gaps: furniture finds less and less room there
-_SMALL, _SMALLEST = 6.0, 3.0
-# length of the walls of a room, about, in its sides: without doors, each wall counted half for each room
-_LENGTH = 1.5
+_SMALL, _SMALLEST = 6.0, 3.0  # sides of usual rooms with little, and very little, room for furniture, in gaps
+_LENGTH = 1.5  # of the walls of a room without doors, in its sides, each wall counted half for each room
 _THICKEST = 0.06  # largest thickness of walls, in sides of a usual room
 _PIECES = 2.2  # pieces of furniture in a room, on average
 _TRIES = 32  # places that are tried for one piece, and pieces in a row that find none before that is given up
-# each piece that finds no place makes the next smaller by this factor, down to the smallest
-_SHRINKING, _SHRUNK = 0.92, 0.2
+_SHRINKING, _SHRUNK = 0.92, 0.2  # a piece that finds no place makes the next so much smaller; the smallest
 _DENSEST = 0.35  # part of the rooms that furniture fills at most: more finds no place
 _ENOUGH = 0.001  # what is left to be blocked, as a part of the map, which is too little for a piece
 
