@@ -21,7 +21,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.compiled import inner_kernel, kernel
 from robocov.density import Density
 from robocov.errors import ParameterError, unknown_name
-from robocov.locational.cost import Distance, Performance, Sensing, SquaredDistance, derivatives
+from robocov.locational import Distance, Performance, Sensing, SquaredDistance, derivatives
 from robocov.observation import Cells
 
 TARGETS = ("centroid", "sensing", "median")

@@ -14,8 +14,15 @@ from voronoi_cases import PENTAGON, REGIONS, names, performance, scattered, seed
 
 from robocov.density.base import CellEdges
 from robocov.errors import ParameterError
-from robocov.locational import Distance, Performance, Sensing, SquaredDistance, gradient, value
-from robocov.locational.cost import derivatives
+from robocov.locational import (
+    Distance,
+    Performance,
+    Sensing,
+    SquaredDistance,
+    derivatives,
+    gradient,
+    value,
+)
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
