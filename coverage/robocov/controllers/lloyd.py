@@ -11,7 +11,7 @@ from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations
-from robocov.voronoi.disc_cells import disc_limited, disc_polygons
+from robocov.voronoi import disc_limited, disc_polygons
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class RangeLimited(Law):
     interactions). Where everybody's cell lies within r/2 it is Lloyd's algorithm.
 
     The centroid is exact with density 1; another density is integrated over a polygon, whose chords
-    stand for the arcs (see `robocov.voronoi.disc_cells`).
+    stand for the arcs (see `robocov.voronoi`).
 
     Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text: cells,
     cost and gradient. Decided here: that the motion is Lloyd's, straight to the centroid with the limits of

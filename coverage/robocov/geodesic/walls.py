@@ -158,9 +158,8 @@ def along_z_curve(column: IntArray, row: IntArray) -> IntArray:
 
 def _neighbours_together(points: Array) -> IntArray:
     """Return an order of (n, 2) points."""
-    return np.argsort(
-        along_z_curve(*(points * 2.0 ** (16 - BITS)).clip(0, 65535).astype(np.int64).T), kind="stable"
-    )
+    column, row = (points * 2.0 ** (16 - BITS)).clip(0, 65535).astype(np.int64).T
+    return np.argsort(along_z_curve(column, row), kind="stable")
 
 
 def box_tree(low: Array, high: Array) -> Array:

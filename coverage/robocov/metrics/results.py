@@ -108,12 +108,10 @@ class Results:
         return read_history(self._folder_of(run) / "cost.csv")
 
     def _known(self, columns: Sequence[str] | None) -> list[str] | None:
-        if columns is None:
-            return None
-        for name in columns:
+        for name in columns or ():
             if name not in self.columns:
                 raise InputError(f"{self.folder}: {unknown_name('column', name, self.columns)}")
-        return list(columns)
+        return None if columns is None else list(columns)
 
     def _folder_of(self, run: str | int | Mapping[str, Any]) -> Path:
         if isinstance(run, int | np.integer):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -102,7 +103,6 @@ def run_metrics(
     moments = nearest_moments(record.time, rate)
     team, working = record.team, record.working
     since = np.concatenate([[0], moments[:-1] + 1])
-    work, effort, way = _integrals(record)
     areas, graphs = [], []
     for k in moments.tolist():
         some = np.flatnonzero(working[k])
@@ -112,22 +112,12 @@ def run_metrics(
         graphs.append(connections(places, team.communication_range[some]))
         if on_sample is not None:
             on_sample()
-    sensed, within, visible = np.array(areas).T
     parts, connectivity = np.array(graphs).T
-    return RunMetrics(
-        time=record.time[moments],
-        sensed_area=sensed,
-        range_area=within,
-        visible_area=visible,
-        work=work[moments],
-        effort=effort[moments],
-        path_length=way[moments],
-        components=parts.astype(np.intp),
-        algebraic_connectivity=connectivity,
-        wall_clearance=np.minimum.reduceat(clearances(record).min(axis=1), since),
-        robot_clearance=np.minimum.reduceat(robot_gaps(record)[0], since),
-        free_area=float(record.environment.free_area),
-    )
+    gaps = clearances(record).min(axis=1), robot_gaps(record)[0]
+    # in the order of the class
+    columns: list[Any] = [record.time[moments], *np.array(areas).T, *_integrals(record)[:, moments]]
+    columns += [parts.astype(np.intp), connectivity, *(np.minimum.reduceat(gap, since) for gap in gaps)]
+    return RunMetrics(*columns, float(record.environment.free_area))
 
 
 def connections(places: Array, ranges: Array) -> tuple[int, float]:
@@ -173,8 +163,8 @@ def figures_of(record: Record, history: CostHistory) -> Mapping[str, float | Non
     return {**run_metrics(record, 0.0).final(), "near_final_s": time_near_final(history)}
 
 
-def _integrals(record: Record) -> tuple[Array, Array, Array]:
-    """Return work, effort and mean way from the first moment to each one, (T,)."""
+def _integrals(record: Record) -> Array:
+    """Return work, effort and mean way from the first moment to each one, (3, T)."""
     forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     square = (forces**2).sum(axis=(1, 2))
@@ -182,5 +172,4 @@ def _integrals(record: Record) -> tuple[Array, Array, Array]:
     moved = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1)).mean(axis=1)
     # the force holds until the next moment; what it does meanwhile, by the trapezoidal rule
     parts = 0.5 * (power[1:] + power[:-1]) * step, square[:-1] * step, moved
-    work, effort, way = (np.concatenate([[0.0], np.cumsum(part)]) for part in parts)
-    return work, effort, way
+    return np.array([np.concatenate([[0.0], np.cumsum(part)]) for part in parts])

@@ -65,8 +65,8 @@ class Region:
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y in metres."""
-        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
-        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+        low_x, low_y, high_x, high_y = self.polygon.bounds
+        return low_x, low_y, high_x, high_y
 
     @cached_property
     def diameter(self) -> float:

@@ -14,8 +14,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov.voronoi import partition
-from robocov.voronoi.disc_cells import disc_limited, disc_polygons
+from robocov.voronoi import disc_limited, disc_polygons, partition
 
 REGION = Region(np.array([[0.0, 0.0], [11.0, -1.0], [12.0, 8.0], [3.0, 10.0]]))
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
