@@ -117,7 +117,8 @@ def run_metrics(
     # in the order of the class
     columns: list[Any] = [record.time[moments], *np.array(areas).T, *_integrals(record)[:, moments]]
     columns += [parts.astype(np.intp), connectivity, *(np.minimum.reduceat(gap, since) for gap in gaps)]
-    return RunMetrics(*columns, float(record.environment.free_area))
+    columns.append(float(record.environment.free_area))
+    return RunMetrics(*columns)
 
 
 def connections(places: Array, ranges: Array) -> tuple[int, float]:
