@@ -25,7 +25,7 @@ from robocov_app.learning.episode import (
     checked_actions,
     drawn_episode,
 )
-from robocov_app.learning.pictures import FRAMES_PER_SECOND, RENDER_MODES, Pictures
+from robocov_app.learning.pictures import METADATA, Pictures
 from robocov_app.learning.scenarios import Scenarios
 from robocov_app.learning.task import CoverageTask, changed_task
 
@@ -66,10 +66,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": FRAMES_PER_SECOND,
-    }
+    metadata: ClassVar[dict[str, Any]] = dict(METADATA)  # type: ignore[misc]
 
     def __init__(
         self,
@@ -99,6 +96,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[Rows, dict[str, Any]]:
         """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
         super().reset(seed=seed)
+        self.outcome = None
         self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
         self._pictures.shown(self.episode)
         info = self._info(np.zeros(self.task.robots))

@@ -12,7 +12,7 @@ from pettingzoo import ParallelEnv
 from robocov.errors import ParameterError, RobocovError, shown
 from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import Episode, drawn_episode
-from robocov_app.learning.pictures import FRAMES_PER_SECOND, RENDER_MODES, Pictures
+from robocov_app.learning.pictures import METADATA, Pictures
 from robocov_app.learning.scenarios import Scenarios
 from robocov_app.learning.task import CoverageTask, changed_task
 
@@ -43,9 +43,8 @@ class CoverageParallelEnv(ParallelEnv):
     """
 
     metadata: ClassVar[dict[str, Any]] = {
+        **METADATA,
         "name": "robocov_coverage_v0",
-        "render_modes": list(RENDER_MODES),
-        "render_fps": FRAMES_PER_SECOND,
         "is_parallelizable": True,
     }
 

@@ -17,8 +17,8 @@ RENDER_MODES = ("rgb_array", "human")
 
 _THEMES = ("light", "dark")
 
-FRAMES_PER_SECOND = 10
-"""Of films of the usual task, one picture for each action."""
+# of films of the usual task, one picture for each action
+METADATA = {"render_modes": list(RENDER_MODES), "render_fps": 10}
 
 
 class Pictures:
