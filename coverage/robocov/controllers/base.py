@@ -70,7 +70,7 @@ def information_of(controller: Any) -> Information:
 
 
 def informed(controller: Controller, environment: Environment) -> Controller:
-    """Return the controller, told the map if it goes by it; a ParameterError if it asks, unannounced."""
+    """Return the controller, told the map if it goes by it; a ParameterError if it asks without saying so."""
     information, tell = information_of(controller), getattr(controller, "informed", None)
     if tell is None:
         return controller

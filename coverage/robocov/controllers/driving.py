@@ -25,7 +25,7 @@ def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -
 
 
 def last_returns(seen: Observations, before: Array | None) -> Array | None:
-    """Return the points that each robot's last scan met, (n, rays, 2) m, or nan; else those `before`."""
+    """Return the points that the last scans met, (n, rays, 2) m, nan for none; between scans `before`."""
     scans = seen.scans
     if scans is None:
         return before
