@@ -52,7 +52,7 @@ class Mistake(NamedTuple):
         return cls(path, f"{place(path)}: {what}" if path else what, at_key)
 
     def told(self, where: str) -> str:
-        """Return its message; terminals make a link of ``mine.json:14:9: ...``, as of compilers'."""
+        """Return its message, which begins as compilers' do, ``mine.json:14:9: ...``: terminals link that."""
         return f"{where}{'' if self.line is None else f':{self.line}:{self.column}'}: {self.text}"
 
 
