@@ -212,6 +212,7 @@ class _KernelCache:
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for the types of the arguments, None where it is to be compiled."""
         target_context.refresh()
+        self._held.close()  # of an attempt that failed
         key = self._key(sig, target_context.codegen())
         found = self._loaded(key, target_context)
         if found is None:

@@ -64,6 +64,15 @@ class Simulation:
 
     Raises StartError when a robot would start in a wall or in another robot, ParameterError when dt is out of
     range, or team and starts differ in size.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> simulation = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0))
+    >>> simulation.step()
+    >>> simulation.positions.shape
+    (6, 2)
     """
 
     def __init__(
@@ -397,4 +406,4 @@ def example() -> None:
     starts = np.array([[0.4, 0.4], [0.4, 0.8], [0.8, 0.4], [2.5, 0.5]])
     simulation = Simulation(Environment("example", square, (triangle,)), Rapf(), starts)
     for _ in range(3):
-        simulation.step()
+        simulation.step(np.full((4, 2), -1000.0))  # against the walls

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robocov import compiled
 from robocov.compiled import _KernelCache, compile_kernels, kernel, on_compile
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
@@ -148,3 +150,17 @@ with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
 print("numba" in sys.modules)
 """
     assert said(os.environ["NUMBA_CACHE_DIR"], script=script)[-1] == "False"
+
+
+@pytest.mark.timeout(60)
+def test_a_kernel_that_cannot_be_compiled_says_so_each_time(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiled, "_PATIENCE", math.inf)
+
+    @kernel
+    def missing(x):
+        return x + nowhere  # noqa: F821
+
+    for _ in range(2):  # the first attempt leaves no lock behind
+        with pytest.raises(Exception, match="nowhere"):
+            missing(1.0)
