@@ -167,7 +167,8 @@ def _shortest(
 class Geodesics:
     """The shortest paths of one environment; immutable.
 
-    `beat` is called now and then while what is needed is computed. It may raise, to give up.
+    `beat` is called now and then while what is needed is computed. It may raise, to give up. Points that are
+    not in the free space are refused, see `place`.
 
     The free space, one polygon a component, and the walls are in coordinates of the grid. In metres are the
     corners, (k, 2), and the size, the side of the square over the region's bounding box.
@@ -279,10 +280,7 @@ class Geodesics:
         return self.with_room(n, BINS, fill)[0], distance, ways
 
     def distances(self, sources: Array, targets: Array) -> Array:
-        """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads.
-
-        Raises InputError when a point lies outside the free space.
-        """
+        """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads."""
         begins, _ = self.place(sources, "sources")
         ends, _ = self.place(targets, "targets")
         index, reach, _ = self._to_corners(begins, bends=True)
@@ -295,10 +293,7 @@ class Geodesics:
         return table
 
     def path(self, source: Array, target: Array) -> Array:
-        """Return the way-points of a shortest path, (w, 2) m, both ends included; (0, 2) where none leads.
-
-        Raises InputError when an end lies outside the free space.
-        """
+        """Return the way-points of a shortest path, (w, 2) m, both ends included; (0, 2) where none leads."""
         ends, _ = self.place(np.stack([source, target]), "ends of the path")
         index, reach, ways = self._to_corners(ends[:1], bends=True)
         last, shortest = self._to_corners(ends[1:], bends=False)[1], np.empty((1, 1))

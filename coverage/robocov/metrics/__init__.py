@@ -18,11 +18,8 @@ from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
 
-SETTLED_WINDOW = 4.0
-"""Seconds over which a robot at rest must not get anywhere."""
-
-SETTLED_DISTANCE = 0.05
-"""Metres that a robot at rest may get in `SETTLED_WINDOW`."""
+SETTLED_WINDOW, SETTLED_DISTANCE = 4.0, 0.05
+"""Seconds over which a robot at rest must not get anywhere, and metres that it may get in these."""
 
 TOUCHING = 1e-3
 """Gap in metres below which two bodies are in contact."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,6 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import pyarrow as pa
     from pandas import DataFrame
     from pyarrow.compute import Expression
@@ -92,8 +90,7 @@ class Results:
         """Return the rows of the runs that failed, as dicts by column; why is in ``error``."""
         from pyarrow.compute import field
 
-        rows: list[dict[str, Any]] = self.to_table(filter=field("error").is_valid()).to_pylist()
-        return rows
+        return list(self.to_table(filter=field("error").is_valid()).to_pylist())
 
     def record(self, run: str | int | Mapping[str, Any]) -> Record:
         """Return the record of a run; its moments are as far apart as the study wanted it.
@@ -224,6 +221,4 @@ def _reason(path: Path) -> str:
 
 
 def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.density.base import CellEdges, Density
+from robocov.density.base import CellEdges, Density, Uniform
 from robocov.errors import ParameterError, checked, counted, shown
 from robocov.observation.neighbours import Neighbours, close_pairs
 from robocov.observation.region import Region
@@ -222,9 +222,7 @@ class Cells(ABC):
     @cached_property
     def polar_moment(self) -> Array:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moments of the cells about their generators."""
-        if self.density is not None:
-            return self.density.moments(self.edges, self.generators)[:, 3]
-        return self.edges.moments(len(self.generators))[:, 3]
+        return (self.density or Uniform()).moments(self.edges, self.generators)[:, 3]
 
     @property
     def polar_moment_about_centroid(self) -> Array:
@@ -239,8 +237,9 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
     Raises ParameterError when it is no decision, or its forces are not finite and (n, 2).
     """
     if not isinstance(made, Decision):
-        wanted = "but a Decision was wanted"
-        raise ParameterError(f"controller {controller!r}: decide gave {shown(made)}, {wanted}")
+        raise ParameterError(
+            f"controller {controller!r}: decide gave {shown(made)}, but a Decision was wanted"
+        )
     decision: Decision = made
     forces = _rows(decision.forces, count, "forces", controller)
     goals = None if decision.goals is None else _rows(decision.goals, count, "goals", controller)

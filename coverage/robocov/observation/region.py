@@ -15,10 +15,7 @@ from robocov.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A convex polygon with what the control laws need of it, computed once.
-
-    Raises InputError when the hull of the vertices has no area.
-    """
+    """A convex polygon with what the control laws need of it, computed once; an InputError without area."""
 
     vertices: Array
     """(k, 2) m, counter-clockwise, no three collinear, the first not repeated."""

@@ -24,8 +24,6 @@ from robocov.observation.neighbours import NOBODY, Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi.delaunay import Mesh, before, following, triangulated
 
-__all__ = ["VoronoiPartition", "partition"]
-
 _TRIANGULATE_FROM = 16
 """Size of team from which a triangulation is quicker than clipping by everybody."""
 

@@ -55,11 +55,9 @@ _SERIES_BELOW = 0.04
 _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
 """Of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
-_SAGITTA = 2e-4
-"""How far the outlines of cells may leave their arcs, relative to the region's diameter."""
-
-_FINE = 2e-5
-"""The same where polygons stand for cells in integrals."""
+_SAGITTA, _FINE = 2e-4, 2e-5
+"""How far outlines, and the polygons that stand for cells in integrals, may leave their arcs, relative to the
+region's diameter."""
 
 _NOTHING = 1e-14
 """Area of a cell, relative to the region's, that is rounding."""
