@@ -59,8 +59,8 @@ def test_top_level() -> None:
 def test_the_tests_of_the_library_stand_in_the_folders_of_its_packages() -> None:
     tested = {path.parent.name for path in (ROOT / "tests/robocov").glob("*/test_*.py")}
     packages = {path.parent.name for path in (ROOT / "coverage/robocov").glob("*/__init__.py")}
-    assert tested == packages
     flat = {path.stem for path in (ROOT / "coverage/robocov").glob("*.py")}
+    assert packages <= tested <= packages | flat
     loose = {path.stem.removeprefix("test_") for path in (ROOT / "tests/robocov").glob("test_*.py")}
     assert loose - flat == {"errata"}, "tests beside the packages that belong into them"
 
