@@ -115,9 +115,10 @@ class Observations:
 
     def neighbour_positions(self, robot: int) -> Array:
         """Return where a robot knows its neighbours to be, (k, 2) m, in the order of ``neighbours.of``."""
-        if self.reported_positions is None:
+        if self.reported_positions is None or self.neighbours.indptr is None:
             return self.positions[self.neighbours.of(robot)]
-        return self.reported_positions[self.neighbours.row(robot)]
+        begin, end = self.neighbours.indptr[robot : robot + 2]
+        return self.reported_positions[begin:end]
 
     def neighbours_within(self, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
         """Return the directed pairs of neighbours that are at most `reach` metres apart, for all they know.
@@ -237,9 +238,8 @@ def checked_decision(made: Any, count: int, controller: str, time: float) -> Dec
     Raises ParameterError when it is no decision, or its forces are not finite and (n, 2).
     """
     if not isinstance(made, Decision):
-        raise ParameterError(
-            f"controller {controller!r}: decide gave {shown(made)}, but a Decision was wanted"
-        )
+        gave = f"decide gave {shown(made)}, but a Decision was wanted"
+        raise ParameterError(f"controller {controller!r}: {gave}")
     decision: Decision = made
     forces = _rows(decision.forces, count, "forces", controller)
     goals = None if decision.goals is None else _rows(decision.goals, count, "goals", controller)

@@ -70,11 +70,6 @@ class Neighbours:
             return np.delete(np.arange(self.count), robot)
         return self.indices[self.indptr[robot] : self.indptr[robot + 1]]
 
-    def row(self, robot: int) -> slice:
-        """Return where in `indices` the robots are that `robot` hears; not of the complete graph."""
-        assert self.indptr is not None
-        return slice(int(self.indptr[robot]), int(self.indptr[robot + 1]))
-
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Return all directed pairs (robot, neighbour), (m,) each, in the order of the rows."""
         if self.indptr is None or self.indices is None:
