@@ -132,7 +132,14 @@ class Kernel:
     @cached_property
     def _dispatcher(self) -> Any:
         dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True, **self._options)
-        dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
+        cache = dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
+        compiling = dispatcher.compile
+
+        def released(types: Any) -> Any:
+            with cache.held:  # until it is saved, or has failed
+                return compiling(types)
+
+        dispatcher.compile = released
         array, typeof = _numba().types.Array, dispatcher.typeof_pyval
 
         def without_flags(value: Any) -> Any:
@@ -202,7 +209,7 @@ class _KernelCache:
 
     def __init__(self, name: str, identity: str) -> None:
         self._name, self._identity = name, identity
-        folder, self._held = _cache_folder(), ExitStack()
+        folder, self.held = _cache_folder(), ExitStack()
         self._cache = None if folder is None else ArrayCache(folder, _LIMIT)
 
     def _key(self, sig: Any, codegen: Any) -> str:
@@ -212,7 +219,6 @@ class _KernelCache:
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for the types of the arguments, None where it is to be compiled."""
         target_context.refresh()
-        self._held.close()  # of an attempt that failed
         key = self._key(sig, target_context.codegen())
         found = self._loaded(key, target_context)
         if found is None:
@@ -222,7 +228,7 @@ class _KernelCache:
         if found is None and gc.isenabled():
             # a tenth of the time, for next to no garbage
             gc.disable()
-            self._held.callback(gc.enable)
+            self.held.callback(gc.enable)
         return found
 
     def _awaited(self, key: str, target_context: Any) -> Any:
@@ -237,14 +243,12 @@ class _KernelCache:
         until = time.monotonic() + _PATIENCE
         while time.monotonic() < until:
             try:
-                self._held.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
+                self.held.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
             except OutputError:
                 time.sleep(0.02)
                 continue
             # it may have been saved just before
-            if found := self._loaded(key, target_context):
-                self._held.close()
-            return found
+            return self._loaded(key, target_context)
         return None
 
     def _loaded(self, key: str, target_context: Any) -> Any:
@@ -262,7 +266,6 @@ class _KernelCache:
         if self._cache is not None:
             code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
             self._cache.save(self._key(sig, result.codegen), {"code": code})
-        self._held.close()
 
 
 def _cache_folder() -> Path | None:

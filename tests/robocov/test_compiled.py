@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import math
 import os
 import subprocess
@@ -164,3 +165,4 @@ def test_a_kernel_that_cannot_be_compiled_says_so_each_time(monkeypatch, tmp_pat
     for _ in range(2):  # the first attempt leaves no lock behind
         with pytest.raises(Exception, match="nowhere"):
             missing(1.0)
+        assert gc.isenabled()
