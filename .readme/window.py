@@ -13,16 +13,16 @@ import pygame
 from PIL import Image
 
 from robocov.mapfile import load_map, map_file
-from robocov_app.demo.film import pixels
-from robocov_app.demo.opening import HEADLESS_FPS, Opening
-from robocov_app.demo.scenario import Law, Scenario
-from robocov_app.demo.session import Session
-from robocov_app.editor.adding import rectangle_drawn
-from robocov_app.editor.opening import EditorOpening
+from robocov_app.editor.edits.adding import rectangle_drawn
+from robocov_app.editor.ui.opening import EditorOpening
+from robocov_app.viewer.film import pixels
+from robocov_app.viewer.opening import HEADLESS_FPS, Opening
+from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
-    from robocov_app.demo.window import Window
-    from robocov_app.editor.window import EditorWindow
+    from robocov_app.editor.ui.window import EditorWindow
+    from robocov_app.viewer.window import Window
 
 HERE = Path(__file__).parent
 SIZE = (1280, 720)

@@ -17,7 +17,7 @@ from robocov.environment import (
     UniformStart,
     WallObstacle,
 )
-from robocov_app import progress
+from robocov_app.terminal import progress
 
 # no test finds, or leaves, anything in the cache of whoever runs it
 os.environ["ROBOCOV_CACHE"] = ""

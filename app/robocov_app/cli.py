@@ -93,11 +93,11 @@ def _guarded(name: str, rest: list[str]) -> int:
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         with _stopping_at_once():
             module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-            from robocov_app.arguments import parsed
+            from robocov_app.terminal.arguments import parsed
 
             options = parsed(module.Arguments, name, rest)
         if name in _COMPILING:
-            from robocov_app.progress import tell_of_compiling
+            from robocov_app.terminal.progress import tell_of_compiling
 
             tell_of_compiling()
         status = module.command(options)

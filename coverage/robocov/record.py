@@ -90,7 +90,7 @@ class _Touch(Document):
 
 
 class _Session(Document):
-    """See `robocov_app.demo.kept`."""
+    """See `robocov_app.viewer.session.kept`."""
 
     began_at_s: Time = 0.0
     start_velocities_m_per_s: list[Point] = Field([])
@@ -138,7 +138,7 @@ class Record(Drawable):
     goals, obstacle_points : (T, n, 2) m
         nan where none; the nearest obstacle point that each robot sensed.
     session : dict
-        Where a run comes from that is a part of a session in the window; see `robocov_app.demo.kept`.
+        Where a run comes from that is a part of a session in the window.
     """
 
     _drawn_as = "record"

@@ -14,13 +14,13 @@ import numpy as np
 
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
-from robocov_app.demo.costs import DirectCosts
-from robocov_app.demo.desk import Desk
-from robocov_app.demo.opening import display
-from robocov_app.demo.scenario import Law, Scenario
-from robocov_app.demo.session import Session
-from robocov_app.demo.window import FPS, Window
-from robocov_app.view.picture import standard_layers
+from robocov_app.render.picture import standard_layers
+from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.opening import display
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window import FPS, Window
 
 WARM = 10
 """Minutes until all that is kept is there."""

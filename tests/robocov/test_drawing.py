@@ -62,7 +62,7 @@ def record(empty: Environment) -> Record:
 
 
 def test_the_application_is_installed_as_the_backend() -> None:
-    assert drawing_backend().__name__ == "robocov_app.drawing_backend"  # type: ignore[attr-defined]
+    assert drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
     assert drawing_backend("matplotlib") is drawing_backend()
     wanted = list(drawing.DrawingBackend.__annotations__)
     assert len(wanted) == 8
@@ -72,7 +72,7 @@ def test_the_application_is_installed_as_the_backend() -> None:
 def test_another_backend_is_asked_for_by_name(
     monkeypatch: pytest.MonkeyPatch, sketches: Sketches, record: Record, empty: Environment
 ) -> None:
-    offering(monkeypatch, matplotlib="robocov_app.drawing_backend", sketches="sketches")
+    offering(monkeypatch, matplotlib="robocov_app.notebook", sketches="sketches")
     cost = CoverageCost(empty, 8)
     result, history = cost(record.positions[-1]), cost_history(record, cost, 2.0)
     for thing, name in (

@@ -3,8 +3,8 @@
 import numpy as np
 import shapely
 
-from robocov_app.view.picture import Painter
-from robocov_app.view.theme import LIGHT
+from robocov_app.render.picture import Painter
+from robocov_app.render.theme import LIGHT
 
 SIZE = (640, 480)
 ONE = np.array([[4.0, 4.0]])

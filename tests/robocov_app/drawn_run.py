@@ -15,7 +15,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.voronoi import partition
-from robocov_app.view.scene import Scene
+from robocov_app.render.scene import Scene
 
 ROOMS = Environment(
     "rooms",

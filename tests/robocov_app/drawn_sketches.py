@@ -11,10 +11,10 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor import arranging, booleans, clipboard, edits, simplifying, vertices
-from robocov_app.editor.background import Background
-from robocov_app.editor.document import BOUNDARY, Item, Sketch
-from robocov_app.editor.selection import Edge, Selection, points_of, rings_of
+from robocov_app.editor.edits import arranging, booleans, clipboard, edits, simplifying, vertices
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.document import BOUNDARY, Item, Sketch
+from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 

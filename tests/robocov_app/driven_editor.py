@@ -12,14 +12,14 @@ import pygame
 from driven_window import MODIFIERS, Driver
 
 from robocov.mapfile import load_map
-from robocov_app.demo.opening import display
-from robocov_app.editor.desk import Desk
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.opening import DirectReadings
-from robocov_app.editor.paper import FIRST_SHEET, Paper
-from robocov_app.editor.pasteboard import OwnPasteboard
-from robocov_app.editor.selection import Selection
-from robocov_app.editor.window import EditorWindow
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.paper import FIRST_SHEET, Paper
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.ui.opening import DirectReadings
+from robocov_app.editor.ui.pasteboard import OwnPasteboard
+from robocov_app.editor.ui.window import EditorWindow
+from robocov_app.viewer.opening import display
 
 SIZE = (900, 600)
 

@@ -12,13 +12,13 @@ import pygame
 from touched_run import HALL, RAPF, begun
 
 from robocov.environment import Environment
-from robocov_app.demo.costs import DirectCosts
-from robocov_app.demo.desk import Desk
-from robocov_app.demo.film import pixels
-from robocov_app.demo.opening import display
-from robocov_app.demo.scenario import Law
-from robocov_app.demo.window import Window
-from robocov_app.view.picture import standard_layers
+from robocov_app.render.picture import standard_layers
+from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.film import pixels
+from robocov_app.viewer.opening import display
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.window import Window
 
 SIZE = (900, 600)
 FRAME = 1 / 50

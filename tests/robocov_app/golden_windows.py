@@ -62,10 +62,10 @@ def played(window, frames: int) -> None:
 
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
-    from robocov_app.demo.film import pixels
-    from robocov_app.demo.opening import Opening
-    from robocov_app.demo.scenario import Scenario
-    from robocov_app.demo.session import Session
+    from robocov_app.viewer.film import pixels
+    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.session.scenario import Scenario
+    from robocov_app.viewer.session.session import Session
 
     theme, play = SCENES[name]
     session = Session(Scenario(load_map("rooms"), robots=4))

@@ -12,10 +12,10 @@ from robocov.mapfile import from_json
 from robocov.record import ARRAYS, Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.demo.keep_process import heard
-from robocov_app.demo.keeping import Keeper, Said, tell, wanted_of
-from robocov_app.demo.session import Session
 from robocov_app.live.messages import receive
+from robocov_app.viewer.session.keep_process import heard
+from robocov_app.viewer.session.keeping import Keeper, Said, tell, wanted_of
+from robocov_app.viewer.session.session import Session
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""

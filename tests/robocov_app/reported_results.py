@@ -11,10 +11,10 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.record import Record
 from robocov.robots import Team
-from robocov_app.output import finite, write_json
 from robocov_app.report.gathering import FIGURES, Entry, Result
-from robocov_app.run import Run, save_numbers
-from robocov_app.saved import Saved
+from robocov_app.runs.run import Run, save_numbers
+from robocov_app.runs.saved import Saved
+from robocov_app.terminal.output import finite, write_json
 
 HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
 """A name that would like to be more than a name."""

@@ -4,7 +4,7 @@ from typing import Literal
 import pytest
 
 from robocov.errors import InputError
-from robocov_app.arguments import one_line, parsed
+from robocov_app.terminal.arguments import one_line, parsed
 
 
 @dataclass

@@ -6,8 +6,8 @@ from drawn_run import ROOMS
 
 from robocov.cost import CoverageCost
 from robocov.mapfile.check import vertex_count
-from robocov_app import building
-from robocov_app.building import built_cost, cost_for_pictures
+from robocov_app.runs import building
+from robocov_app.runs.building import built_cost, cost_for_pictures
 
 PLACE = np.array([[2.0, 2.0]])
 

@@ -15,8 +15,7 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.demo.scenario import Law, branch_words, gain_words
-from robocov_app.plots.gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.gathering import gathered
 from robocov_app.report.groups import dependences, gain_text, styles
@@ -24,6 +23,7 @@ from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gain_choices import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
+from robocov_app.viewer.session.scenario import Law, branch_words, gain_words
 
 STUDY = """
 maps = ["room.json"]

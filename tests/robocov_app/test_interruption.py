@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from robocov_app.interruption import Interruption
+from robocov_app.terminal.interruption import Interruption
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 

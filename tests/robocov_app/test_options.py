@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov_app.options import RunOptions, parsed_gains
+from robocov_app.terminal.options import RunOptions, parsed_gains
 
 
 def test_gains_are_json_values() -> None:
@@ -56,7 +56,7 @@ def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() 
     from robocov.simulation import DEFAULT_DT
     from robocov_app.commands.compare import Arguments as Compare
     from robocov_app.commands.run import Arguments as Run
-    from robocov_app.run import team_of
+    from robocov_app.runs.run import team_of
 
     assert Run().controller == Compare().controllers[0] == FLAGSHIP
     assert RunOptions().dt == DEFAULT_DT

@@ -1,7 +1,7 @@
 import json
 from pathlib import Path
 
-from robocov_app.output import finite, write_csv, write_json
+from robocov_app.terminal.output import finite, write_csv, write_json
 
 
 def test_numbers_keep_all_their_digits(tmp_path: Path) -> None:

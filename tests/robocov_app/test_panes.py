@@ -5,9 +5,9 @@ import pytest
 from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.errors import ParameterError
-from robocov_app.panes import comparison_frames, pane_layout, side_by_side
-from robocov_app.recording import frame_rows
-from robocov_app.view.theme import DARK, LIGHT
+from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.runs.panes import comparison_frames, pane_layout, side_by_side
+from robocov_app.runs.recording import frame_rows
 
 
 def plain(count, width=64, height=48, start=0):

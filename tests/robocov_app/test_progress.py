@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from robocov_app.progress import progress
+from robocov_app.terminal.progress import progress
 
 
 def test_one_plain_line_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,8 +17,7 @@ from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
-from robocov_app.demo.film import Film
-from robocov_app.recording import (
+from robocov_app.runs.recording import (
     frame_rows,
     iter_frames,
     png_bytes,
@@ -26,6 +25,7 @@ from robocov_app.recording import (
     save_frames,
     told_costs,
 )
+from robocov_app.viewer.film import Film
 
 
 def plain(count, width=64, height=48):

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov_app.statistics import (
+from robocov_app.figures.statistics import (
     Interval,
     bootstrap,
     bootstrap_by,

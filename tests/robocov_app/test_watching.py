@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robocov_app.watching import INTERVAL, LONGEST, SETTLED, changes
+from robocov_app.terminal.watch import INTERVAL, LONGEST, SETTLED, changes
 
 
 class EndedError(Exception):

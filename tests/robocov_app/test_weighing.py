@@ -14,9 +14,9 @@ from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
+from robocov_app.render.density_summary import density_kind, weighed_lines
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import embedded_map
-from robocov_app.weighing import density_kind, weighed_lines
 
 PLAIN = Environment("plain", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)))
 HEAVY = PLAIN.with_density(Gaussians((Gaussian((5.0, 5.0), 4.0, sigma=1.0),), 0.5))

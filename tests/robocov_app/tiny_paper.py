@@ -9,10 +9,10 @@ import pytest
 
 from robocov.errors import OutputError
 from robocov.files.atomic import locked
-from robocov_app.interruption import Interruption
-from robocov_app.paper.beyond_plan import BeyondPlan
-from robocov_app.paper.plan import Plan
-from robocov_app.paper.studying import Means
+from robocov_app.replication.beyond_plan import BeyondPlan
+from robocov_app.replication.plan import Plan
+from robocov_app.replication.studying import Means
+from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(
     name="quick",

@@ -7,11 +7,11 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
-from robocov_app.demo.costs import DirectCosts
-from robocov_app.demo.desk import Desk
-from robocov_app.demo.lane import with_failed
-from robocov_app.demo.scenario import Law, Scenario
-from robocov_app.demo.session import Session
+from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.pane import with_failed
+from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.session import Session
 
 HALL = Environment(
     "hall",

@@ -3,10 +3,10 @@
 import numpy as np
 import pygame
 
-from robocov_app.view.canvas import Canvas
-from robocov_app.view.fonts import label
-from robocov_app.view.picture import Painter
-from robocov_app.view.theme import robot_hues
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import label
+from robocov_app.render.picture import Painter
+from robocov_app.render.theme import robot_hues
 
 
 def places(frame, words, size, theme, colour):

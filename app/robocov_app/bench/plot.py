@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from robocov_app.plots.page import HEADING, SMALL, TEXT, Page, plain_style, tone
-from robocov_app.plots.runs import save_figure
-from robocov_app.view.theme import LIGHT, Theme
+from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, plain_style, tone
+from robocov_app.figures.runs import save_figure
+from robocov_app.render.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,14 +12,14 @@ import pygame
 
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row
-from robocov_app.demo.costs import LATTICE, WorkerCosts
-from robocov_app.demo.desk import Desk
-from robocov_app.demo.opening import display
-from robocov_app.demo.scenario import Law, Limits, Scenario
-from robocov_app.demo.screen import undisturbed
-from robocov_app.demo.session import Session
-from robocov_app.demo.window import FPS, Window
-from robocov_app.view.picture import standard_layers
+from robocov_app.render.picture import standard_layers
+from robocov_app.viewer.costs import LATTICE, WorkerCosts
+from robocov_app.viewer.opening import display
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.screen import undisturbed
+from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window import FPS, Window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -64,12 +64,12 @@ class Arguments:
 def command(options: Arguments) -> int | None:
     """Measure, then print and draw; what was measured until Ctrl-C as well."""
     from robocov.errors import ParameterError
-    from robocov_app.progress import progress
+    from robocov_app.terminal.progress import progress
 
     for name in THREADS:
         os.environ.setdefault(name, "1")
     if options.plot is not None:
-        from robocov_app.plots.runs import check_figure_path
+        from robocov_app.figures.runs import check_figure_path
 
         check_figure_path(options.plot)
     parts: tuple[str, ...] = PARTS if options.part == "all" else (options.part,)
@@ -120,7 +120,7 @@ def print_tables(rows: Sequence[Row]) -> None:
     """Print the rows for people, one table a part."""
     from rich.table import Table
 
-    from robocov_app.console import console
+    from robocov_app.terminal.tables import console
 
     out = console()
     for part, group in groupby(rows, key=lambda row: row.part):

@@ -15,8 +15,8 @@ import tyro
 from robocov.errors import InputError, MapError, place
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
-from robocov_app.map_reports import report_lines
-from robocov_app.watching import changes
+from robocov_app.terminal.map_reports import report_lines
+from robocov_app.terminal.watch import changes
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -121,7 +121,7 @@ def print_report(name: str, report: MapReport) -> None:
 
 def _watch(options: Arguments) -> int:
     """Check again at each save; Ctrl-C ends it."""
-    from robocov_app.console import console
+    from robocov_app.terminal.tables import console
 
     names = {_path(name): name for name in options.files}
     output = console()

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
-from robocov_app.options import RunOptions, parsed_gains
+from robocov_app.terminal.options import RunOptions, parsed_gains
 
 if TYPE_CHECKING:
-    from robocov_app.run import Run
+    from robocov_app.runs.run import Run
 
 INTERRUPTED = 130
 
@@ -37,8 +37,8 @@ def command(options: Arguments) -> int:
     from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
-    from robocov_app.building import built_cost
-    from robocov_app.compare import (
+    from robocov_app.runs.building import built_cost
+    from robocov_app.runs.compare import (
         begin_comparison,
         folder_names,
         gains_for,
@@ -46,9 +46,7 @@ def command(options: Arguments) -> int:
         save_comparison,
         save_comparison_moving,
     )
-    from robocov_app.interruption import Interruption
-    from robocov_app.output import finite, listed
-    from robocov_app.run import (
+    from robocov_app.runs.run import (
         check_layers,
         conditions_of,
         evaluated,
@@ -57,6 +55,8 @@ def command(options: Arguments) -> int:
         starts_of,
         team_of,
     )
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.output import finite, listed
 
     names = options.controllers
     if not names:
@@ -108,9 +108,9 @@ def print_table(runs: dict[str, Run]) -> None:
     """Print the comparison for people."""
     from rich.table import Table
 
-    from robocov_app.compare import rows_of
-    from robocov_app.console import console
-    from robocov_app.weighing import weighed_lines
+    from robocov_app.render.density_summary import weighed_lines
+    from robocov_app.runs.compare import rows_of
+    from robocov_app.terminal.tables import console
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("", style="bold", no_wrap=True)

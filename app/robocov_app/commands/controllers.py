@@ -8,7 +8,7 @@ from typing import Any
 
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
 from robocov.controllers.gains import Gain, Option, value_text
-from robocov_app.console import console
+from robocov_app.terminal.tables import console
 
 
 @dataclass

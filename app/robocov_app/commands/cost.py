@@ -14,9 +14,9 @@ from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, shown
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
-from robocov_app.building import built_cost, cost_for_pictures
-from robocov_app.output import finite
-from robocov_app.weighing import density_kind, weighed_lines
+from robocov_app.render.density_summary import density_kind, weighed_lines
+from robocov_app.runs.building import built_cost, cost_for_pictures
+from robocov_app.terminal.output import finite
 
 if TYPE_CHECKING:
     from robocov.cost import CoverageCost, CoverageResult
@@ -56,7 +56,7 @@ def command(options: Arguments) -> None:
     if options.sites is not None:
         writable(options.sites)
     if options.plot is not None:
-        from robocov_app.plots.runs import check_figure_path
+        from robocov_app.figures.runs import check_figure_path
 
         check_figure_path(options.plot)
     environment = load_map(options.map)
@@ -123,10 +123,10 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
 def draw(options: Arguments, environment: Environment, cost: CoverageCost, result: CoverageResult) -> None:
     """Draw the map of distances."""
     from robocov.robots import Team
-    from robocov_app.plots.coverage import Moment, plot_coverage
-    from robocov_app.plots.runs import save_figure
-    from robocov_app.view.field import Field, FieldLattice
-    from robocov_app.view.phi import mean_words
+    from robocov_app.figures.coverage import Moment, plot_coverage
+    from robocov_app.figures.runs import save_figure
+    from robocov_app.render.field import Field, FieldLattice
+    from robocov_app.render.phi import mean_words
 
     assert options.plot is not None
     n = len(result.positions)

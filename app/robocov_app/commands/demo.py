@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.condition_options import ConditionOptions
-from robocov_app.options import in_range, parsed_gains, parsed_size, robots_of
+from robocov_app.terminal.condition_options import ConditionOptions
+from robocov_app.terminal.options import in_range, parsed_gains, parsed_size, robots_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from robocov_app.demo.opening import Opening
-    from robocov_app.demo.session import Session
-    from robocov_app.recording import Frame
+    from robocov_app.runs.recording import Frame
+    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.session.session import Session
 
 
 @dataclass
@@ -111,9 +111,9 @@ def command(options: Arguments) -> int:
     """Open the window, or render it."""
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
-    from robocov_app.demo.opening import Opening
-    from robocov_app.demo.screen import show_compiling
-    from robocov_app.view.picture import checked_layers
+    from robocov_app.render.picture import checked_layers
+    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.screen import show_compiling
 
     if not options.headless:
         on_compile.append(lambda _: show_compiling(options.pixels() or (900, 600)))
@@ -144,8 +144,8 @@ def session_of(options: Arguments) -> Session:
     """Return the session that the options describe."""
     from robocov.mapfile import load_map
     from robocov.robots import read_team
-    from robocov_app.demo.scenario import Law, Limits, Scenario
-    from robocov_app.demo.session import Session
+    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+    from robocov_app.viewer.session.session import Session
 
     robots, limits = options.robots, Limits(radius=options.radius)
     if options.team is not None:
@@ -173,11 +173,11 @@ def rendered(opening: Opening, options: Arguments) -> int:
     """Render frames of the window without a display."""
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
-    from robocov_app.demo.film import pixels
-    from robocov_app.demo.opening import HEADLESS_FPS
-    from robocov_app.interruption import Interruption
-    from robocov_app.progress import progress
-    from robocov_app.recording import kept_frames, save_film, save_frames
+    from robocov_app.runs.recording import kept_frames, save_film, save_frames
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.progress import progress
+    from robocov_app.viewer.film import pixels
+    from robocov_app.viewer.opening import HEADLESS_FPS
 
     if options.video is not None:
         writable(options.video)

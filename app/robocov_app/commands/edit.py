@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.options import in_range, parsed_size
+from robocov_app.terminal.options import in_range, parsed_size
 
 
 @dataclass
@@ -55,7 +55,7 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the editor, or save a picture of it."""
-    from robocov_app.editor.opening import EditorOpening
+    from robocov_app.editor.ui.opening import EditorOpening
 
     opening = EditorOpening(
         None if options.map is None else map_path(options.map),
@@ -71,8 +71,8 @@ def command(options: Arguments) -> int:
             window.run()
             return 0
         from robocov.files.atomic import written
-        from robocov_app.demo.film import pixels
-        from robocov_app.recording import png_bytes
+        from robocov_app.runs.recording import png_bytes
+        from robocov_app.viewer.film import pixels
 
         window.panel.show_tab(options.page)
         window.desk.message = ""

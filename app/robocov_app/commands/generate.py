@@ -16,8 +16,8 @@ from robocov.errors import InputError, MapError, OutputError, ParameterError, co
 from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
-from robocov_app.options import in_range
-from robocov_app.progress import progress
+from robocov_app.terminal.options import in_range
+from robocov_app.terminal.progress import progress
 
 Job: TypeAlias = tuple[str, Callable[[], Environment]]
 """The name of a map, and what makes it."""
@@ -103,8 +103,8 @@ def command(options: Arguments) -> None:
                 rows.append(_row(path, made[-1]))
                 update(number + 1)
     if options.plot is not None:
-        from robocov_app.plots.map_sheet import plot_maps
-        from robocov_app.plots.runs import save_figure
+        from robocov_app.figures.map_sheet import plot_maps
+        from robocov_app.figures.runs import save_figure
 
         save_figure(plot_maps(made, options.theme), options.plot)
     if options.out is not None:
@@ -126,7 +126,7 @@ def _check(options: Arguments) -> None:
     if options.side != _SIDE and options.width is not None:
         raise InputError(f"--side: {options.side:g}, but --width and --height say how large the map is")
     if options.plot is not None:
-        from robocov_app.plots.runs import check_figure_path
+        from robocov_app.figures.runs import check_figure_path
 
         check_figure_path(options.plot)
     _check_out(options.out, folder=bool(options.count or options.study), overwrite=options.overwrite)
@@ -195,7 +195,7 @@ def _of_seeds(options: Arguments) -> list[Job]:
 
 def _of_study(name: str) -> list[Job]:
     """Return what makes the maps that a study of the paper draws by chance."""
-    from robocov_app.paper.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
+    from robocov_app.replication.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
 
     plan = FULL if name == "full" else QUICK
     maps = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan))

@@ -14,9 +14,9 @@ from robocov.errors import InputError, one_line
 from robocov.files.atomic import writable
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
+from robocov_app.figures.figure_files import check_figure_path
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map
-from robocov_app.plots.figure_files import check_figure_path
-from robocov_app.progress import progress
+from robocov_app.terminal.progress import progress
 
 
 @dataclass

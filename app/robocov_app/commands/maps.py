@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.console import console
-from robocov_app.weighing import density_kind
+from robocov_app.render.density_summary import density_kind
+from robocov_app.terminal.tables import console
 
 
 @dataclass

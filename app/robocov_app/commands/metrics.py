@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov_app.options import in_range
+from robocov_app.terminal.options import in_range
 
 if TYPE_CHECKING:
-    from robocov_app.plots.metrics import Measured
-    from robocov_app.saved import Saved
+    from robocov_app.figures.metrics import Measured
+    from robocov_app.runs.saved import Saved
 
 
 @dataclass
@@ -45,11 +45,11 @@ class Arguments:
 def command(options: Arguments) -> None:
     """Measure, write and print."""
     from robocov.files.result_folder import extended
-    from robocov_app.output import write_csv
-    from robocov_app.saved import load_saved
+    from robocov_app.runs.saved import load_saved
+    from robocov_app.terminal.output import write_csv
 
     if options.plot is not None:
-        from robocov_app.plots.figure_files import check_figure_path
+        from robocov_app.figures.figure_files import check_figure_path
 
         check_figure_path(options.plot)
     from robocov.metrics.run_metrics import COLUMNS
@@ -66,8 +66,8 @@ def command(options: Arguments) -> None:
             measured.append(run)
             answers.append(answer_of(saved, run))
     if options.plot is not None:
-        from robocov_app.plots.figure_files import save_figure
-        from robocov_app.plots.metrics import plot_metrics
+        from robocov_app.figures.figure_files import save_figure
+        from robocov_app.figures.metrics import plot_metrics
 
         save_figure(
             plot_metrics(measured, options.theme, title=f"Metrics  ·  {options.folder.name}"), options.plot
@@ -82,8 +82,8 @@ def measure(saved: Saved, options: Arguments) -> Measured:
     """Measure one run."""
     from robocov.metrics.run_metrics import run_metrics
     from robocov.record import nearest_moments
-    from robocov_app.plots.metrics import Measured
-    from robocov_app.progress import progress
+    from robocov_app.figures.metrics import Measured
+    from robocov_app.terminal.progress import progress
 
     record = saved.record
     total = len(nearest_moments(record.time, options.rate))
@@ -117,7 +117,7 @@ def print_table(answers: list[dict[str, Any]]) -> None:
     """Print the figures of all runs for people."""
     from rich.table import Table
 
-    from robocov_app.console import console
+    from robocov_app.terminal.tables import console
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("", style="bold", no_wrap=True)

@@ -17,16 +17,16 @@ from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.building import PATIENCE, built_cost
-from robocov_app.output import finite
-from robocov_app.progress import progress
-from robocov_app.weighing import density_kind, weighed_lines
+from robocov_app.render.density_summary import density_kind, weighed_lines
+from robocov_app.runs.building import PATIENCE, built_cost
+from robocov_app.terminal.output import finite
+from robocov_app.terminal.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
-    from robocov_app.saved import Saved
+    from robocov_app.runs.saved import Saved
 
 _ROBOTS = 6
 
@@ -91,7 +91,7 @@ def command(options: Arguments) -> None:
     _check(options)
     saved: list[Saved] = []
     if options.run is not None:
-        from robocov_app.saved import load_saved
+        from robocov_app.runs.saved import load_saved
 
         saved = load_saved(options.run)
         team = saved[0].record.team
@@ -138,7 +138,7 @@ def _check(options: Arguments) -> None:
         if options.positions.exists() and not options.overwrite:
             raise InputError(f"{options.positions}: exists already; another name, or --overwrite, was wanted")
     if options.plot is not None:
-        from robocov_app.plots.runs import check_figure_path
+        from robocov_app.figures.runs import check_figure_path
 
         check_figure_path(options.plot)
 
@@ -224,11 +224,11 @@ def _print(
 def _draw(path: Path, theme: str, environment: Environment, best: Optimum, radius: float) -> None:
     """Draw the map of distances."""
     from robocov.robots import Team
-    from robocov_app.building import PICTURE_LATTICE
-    from robocov_app.plots.coverage import Moment, plot_coverage
-    from robocov_app.plots.runs import save_figure
-    from robocov_app.view.field import Field, FieldLattice
-    from robocov_app.view.phi import mean_words
+    from robocov_app.figures.coverage import Moment, plot_coverage
+    from robocov_app.figures.runs import save_figure
+    from robocov_app.render.field import Field, FieldLattice
+    from robocov_app.render.phi import mean_words
+    from robocov_app.runs.building import PICTURE_LATTICE
 
     cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
     n = len(best.positions)

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, counted
-from robocov_app.options import in_range
+from robocov_app.terminal.options import in_range
 
 if TYPE_CHECKING:
-    from robocov_app.paper.figures import Shown
-    from robocov_app.paper.studying import Forecast, Means
-    from robocov_app.paper.verdicts import Claim
+    from robocov_app.replication.figures import Shown
+    from robocov_app.replication.studying import Forecast, Means
+    from robocov_app.replication.verdicts import Claim
 
 INTERRUPTED = 130
 
@@ -78,17 +78,15 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Run the study and write all that comes of it."""
-    from robocov_app.interruption import Interruption
-    from robocov_app.output import finite
-    from robocov_app.paper.asking import asked
-    from robocov_app.paper.beyond import forecast_beyond, studied_beyond
-    from robocov_app.paper.beyond_writing import (
+    from robocov_app.replication.asking import asked
+    from robocov_app.replication.beyond import forecast_beyond, studied_beyond
+    from robocov_app.replication.beyond_writing import (
         beyond_claims,
         save_beyond_page,
         save_beyond_pictures,
     )
-    from robocov_app.paper.plan import FULL, QUICK
-    from robocov_app.paper.studying import (
+    from robocov_app.replication.plan import FULL, QUICK
+    from robocov_app.replication.studying import (
         Means,
         Stopped,
         begun,
@@ -98,8 +96,10 @@ def command(options: Arguments) -> int:
         studied_figures,
         together,
     )
-    from robocov_app.paper.writing import save_claims, save_page, save_pictures
+    from robocov_app.replication.writing import save_claims, save_page, save_pictures
     from robocov_app.sweep.pool import processors
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.output import finite
 
     plan = QUICK if options.quick else FULL
     out, quiet = options.out, options.json
@@ -163,7 +163,7 @@ def print_claims(claims: Sequence[Claim]) -> None:
     """Print the verdicts for people."""
     from rich.table import Table
 
-    from robocov_app.console import console
+    from robocov_app.terminal.tables import console
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("claim", overflow="fold")

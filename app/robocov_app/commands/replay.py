@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, ParameterError, listed
-from robocov_app.options import RunOptions, parsed_size
+from robocov_app.terminal.options import RunOptions, parsed_size
 
 if TYPE_CHECKING:
-    from robocov_app.interruption import Interruption
-    from robocov_app.run import Run
-    from robocov_app.saved import Saved
+    from robocov_app.runs.run import Run
+    from robocov_app.runs.saved import Saved
+    from robocov_app.terminal.interruption import Interruption
 
 INTERRUPTED = 130
 
@@ -104,8 +104,8 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the window, or make frames and a film."""
-    from robocov_app.run import check_layers
-    from robocov_app.saved import load_saved
+    from robocov_app.runs.run import check_layers
+    from robocov_app.runs.saved import load_saved
 
     check_layers(options.film())
     saved = load_saved(options.run)
@@ -116,9 +116,9 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
     from robocov.controllers import controller_kind
     from robocov.mapfile import bundled_maps, load_map
-    from robocov_app.demo.opening import NO_DISPLAY, Opening
-    from robocov_app.demo.replayed import replayed_session
-    from robocov_app.view.picture import checked_layers
+    from robocov_app.render.picture import checked_layers
+    from robocov_app.viewer.opening import NO_DISPLAY, Opening
+    from robocov_app.viewer.session.replayed import replayed_session
 
     for controller in options.controller:
         controller_kind(controller)
@@ -158,8 +158,8 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
 def filmed(options: Arguments, saved: list[Saved]) -> int:
     """Make frames and a film of saved runs."""
     from robocov.files.result_folder import results
-    from robocov_app.interruption import Interruption
-    from robocov_app.output import listed, write_json
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.output import listed, write_json
 
     out = options.out
     assert out is not None
@@ -185,9 +185,9 @@ def _spare(out: Path, source: Path, saved: list[Saved]) -> None:
 
 
 def _save_moving(options: RunOptions, saved: list[Saved], out: Path, stop: Interruption) -> None:
-    from robocov_app.compare import save_panes_moving
-    from robocov_app.run import save_run_moving, shown_in_films
-    from robocov_app.saved import roster_of
+    from robocov_app.runs.compare import save_panes_moving
+    from robocov_app.runs.run import save_run_moving, shown_in_films
+    from robocov_app.runs.saved import roster_of
 
     runs = [_run_of(each) for each in saved]
     if len(runs) == 1:
@@ -202,6 +202,6 @@ def _run_of(saved: Saved) -> Run:
     import numpy as np
 
     from robocov.metrics import CostHistory
-    from robocov_app.run import Run
+    from robocov_app.runs.run import Run
 
     return Run(saved.record, saved.history or CostHistory(*np.empty((4, 0))), {})

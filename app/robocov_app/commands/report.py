@@ -85,7 +85,7 @@ def command(options: Arguments) -> None:
 
 def _readable(result: Result, *, quiet: bool) -> Result:
     """Return the result with its damaged runs apart; reading all takes 10 ms a run."""
-    from robocov_app.progress import progress
+    from robocov_app.terminal.progress import progress
 
     with progress("runs read", len(result.fine), quiet=quiet or result.kind != "sweep") as tell:
         return result.readable(tell)
@@ -93,8 +93,8 @@ def _readable(result: Result, *, quiet: bool) -> Result:
 
 def _with_references(result: Result, options: Arguments) -> Result:
     """Return the result with the references that are known, or searched for."""
-    from robocov_app.progress import progress
     from robocov_app.report.references import with_references
+    from robocov_app.terminal.progress import progress
 
     quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
     with progress("searching", total, quiet=quiet) as tell:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov_app.options import RunOptions, parsed_gains
+from robocov_app.terminal.options import RunOptions, parsed_gains
 
 if TYPE_CHECKING:
-    from robocov_app.run import Run
+    from robocov_app.runs.run import Run
 
 INTERRUPTED = 130
 
@@ -35,11 +35,9 @@ def command(options: Arguments) -> int:
     from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
-    from robocov_app.building import built_cost
-    from robocov_app.compare import folder_names
-    from robocov_app.interruption import Interruption
-    from robocov_app.output import finite, listed
-    from robocov_app.run import (
+    from robocov_app.runs.building import built_cost
+    from robocov_app.runs.compare import folder_names
+    from robocov_app.runs.run import (
         check_layers,
         conditions_of,
         evaluated,
@@ -50,6 +48,8 @@ def command(options: Arguments) -> int:
         starts_of,
         team_of,
     )
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.output import finite, listed
 
     gains = parsed_gains(options.gains)
     environment = load_map(options.map)
@@ -83,7 +83,7 @@ def command(options: Arguments) -> int:
 
 def print_summary(run: Run) -> None:
     """Print what is worth knowing of a run."""
-    from robocov_app.weighing import weighed_lines
+    from robocov_app.render.density_summary import weighed_lines
 
     summary, record = run.summary, run.record
     settled = summary["settled_at_s"]

@@ -13,7 +13,7 @@ from robocov.files.atomic import written
 from robocov_app.exporters.cells import not_held
 from robocov_app.exporters.coordinates import decimal, free_area
 from robocov_app.exporters.writing import Exporter, ExportReport, WriteOptions
-from robocov_app.view.theme import DARK, LIGHT, Colour, Theme
+from robocov_app.render.theme import DARK, LIGHT, Colour, Theme
 
 if TYPE_CHECKING:
     from pathlib import Path

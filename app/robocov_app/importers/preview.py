@@ -8,12 +8,12 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from robocov_app.figures.arena import draw_map, map_handles
+from robocov_app.figures.figure_files import check_figure_path, save_figure
+from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
 from robocov_app.importers.comparison import Comparison, compare
-from robocov_app.plots.arena import draw_map, map_handles
-from robocov_app.plots.figure_files import check_figure_path, save_figure
-from robocov_app.plots.page import HEADING, SMALL, TITLE, Box, Page, plain_style, tone
-from robocov_app.view.spacing import columns_for
-from robocov_app.view.theme import LIGHT, Colour, Theme, theme_named
+from robocov_app.render.spacing import columns_for
+from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

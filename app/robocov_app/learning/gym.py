@@ -32,7 +32,7 @@ from robocov_app.learning.task import CoverageTask, changed_task
 if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov_app.learning.layout import Rows
-    from robocov_app.recording import Frame
+    from robocov_app.runs.recording import Frame
 
 ID = "robocov/Coverage-v0"
 

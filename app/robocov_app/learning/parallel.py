@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov_app.learning.layout import Rows
-    from robocov_app.recording import Frame
+    from robocov_app.runs.recording import Frame
 
 
 class CoverageParallelEnv(ParallelEnv):

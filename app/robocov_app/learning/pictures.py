@@ -10,8 +10,8 @@ from robocov.errors import ParameterError, RobocovError, unknown_name
 
 if TYPE_CHECKING:
     from robocov_app.learning.episode import Episode
-    from robocov_app.recording import Frame
-    from robocov_app.view.picture import Painter
+    from robocov_app.render.picture import Painter
+    from robocov_app.runs.recording import Frame
 
 RENDER_MODES = ("rgb_array", "human")
 
@@ -64,9 +64,9 @@ class Pictures:
             self._window = self._clock = None
 
     def _drawn(self, episode: Episode) -> tuple[Painter, Any]:
-        from robocov_app.view.picture import Painter
-        from robocov_app.view.scene import Scene
-        from robocov_app.view.theme import theme_named
+        from robocov_app.render.picture import Painter
+        from robocov_app.render.scene import Scene
+        from robocov_app.render.theme import theme_named
 
         if self._painter is None or self._painter.environment is not episode.environment:
             self._painter = Painter(episode.environment, self._size, theme_named(self._theme))

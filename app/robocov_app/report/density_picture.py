@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov_app.view.phi import shading
-from robocov_app.view.theme import DARK, LIGHT, mix
+from robocov_app.render.phi import shading
+from robocov_app.render.theme import DARK, LIGHT, mix
 
 if TYPE_CHECKING:
     from robocov.environment import Environment

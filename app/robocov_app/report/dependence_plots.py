@@ -11,8 +11,8 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import value_text
-from robocov_app.plots.curves import curve_styles
-from robocov_app.plots.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.curves import curve_styles
+from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
 from robocov_app.report.groups import Group, by_controller, dependences, medians, settings
 from robocov_app.report.result_plots import PANEL, RELATIVE, SCALE, Plot
 from robocov_app.report.svg import inline_svg

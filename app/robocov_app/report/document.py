@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
 from robocov.errors import ParameterError, counted
-from robocov_app.plots.curves import MARKS
+from robocov_app.figures.curves import MARKS
+from robocov_app.render.theme import theme_named
 from robocov_app.report.choosing import MOST_RUNS, chosen
 from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
@@ -43,7 +44,6 @@ from robocov_app.report.tables import (
     summary_tables,
 )
 from robocov_app.report.theme_css import theme_rules
-from robocov_app.view.theme import theme_named
 
 if TYPE_CHECKING:
     from jinja2 import Template

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from robocov_app.plots.curves import MARKS
+from robocov_app.figures.curves import MARKS
 from robocov_app.report.density_picture import density_picture
-from robocov_app.saved import roster_of
+from robocov_app.runs.saved import roster_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment, Obstacle
     from robocov.metrics import CostHistory
     from robocov.record import Record
-    from robocov_app.plots.curves import CurveStyle
+    from robocov_app.figures.curves import CurveStyle
 
 RATE = 5.0
 """Moments of a run per simulated second, where there is room."""

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import counted
+from robocov_app.render.phi import density_words
 from robocov_app.report.groups import gain_text, setting_label, variants
 from robocov_app.report.pairs import MOST_SAID
 from robocov_app.sweep.circumstances import UNITS, circumstance_text
-from robocov_app.view.phi import density_words
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Entry, Result

@@ -18,7 +18,7 @@ from robocov.mapfile import from_json
 from robocov.metrics import mean_over_run
 from robocov.metrics.results import read_history, read_results
 from robocov.record import Record
-from robocov_app.saved import load_saved, roster_of
+from robocov_app.runs.saved import load_saved, roster_of
 from robocov_app.sweep.circumstances import UNITS, circumstance_column
 from robocov_app.sweep.table import gain_column
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
     from robocov_app.report.references import Reference
-    from robocov_app.saved import Saved
+    from robocov_app.runs.saved import Saved
 
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import value_text
-from robocov_app.plots.curves import curve_styles, styles_of
+from robocov_app.figures.curves import curve_styles, styles_of
 from robocov_app.sweep.circumstances import circumstance_text
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
-    from robocov_app.plots.curves import CurveStyle
+    from robocov_app.figures.curves import CurveStyle
     from robocov_app.report.gathering import Entry, Result
 
 MOST_GROUPS = 8

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robocov.metrics.run_metrics import run_metrics
-from robocov_app.plots.results import Band, plot_cost_bands
+from robocov_app.figures.results import Band, plot_cost_bands
 from robocov_app.report.embedding import has_path
 from robocov_app.report.groups import shown_groups
 from robocov_app.report.result_plots import PANEL, SCALE, Looks, Plot

@@ -15,8 +15,8 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import counted
+from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
 from robocov_app.report.groups import TUNED, Group, medians, variants
-from robocov_app.statistics import Interval, bootstrap, mean_with_t_interval
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Entry, Result

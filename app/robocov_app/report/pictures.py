@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from robocov_app.render.phi import density_words
+from robocov_app.render.spacing import fitted_radii, mark_size
+from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path, lives
-from robocov_app.saved import roster_of
-from robocov_app.view.phi import density_words
-from robocov_app.view.spacing import fitted_radii, mark_size
-from robocov_app.view.theme import ONE_HUE_EACH, robot_hues
+from robocov_app.runs.saved import roster_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

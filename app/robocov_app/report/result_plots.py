@@ -9,8 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import counted
-from robocov_app.plots.curves import CurveStyle
-from robocov_app.plots.results import (
+from robocov_app.figures.curves import CurveStyle
+from robocov_app.figures.results import (
     Band,
     Pairs,
     Sample,

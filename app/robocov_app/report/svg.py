@@ -11,9 +11,9 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from robocov_app.plots.page import plain_style
+from robocov_app.figures.page import plain_style
+from robocov_app.render.theme import LIGHT
 from robocov_app.report.theme_css import hex_code, named_colours
-from robocov_app.view.theme import LIGHT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -25,7 +25,7 @@ from robocov_app.report.references import RESTARTS
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
-    from robocov_app.plots.curves import CurveStyle
+    from robocov_app.figures.curves import CurveStyle
     from robocov_app.report.gathering import Entry, Result
 
 NOTHING = "–"

@@ -6,8 +6,8 @@ and dark. Names begin with ``--rc-``, so that they meet no others in a notebook.
 
 from __future__ import annotations
 
-from robocov_app.plots.gains import quiet_heat
-from robocov_app.view.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
+from robocov_app.figures.gains import quiet_heat
+from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
 
 
 def hex_code(colour: Colour) -> str:
@@ -75,7 +75,7 @@ def theme_rules(scope: str, theme: str = "auto") -> str:
     """
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":
-        from robocov_app.view.theme import theme_named
+        from robocov_app.render.theme import theme_named
 
         return f"{scope}{{{variables(theme_named(theme))}}}@media print{{{scope}{{{light}}}}}\n"
     notebook = f':is([data-jp-theme-light="{{}}"],[data-vscode-theme-kind$="{{}}"]) {scope}'

@@ -23,10 +23,10 @@ from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
 from robocov.record import ARRAYS, Recorder, versions
 from robocov.simulation import Simulation
-from robocov_app.output import csv_text, finite
-from robocov_app.run import cost_columns, cost_rows
+from robocov_app.runs.run import cost_columns, cost_rows
 from robocov_app.sweep.circumstances import conditions_of
 from robocov_app.sweep.study import source_json, team_of
+from robocov_app.terminal.output import csv_text, finite
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, ParameterError, RobocovError, shown
-from robocov_app.interruption import Interruption
 from robocov_app.sweep.ledger import difference_of, opened, study_bytes
 from robocov_app.sweep.pool import LocalPool, processors
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.task import tasks_of
 from robocov_app.sweep.telling import Count, told
+from robocov_app.terminal.interruption import Interruption
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

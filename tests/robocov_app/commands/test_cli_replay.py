@@ -11,10 +11,10 @@ from PIL import Image
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov_app.cli import main
-from robocov_app.compare import begin_comparison
-from robocov_app.demo.session import Session
-from robocov_app.demo.window import Window
-from robocov_app.output import write_csv
+from robocov_app.runs.compare import begin_comparison
+from robocov_app.terminal.output import write_csv
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window import Window
 
 EMPTY = replace(HALL, obstacles=())
 SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")

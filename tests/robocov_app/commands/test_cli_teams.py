@@ -7,8 +7,8 @@ from called import SHORT, answer, complaint
 
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.run import cost_columns
-from robocov_app.saved import load_saved
+from robocov_app.runs.run import cost_columns
+from robocov_app.runs.saved import load_saved
 
 TEAM = """
 [[group]]

@@ -12,13 +12,13 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.demo.replayed import LostLaw
-from robocov_app.demo.session import Session
-from robocov_app.demo.window import Window
-from robocov_app.drawing_backend import record_html, record_png
-from robocov_app.paper.plan import Contender
-from robocov_app.paper.reading import read_outcomes
+from robocov_app.notebook import record_html, record_png
+from robocov_app.replication.plan import Contender
+from robocov_app.replication.reading import read_outcomes
 from robocov_app.sweep.study_file import read_study
+from robocov_app.viewer.session.replayed import LostLaw
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window import Window
 
 SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")
 SMALL = ("--size", "320x240", "--fps", "2", "--film-speed", "1")

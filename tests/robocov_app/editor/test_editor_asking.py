@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robocov_app.editor.asking import ROWS, Answer, FileQuestion, ListQuestion, Picker, Question
+from robocov_app.editor.ui.asking import ROWS, Answer, FileQuestion, ListQuestion, Picker, Question
 
 
 def test_a_question_is_answered_by_letter_enter_and_escape() -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov_app.editor.background import (
+from robocov_app.editor.model.background import (
     Background,
     picture_laid,
     shifted,

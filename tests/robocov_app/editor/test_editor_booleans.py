@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor import booleans, edits
-from robocov_app.editor.document import Item, Sketch
-from robocov_app.editor.outlines import outlines
-from robocov_app.editor.problems import problems
-from robocov_app.editor.selection import Selection
+from robocov_app.editor.edits import booleans, edits
+from robocov_app.editor.model.document import Item, Sketch
+from robocov_app.editor.model.outlines import outlines
+from robocov_app.editor.model.problems import problems
+from robocov_app.editor.model.selection import Selection
 
 
 def covered(sketch: Sketch) -> shapely.Geometry:

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map
-from robocov_app.editor import edits
-from robocov_app.editor.clipboard import copied, pasted
-from robocov_app.editor.document import Sketch, sketch_text
-from robocov_app.editor.selection import Selection
+from robocov_app.editor.edits import edits
+from robocov_app.editor.edits.clipboard import copied, pasted
+from robocov_app.editor.model.document import Sketch, sketch_text
+from robocov_app.editor.model.selection import Selection
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5)

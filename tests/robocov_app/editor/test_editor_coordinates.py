@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov_app.editor.coordinates import angle_of, length_of, next_point_of, point_of, size_of
+from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of, point_of, size_of
 
 LAST = (1.0, 2.0)
 

@@ -14,10 +14,10 @@ from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedPolygo
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
-from robocov_app.editor import densities
-from robocov_app.editor.document import Sketch, parse_sketch, sketch_of, sketch_text
-from robocov_app.editor.files import opened, saved
-from robocov_app.editor.problems import problems
+from robocov_app.editor.edits import densities
+from robocov_app.editor.model.document import Sketch, parse_sketch, sketch_of, sketch_text
+from robocov_app.editor.model.files import opened, saved
+from robocov_app.editor.model.problems import problems
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)

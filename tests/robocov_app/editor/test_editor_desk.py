@@ -9,19 +9,19 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.demo.actions import all_actions as demo_actions
-from robocov_app.editor import actions
-from robocov_app.editor.actions import GROUPS, REPEATING, all_actions, told_actions
-from robocov_app.editor.desk import GRIDS
-from robocov_app.editor.document import BOUNDARY
-from robocov_app.editor.fields import FIELDS, coordinate
-from robocov_app.editor.menus import offered
-from robocov_app.editor.selection import Selection, Vertex
-from robocov_app.editor.settings import SHOWN, SNAPS, EditorSettings, kinds_of
-from robocov_app.editor.snapping import KINDS
-from robocov_app.editor.toolbox import toolbox
-from robocov_app.editor.typed import COMMANDS
-from robocov_app.view.picture import standard_layers
+from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.tools.snapping import KINDS
+from robocov_app.editor.tools.toolbox import toolbox
+from robocov_app.editor.ui import actions
+from robocov_app.editor.ui.actions import GROUPS, REPEATING, all_actions, told_actions
+from robocov_app.editor.ui.desk import GRIDS
+from robocov_app.editor.ui.fields import FIELDS, coordinate
+from robocov_app.editor.ui.menus import offered
+from robocov_app.editor.ui.settings import SHOWN, SNAPS, EditorSettings, kinds_of
+from robocov_app.editor.ui.typed import COMMANDS
+from robocov_app.render.picture import standard_layers
+from robocov_app.viewer.actions import all_actions as demo_actions
 
 LOW = PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)))
 HIGH = PolygonObstacle(((3, 3), (6, 3), (6, 6), (3, 6)))

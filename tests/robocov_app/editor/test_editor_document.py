@@ -21,10 +21,10 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
-from robocov_app.editor import vertices
-from robocov_app.editor.annotations import annotated, taken_apart
-from robocov_app.editor.background import Background
-from robocov_app.editor.document import (
+from robocov_app.editor.edits import vertices
+from robocov_app.editor.model.annotations import annotated, taken_apart
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.document import (
     BOUNDARY,
     Item,
     Sketch,
@@ -34,7 +34,7 @@ from robocov_app.editor.document import (
     sketch_of,
     sketch_text,
 )
-from robocov_app.editor.selection import points_of
+from robocov_app.editor.model.selection import points_of
 
 EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 

@@ -15,14 +15,14 @@ from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
-from robocov_app.demo.settings import FOLDER
-from robocov_app.editor import edits
-from robocov_app.editor.asking import FileQuestion, Picker, Question
-from robocov_app.editor.drafts import FOLDER as DRAFTS
-from robocov_app.editor.drafts import left_behind
-from robocov_app.editor.importing import ImportQuestion
-from robocov_app.editor.opening import EditorOpening, offer
-from robocov_app.editor.paper import Paper
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model.drafts import FOLDER as DRAFTS
+from robocov_app.editor.model.drafts import left_behind
+from robocov_app.editor.model.paper import Paper
+from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
+from robocov_app.editor.ui.importing import ImportQuestion
+from robocov_app.editor.ui.opening import EditorOpening, offer
+from robocov_app.viewer.settings import FOLDER
 
 
 @pytest.fixture

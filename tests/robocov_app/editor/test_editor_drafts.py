@@ -13,9 +13,9 @@ from drawn_sketches import HALL
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
-from robocov_app.editor import drafts
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.drafts import (
+from robocov_app.editor.model import drafts
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.drafts import (
     FOLDER,
     Draft,
     DraftKeeper,
@@ -24,7 +24,7 @@ from robocov_app.editor.drafts import (
     left_behind,
     opened_elsewhere,
 )
-from robocov_app.editor.files import opened, saved, state_of
+from robocov_app.editor.model.files import opened, saved, state_of
 
 SKETCH = Sketch("Hall", boundary=HALL)
 
@@ -37,9 +37,9 @@ EDITOR = """
 import sys, time
 from pathlib import Path
 from robocov.environment import CircleObstacle
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.drafts import DraftKeeper
-from robocov_app.editor.files import opened
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.drafts import DraftKeeper
+from robocov_app.editor.model.files import opened
 
 folder, path = Path(sys.argv[1]), Path(sys.argv[2])
 sketch, disk = opened(path) if path.exists() else (Sketch("Hall"), None)

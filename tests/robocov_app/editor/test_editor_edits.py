@@ -18,12 +18,12 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor import edits
-from robocov_app.editor.affine import Affine
-from robocov_app.editor.background import Background
-from robocov_app.editor.document import BOUNDARY, Sketch
-from robocov_app.editor.plane import cos_sin, ring_near, rounded, tenths
-from robocov_app.editor.selection import Selection, Vertex
+from robocov_app.editor.edits import edits
+from robocov_app.editor.edits.affine import Affine
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.document import BOUNDARY, Sketch
+from robocov_app.editor.model.plane import cos_sin, ring_near, rounded, tenths
+from robocov_app.editor.model.selection import Selection, Vertex
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")

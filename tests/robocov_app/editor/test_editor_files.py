@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import load_map
-from robocov_app.editor import files
-from robocov_app.editor.document import Sketch, sketch_text
-from robocov_app.editor.files import ChangedError, opened, saved, state_of
+from robocov_app.editor.model import files
+from robocov_app.editor.model.document import Sketch, sketch_text
+from robocov_app.editor.model.files import ChangedError, opened, saved, state_of
 
 SKETCH = Sketch("Hall", boundary=HALL)
 

@@ -9,10 +9,10 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.findings import STEM
-from robocov_app.editor.strips import map_words
-from robocov_app.view.theme import DARK, LIGHT
+from robocov_app.editor.canvas.findings import STEM
+from robocov_app.editor.canvas.strips import map_words
+from robocov_app.editor.model.document import Sketch
+from robocov_app.render.theme import DARK, LIGHT
 
 NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
 CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))

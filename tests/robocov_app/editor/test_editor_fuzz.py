@@ -10,11 +10,11 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.actions import all_actions
-from robocov_app.editor.document import parse_sketch, sketch_text
-from robocov_app.editor.panel import TABS
-from robocov_app.editor.readout import readout
-from robocov_app.editor.typed import COMMANDS
+from robocov_app.editor.model.document import parse_sketch, sketch_text
+from robocov_app.editor.model.readout import readout
+from robocov_app.editor.ui.actions import all_actions
+from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.typed import COMMANDS
 
 EVENTS, BATCH, DRAWN = 2_500, 6, 5
 """Events of one seed, events between two frames, and frames of which one is drawn."""

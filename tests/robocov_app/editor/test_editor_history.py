@@ -2,10 +2,10 @@ from drawn_sketches import changes, drafts, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov_app.editor import edits
-from robocov_app.editor.document import DECIMALS, Sketch, draft_document, sketch_of
-from robocov_app.editor.history import History
-from robocov_app.editor.selection import Change, Selection
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model.document import DECIMALS, Sketch, draft_document, sketch_of
+from robocov_app.editor.model.history import History
+from robocov_app.editor.model.selection import Change, Selection
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 

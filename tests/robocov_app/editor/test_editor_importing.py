@@ -12,10 +12,10 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
 
-from robocov_app.editor import import_process
-from robocov_app.editor.asking import Question
-from robocov_app.editor.edits import titled
-from robocov_app.editor.importing import ImportQuestion, options_of
+from robocov_app.editor.edits.edits import titled
+from robocov_app.editor.ui import import_process
+from robocov_app.editor.ui.asking import Question
+from robocov_app.editor.ui.importing import ImportQuestion, options_of
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping
 from robocov_app.live.latest import DirectWorker, LatestWorker
 
@@ -117,7 +117,7 @@ def waited(asked: ImportQuestion) -> None:
 
 def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     # every older import is given up
-    worker: Any = LatestWorker("robocov_app.editor.import_process", "imports", patience=0.0)
+    worker: Any = LatestWorker("robocov_app.editor.ui.import_process", "imports", patience=0.0)
     asked = question(plan, worker)
     for letter in "0.1":
         asked.type(letter)

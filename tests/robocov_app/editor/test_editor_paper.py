@@ -8,10 +8,10 @@ from driven_editor import sheet, touched
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.editor import edits
-from robocov_app.editor.drafts import left_behind
-from robocov_app.editor.files import ChangedError
-from robocov_app.editor.paper import FIRST_SHEET, Paper
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model.drafts import left_behind
+from robocov_app.editor.model.files import ChangedError
+from robocov_app.editor.model.paper import FIRST_SHEET, Paper
 
 PILLAR = CircleObstacle((5, 5), 1.0)
 

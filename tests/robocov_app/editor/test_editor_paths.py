@@ -10,10 +10,10 @@ from driven_editor import opened_editor, sheet
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import load_map
-from robocov_app.editor import edits, paths
-from robocov_app.editor.affine import Affine
-from robocov_app.editor.document import Sketch, parse_sketch, sketch_text
-from robocov_app.editor.selection import Selection
+from robocov_app.editor.edits import edits, paths
+from robocov_app.editor.edits.affine import Affine
+from robocov_app.editor.model.document import Sketch, parse_sketch, sketch_text
+from robocov_app.editor.model.selection import Selection
 
 CART = CircleObstacle((2.0, 2.0), 0.5)
 ROUND = ObstaclePath(((2.0, 2.0), (8.0, 2.0), (8.0, 6.0)), 0.5)

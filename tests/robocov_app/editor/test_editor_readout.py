@@ -13,9 +13,9 @@ from shapely import MultiPolygon
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.mapfile import bundled_maps, load_map
 from robocov.mapfile.check import check_map
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.problems import problems
-from robocov_app.editor.readout import reach_of, readout
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.problems import problems
+from robocov_app.editor.model.readout import reach_of, readout
 
 FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 

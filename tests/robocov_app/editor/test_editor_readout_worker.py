@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov_app.editor import edits, readout_process
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.readout import readout
-from robocov_app.editor.readout_messages import Question
-from robocov_app.editor.readout_worker import ReadoutWorker
-from robocov_app.editor.selection import Selection
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model import readout_process
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.readout import readout
+from robocov_app.editor.model.readout_messages import Question
+from robocov_app.editor.model.readout_worker import ReadoutWorker
+from robocov_app.editor.model.selection import Selection
 from robocov_app.live.latest import Service
 
 PATIENCE = 60.0

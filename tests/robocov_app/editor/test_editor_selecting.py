@@ -7,9 +7,9 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.document import BOUNDARY
-from robocov_app.editor.grips import grip_at, grips, handled
-from robocov_app.editor.selection import Selection, Vertex
+from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.tools.grips import grip_at, grips, handled
 
 SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -221,7 +221,8 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
 
 
 def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
-    from robocov_app.editor import drags, edits
+    from robocov_app.editor.edits import edits
+    from robocov_app.editor.tools import drags
 
     ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(drags.MANY_POINTS + 10))
     with opened_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as hands:

@@ -16,8 +16,8 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.document import BOUNDARY, Sketch
-from robocov_app.editor.selection import (
+from robocov_app.editor.model.document import BOUNDARY, Sketch
+from robocov_app.editor.model.selection import (
     Edge,
     Selection,
     Vertex,

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov_app.demo.film import pixels
-from robocov_app.demo.opening import display
-from robocov_app.editor import edits
-from robocov_app.editor.background import Background
-from robocov_app.editor.drawn_rings import Outlines, name_place, outline_of
-from robocov_app.editor.selection import Selection
-from robocov_app.editor.sheet import Sheet, View, beyond, grid_steps, outside_colour
-from robocov_app.view.camera import Camera
-from robocov_app.view.theme import DARK, LIGHT
+from robocov_app.editor.canvas.drawn_rings import Outlines, name_place, outline_of
+from robocov_app.editor.canvas.sheet import Sheet, View, beyond, grid_steps, outside_colour
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.selection import Selection
+from robocov_app.render.camera import Camera
+from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.viewer.film import pixels
+from robocov_app.viewer.opening import display
 
 SIZE = (420, 360)
 BOX = (10.0, 30.0, 400.0, 300.0)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.editor.tool import (
+from robocov_app.editor.tools.tool import (
     ANGLE,
     Aim,
     Tool,

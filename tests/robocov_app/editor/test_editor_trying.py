@@ -7,10 +7,10 @@ import pygame
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.editor import edits
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.selection import Selection
-from robocov_app.editor.trying import brought_back
+from robocov_app.editor.edits import edits
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.ui.trying import brought_back
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 

@@ -9,14 +9,14 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.demo.layout import SMALLEST
-from robocov_app.editor.actions import told_actions
-from robocov_app.editor.document import Sketch
-from robocov_app.editor.edits import circle_drawn, polygon_drawn
-from robocov_app.editor.panel import TABS
-from robocov_app.editor.pasteboard import OwnPasteboard, SystemPasteboard
-from robocov_app.editor.selection import Selection, Vertex
-from robocov_app.editor.status import facts
+from robocov_app.editor.edits.edits import circle_drawn, polygon_drawn
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.ui.actions import told_actions
+from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
+from robocov_app.editor.ui.status import facts
+from robocov_app.viewer.layout import SMALLEST
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -271,7 +271,7 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
 def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatch) -> None:
-    from robocov_app.demo import overlays
+    from robocov_app.viewer import overlays
 
     words: set[str] = set()
     real = overlays.label

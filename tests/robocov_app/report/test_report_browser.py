@@ -16,12 +16,12 @@ from reported_results import HOSTILE, entry, falling, walk, watched
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.voronoi import partition
-from robocov_app.plots.curves import curve_styles
+from robocov_app.figures.curves import curve_styles
+from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.document import report
 from robocov_app.report.embedding import embedded_map, embedded_run
 from robocov_app.report.gathering import Damaged
 from robocov_app.report.replay import ReplayRun, asset, replay_html
-from robocov_app.view.theme import DARK, LIGHT
 
 pytestmark = [
     pytest.mark.slow,

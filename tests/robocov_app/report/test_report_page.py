@@ -4,9 +4,9 @@ import numpy as np
 import pygame
 import pytest
 
-from robocov_app.demo.inspector import Line, Report
-from robocov_app.demo.report_page import BUTTONS, ReportPage
-from robocov_app.view.theme import THEMES
+from robocov_app.render.theme import THEMES
+from robocov_app.viewer.inspector import Line, Report
+from robocov_app.viewer.report_page import BUTTONS, ReportPage
 
 SIZE = (320, 300)
 ARROWS = 45  # pixels from the left: arrows are before, words behind

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from reported_results import HOSTILE
 
-from robocov_app.plots.gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.plots.results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.render.theme import LIGHT
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import named_colours
-from robocov_app.view.theme import LIGHT
 
 RNG = np.random.default_rng(5)
 TIME = np.linspace(0.0, 10.0, 40)

@@ -21,7 +21,6 @@ from robocov.errors import InputError, OutputError, ParameterError
 from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.interruption import Interruption
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.crew import Crew, Returned
 from robocov_app.sweep.ledger import opened
@@ -29,6 +28,7 @@ from robocov_app.sweep.performing import made_with, perform
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.task import Task, tasks_of
+from robocov_app.terminal.interruption import Interruption
 
 PATIENCE = 60.0
 

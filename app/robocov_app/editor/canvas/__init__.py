@@ -1,0 +1,1 @@
+"""The sheet and all that is drawn on it."""

@@ -1,0 +1,367 @@
+"""The arena: the sheet under a camera, and all that is drawn on top of it while it is edited."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+import shapely
+
+from robocov_app.editor.canvas.findings import (
+    Hatching,
+    badge_places,
+    draw_gap,
+    draw_problems,
+    tag_gap,
+)
+from robocov_app.editor.canvas.handles import (
+    accent,
+    draw_box,
+    draw_ghost,
+    draw_grips,
+    draw_guides,
+    draw_outline,
+    draw_path,
+    draw_preview,
+    draw_start,
+    draw_typed,
+)
+from robocov_app.editor.canvas.sheet import Sheet, View
+from robocov_app.editor.canvas.strips import Strips
+from robocov_app.editor.edits.paths import goes, moving
+from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.model.selection import Change
+from robocov_app.editor.tools.drags import Moving
+from robocov_app.editor.tools.grips import KNOB, box_of, grips
+from robocov_app.editor.tools.tool import apart
+from robocov_app.render import sprites
+from robocov_app.render.camera import Camera
+from robocov_app.render.layers import READABLE
+from robocov_app.render.spacing import fitted_radii
+from robocov_app.render.theme import mix
+
+if TYPE_CHECKING:
+    from robocov.environment import Point
+    from robocov_app.editor.model.document import Owner, Sketch
+    from robocov_app.editor.model.problems import Problem
+    from robocov_app.editor.model.selection import Selection
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.team import Team
+    from robocov_app.render.canvas import Canvas
+    from robocov_app.render.theme import Theme
+    from robocov_app.viewer.layout import Layout
+
+REACH = 12.0
+"""Pixels at scale 1 that a finger is wide."""
+
+MARGIN = 26.0
+"""Pixels at scale 1 around the map when all of it is shown."""
+
+STAYS = 0.45
+"""Part of the view by which the map can be moved out of its middle."""
+
+EMPTY = (0.0, 0.0, 10.0, 10.0)
+"""What is shown of a sheet with nothing on it, m."""
+
+
+class Arena:
+    """Draws what is on a desk, and finds what is under the cursor."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.sheet = Sheet()
+        self.strips = Strips(desk)
+        self.team: Team | None = None
+        self.hovered: Problem | None = None
+        self.at: tuple[float, float] | None = None
+        """Where the mouse is, px; None where it is elsewhere."""
+        self._hatching = Hatching()
+        self._camera: Camera | None = None
+        self._carried: tuple[Moving, Camera, pygame.Surface] | None = None
+
+    # cameras
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Fit another layout or theme; what was zoomed or panned stays so."""
+        self.layout, self.theme = layout, theme
+        if self._camera is not None:
+            self._camera = self._camera.within(self._view_box())
+
+    def _view_box(self) -> tuple[float, float, float, float]:
+        return self.strips.room(self.layout.arena, self.layout.scale)
+
+    @property
+    def camera(self) -> Camera:
+        """What is shown where."""
+        if self._camera is None:
+            self.fit()
+        assert self._camera is not None
+        return self._camera
+
+    def fit(self) -> None:
+        """Show the whole map."""
+        self._show(self.desk.sketch.bounds or EMPTY)
+
+    def fit_selection(self) -> None:
+        """Show what is selected, or all."""
+        from robocov_app.editor.edits.edits import bounds_of
+
+        self._show(bounds_of(self.desk.sketch, self.desk.selection) or self.desk.sketch.bounds or EMPTY)
+
+    def _show(self, bounds: tuple[float, float, float, float]) -> None:
+        low_x, low_y, high_x, high_y = bounds
+        least = 0.2
+        grow_x, grow_y = max(least - (high_x - low_x), 0) / 2, max(least - (high_y - low_y), 0) / 2
+        grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
+        self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
+
+    def go_to(self, problem: Problem) -> None:
+        """Bring a problem into sight."""
+        where = problem.where
+        if where is None or where.is_empty:
+            return
+        spot = where.representative_point()
+        x, y = self.to_pixel((spot.x, spot.y))
+        left, top, width, height = self.camera.view
+        edge = 40 * self.layout.scale
+        if not (left + edge < x < left + width - edge and top + edge < y < top + height - edge):
+            self._look(replace(self.camera, center=(spot.x, spot.y)))
+
+    def zoom(self, factor: float, at: tuple[float, float]) -> None:
+        """Magnify what is under a pixel of the window."""
+        low_x, low_y, high_x, high_y = self.desk.sketch.bounds or EMPTY
+        whole = max(high_x - low_x, high_y - low_y, 1.0)
+        # neither a dot nor a single wall's paint
+        factor = float(np.clip(self.camera.zoom * factor, 20.0 / whole, 2e4)) / self.camera.zoom
+        self._look(self.camera.zoomed(factor, at))
+
+    def pan(self, dx: float, dy: float) -> None:
+        """Move the sheet by so many pixels; the map stays within reach."""
+        camera = self.camera.panned(dx, dy)
+        low_x, low_y, high_x, high_y = self.desk.sketch.bounds or EMPTY
+        far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
+        x = float(np.clip(camera.center[0], low_x - far_x, high_x + far_x))
+        y = float(np.clip(camera.center[1], low_y - far_y, high_y + far_y))
+        self._look(replace(camera, center=(x, y)))
+
+    def _look(self, camera: Camera) -> None:
+        self._camera = camera
+        self.desk.pixel = self.layout.scale / camera.zoom
+
+    # what is where
+
+    def over(self, pixel: tuple[float, float]) -> bool:
+        """Return whether a pixel of the window shows the sheet."""
+        left, top, width, height = self.camera.view
+        return left <= pixel[0] < left + width and top <= pixel[1] < top + height
+
+    def to_world(self, pixel: tuple[float, float]) -> Point:
+        """Return the place under a pixel of the window, m."""
+        x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
+        return x, y
+
+    def to_pixel(self, point: Point) -> tuple[float, float]:
+        """Return the pixel of the window where a place is."""
+        x, y = self.camera.to_pixels(np.array(point)).tolist()
+        return x, y
+
+    @property
+    def reach(self) -> float:
+        """How many metres a finger is wide."""
+        return REACH * self.layout.scale / self.camera.zoom
+
+    def problem_at(self, pixel: tuple[float, float]) -> Problem | None:
+        """Return the problem whose badge is under a pixel."""
+        if "problems" not in self.desk.shown:
+            return None
+        for problem, at in badge_places(self.desk.problems, self._view()):
+            if apart(at, pixel) < 10 * self.layout.scale:
+                return problem
+        return None
+
+    # drawing
+
+    def _view(self) -> View:
+        desk = self.desk
+        folder = desk.paper.path.parent if desk.paper.path is not None else desk.folder
+        return View(
+            self.camera,
+            self.theme,
+            self.layout.scale,
+            self.layout.size,
+            frozenset(desk.shown),
+            desk.grid,
+            Path(folder),
+        )
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw all of it."""
+        desk, shown = self.desk, self.desk.shown
+        wide = pygame.Surface((self.layout.arena[2], 1))
+        self.strips.update(self._view().canvas(wide), self.team)
+        if self.camera.view != self._view_box():
+            self._look(self.camera.within(self._view_box()))
+        view = self._view()
+        pending = desk.pending
+        base, now = desk.sketch, pending.sketch if pending is not None else desk.sketch
+        moved = getattr(desk.tools["picture"], "moved", None)
+        weighed = getattr(desk.tool, "change", None)
+        drag = desk.selector.drag
+        carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
+        lifted = self._lifted(base, now) if carried is None else _kept_keys(carried)
+        under = now if now.boundary is not base.boundary else base
+        if moved is not None:
+            under = replace(under, background=moved)
+        if isinstance(weighed, Change):
+            under = replace(under, density=weighed.sketch.density)
+        page = self.sheet.page(view, under, lifted)
+        left, top, width, height = self.layout.arena
+        screen.fill(self.theme.background, pygame.Rect(left, top, width, height))
+        clip = view.clip
+        screen.blit(page, clip, clip)
+        screen.set_clip(clip)
+        # words keep to the arena
+        canvas = view.canvas(screen.subsurface(pygame.Rect(left, top, width, height)))
+        canvas.surface.set_clip(clip)
+        if carried is not None:
+            self._carry(screen, view, carried)
+        elif lifted:
+            there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
+            self.sheet.draw_items(canvas, there, mix(self.theme.obstacle, accent(self.theme), 0.22))
+        elif now is not base:
+            new = [item for item in now.obstacles if item.key not in base.places]
+            self.sheet.draw_items(canvas, new, mix(self.theme.obstacle, accent(self.theme), 0.22))
+        if "impassable" in shown and desk.readout is not None:
+            self._hatching.draw(screen, view, desk.readout)
+            if desk.readout.gap is not None:
+                draw_gap(canvas, desk.readout.gap, desk.readout.radius)
+        self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
+        self._draw_starts(canvas, now)
+        if self.team is not None and "robots" in shown:
+            self._draw_team(canvas, self.team)
+        if carried is None:
+            self._draw_selection(canvas, now, pending.selection if pending is not None else desk.selection)
+        if "impassable" in shown and desk.readout is not None and desk.readout.gap is not None:
+            busy = desk.tool is not desk.selector or drag is not None
+            tag_gap(canvas, desk.readout.gap, desk.readout.radius, self.at if busy else None)
+        if "problems" in shown:
+            draw_problems(canvas, view, desk.problems, desk.problem, self.hovered)
+        self._draw_tool(canvas)
+        screen.set_clip(None)
+        self.strips.draw(screen, canvas, self.layout.arena)
+
+    def _lifted(self, base: Sketch, now: Sketch) -> frozenset[int]:
+        """Return the obstacles that are being changed."""
+        if now is base:
+            return frozenset()
+        places = now.places
+        return frozenset(
+            item.key
+            for item in base.obstacles
+            if (place := places.get(item.key)) is None or now.obstacles[place] is not item
+        )
+
+    def _carry(self, screen: pygame.Surface, view: View, drag: Moving) -> None:
+        """Draw many things that are being moved: once, and then the picture of them."""
+        assert drag.offset is not None
+        if self._carried is None or self._carried[0] is not drag or self._carried[1] != view.camera:
+            page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
+            own = view.canvas(page)
+            sketch = self.desk.sketch
+            there = [item for item in sketch.obstacles if item.key in drag.moving.items]
+            fill = mix(self.theme.obstacle, accent(self.theme), 0.22)
+            self.sheet.draw_items(own, there, fill, accent(self.theme))
+            for owner in drag.moving.owners - drag.moving.items:
+                self._draw_owner(own, sketch, owner, accent(self.theme), 2.0)
+            self._carried = drag, view.camera, page
+        dx, dy = drag.offset
+        zoom = view.camera.zoom
+        screen.blit(
+            self._carried[2], (round(dx * zoom), round(-dy * zoom)), special_flags=pygame.BLEND_PREMULTIPLIED
+        )
+
+    def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
+        """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
+        theme, since = canvas.theme, self.desk.moves_since
+        for key in moving(sketch):
+            item = sketch.item(key)
+            path = item.shape.path
+            assert path is not None
+            chosen = key in self.desk.selection.items
+            draw_path(canvas, path, accent(theme) if chosen else mix(theme.background, theme.ink, 0.6))
+            if since is not None and goes(path):
+                shift = path.shift(self.desk.now - since)
+                draw_ghost(canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by))
+
+    def _draw_starts(self, canvas: Canvas, sketch: Sketch) -> None:
+        for k, (name, spec) in enumerate(sketch.starts):
+            draw_start(canvas, spec, name, chosen=name in self.desk.selection.starts, first=k == 0)
+
+    def _draw_team(self, canvas: Canvas, team: Team) -> None:
+        if not team.places:
+            return
+        theme, scale = canvas.theme, canvas.scale
+        places = canvas.camera.to_pixels(np.array(team.places))
+        true = np.full(len(places), team.radius * canvas.camera.zoom)
+        radii = np.minimum(
+            fitted_radii(places, true, 2.4 * scale, min(READABLE * scale, 400.0)), true.clip(3.0)
+        )
+        edge = mix(theme.background, theme.ink, 0.55)
+        for k, (at, radius) in enumerate(zip(places.tolist(), radii.tolist(), strict=True)):
+            fill = theme.robots[k % len(theme.robots)]
+            size = round(2 * min(radius, 400.0)) / 2
+            text = str(k + 1) if sprites.number_size(size, min(len(str(k + 1)), 4)) > 7.5 * scale else ""
+            canvas.stamp(
+                partial(sprites.disc, size, fill, theme.robot_ring, min(1.4 * scale, 0.3 * size), edge, text),
+                at,
+            )
+
+    def _draw_selection(self, canvas: Canvas, sketch: Sketch, selection: Selection) -> None:
+        desk, theme = self.desk, self.theme
+        selector = desk.selector
+        selection = selection.within(sketch)
+        owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
+        hovered = selector.hovered if desk.tool is selector and not selector.busy and self.at else None
+        if hovered is not None and hovered not in owners:
+            self._draw_owner(canvas, sketch, hovered, mix(theme.background, accent(theme), 0.7), 1.5)
+        for owner in owners:
+            self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
+        if "handles" not in desk.shown or desk.tool is not selector or not selection:
+            return
+        box = box_of(sketch, selection, desk.pixel)
+        if box is not None:
+            draw_box(canvas, box, mix(theme.background, accent(theme), 0.6))
+        found = desk.grips if sketch is desk.sketch else grips(sketch, selection, desk.pixel)
+        draw_grips(canvas, found, frozenset(selection.vertices), selector.near, KNOB * canvas.scale)
+
+    def _draw_owner(
+        self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: tuple[int, int, int], width: float
+    ) -> None:
+        if isinstance(owner, str):
+            if owner in dict(sketch.starts):
+                draw_start(canvas, sketch.start(owner), "", chosen=True, first=False, scale_of_dots=1.3)
+        elif owner == BOUNDARY:
+            if sketch.boundary is not None:
+                draw_outline(canvas, [np.asarray(sketch.boundary, dtype=float)], colour, width + 0.5)
+        elif owner in sketch.places:
+            draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
+
+    def _draw_tool(self, canvas: Canvas) -> None:
+        desk = self.desk
+        at = self.at
+        draw_guides(canvas, desk.tool.guides)
+        preview = desk.tool.preview(desk)
+        if preview is not None:
+            draw_preview(canvas, preview, at)
+        if desk.typed:
+            left, top, width, height = self.camera.view
+            draw_typed(canvas, desk.typed, at or (left + width / 2, top + height / 2))
+
+
+def _kept_keys(drag: Moving) -> frozenset[int]:
+    """Return the obstacles that are not where they were while they are moved."""
+    return frozenset() if drag.copies else drag.moving.items

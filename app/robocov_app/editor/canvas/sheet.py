@@ -1,0 +1,380 @@
+"""The sheet: floor, picture, grid, obstacles and boundary on one page; only what changed is drawn anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+import shapely
+
+from robocov_app.editor.canvas.drawn_rings import Outlines
+from robocov_app.editor.canvas.picture import Underlaid
+from robocov_app.render.camera import round_length
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.clipping import FAR
+from robocov_app.render.density import draw_shading
+from robocov_app.render.fonts import shortened
+from robocov_app.render.theme import LIGHT, mix, robot_hues
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from robocov.arrays import Array
+    from robocov_app.editor.canvas.drawn_rings import Outline
+    from robocov_app.editor.model.document import Item, Sketch
+    from robocov_app.render.camera import Camera
+    from robocov_app.render.theme import Colour, Theme
+
+FINE, COARSE = 11.0, 55.0
+"""Pixels at scale 1 between the fine and the strong lines of the grid, at least."""
+
+BIAS = 1e-4
+"""Pixels by which all is shifted: round numbers would else lie between two pixels, and fall anyhow."""
+
+PATCHES = 0.5
+"""Part of the page from which on it is drawn anew as a whole."""
+
+_EDGE = 6
+"""Pixels at scale 1 around what changed that are drawn anew too."""
+
+_ROOM = 8.0
+"""Pixels at scale 1 that a name leaves free beside it."""
+
+LEAST_LETTERS = 6
+"""Letters of a shortened name, at least."""
+
+SEEN_THROUGH = 0.62
+"""Opacity of obstacles over a picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """How a sheet is looked at.
+
+    Attributes
+    ----------
+    camera : Camera
+    theme : Theme
+    scale : float
+    size : (width, height), px
+    shown : names of `settings.SHOWN`
+    grid : float, m
+    folder : Path
+        What a picture's path counts from.
+    """
+
+    camera: Camera
+    theme: Theme
+    scale: float
+    size: tuple[int, int]
+    shown: frozenset[str]
+    grid: float
+    folder: Path
+
+    @property
+    def clip(self) -> pygame.Rect:
+        """The pixels that show the world."""
+        left, top, width, height = (round(value) for value in self.camera.view)
+        return pygame.Rect(left, top, width, height)
+
+    def canvas(self, surface: pygame.Surface) -> Canvas:
+        """Return a canvas for a surface."""
+        return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
+
+
+def outside_colour(theme: Theme) -> Colour:
+    """Return the colour of what lies outside the boundary."""
+    return mix(theme.panel, theme.ink, 0.05) if theme is LIGHT else mix(theme.background, (0, 0, 0), 0.28)
+
+
+class Sheet:
+    """Draws the page, and keeps it.
+
+    Attributes
+    ----------
+    full, patched, scrolled : int
+        How often the page was drawn as a whole, in part, and moved.
+    """
+
+    def __init__(self) -> None:
+        self.outlines = Outlines()
+        self.underlaid = Underlaid()
+        self.full = self.patched = self.scrolled = 0
+        self._page: pygame.Surface | None = None
+        self._look: tuple[object, ...] = ()
+        self._camera: Camera | None = None
+        self._drawn: dict[int, Item] = {}
+        self._beyond: tuple[object, shapely.Geometry | None] = (None, None)
+
+    def page(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> pygame.Surface:
+        """Return the page with a sketch, without the obstacles that are being dragged."""
+        left, top, width, height = view.camera.view
+        view = replace(view, camera=view.camera.within((left + BIAS, top + BIAS, width, height)))
+        look = (
+            *(view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid),
+            *(view.shown & {"grid", "names", "picture"}, view.folder, sketch.background),
+            *(sketch.boundary, sketch.density),
+        )
+        items = {item.key: item for item in sketch.obstacles if item.key not in lifted}
+        page = self._page
+        if page is None or look != self._look or self._camera is None:
+            return self._all(view, sketch, items, look)
+        boxes: list[pygame.Rect] = []
+        if view.camera.center != self._camera.center:
+            moved = self._scroll(page, view)
+            if moved is None:
+                return self._all(view, sketch, items, look)
+            boxes += moved
+        drawn, self._drawn = self._drawn, items
+        boxes += [self._box(view, item) for key, item in drawn.items() if items.get(key) is not item]
+        boxes += [self._box(view, item) for key, item in items.items() if drawn.get(key) is not item]
+        boxes = [box for box in (each.clip(view.clip) for each in boxes) if box.width and box.height]
+        whole = view.clip
+        if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
+            return self._all(view, sketch, items, look)
+        for box in _merged(boxes):
+            self._paint(page, view, sketch, items, box)
+            self.patched += 1
+        return page
+
+    def _all(
+        self, view: View, sketch: Sketch, items: dict[int, Item], look: tuple[object, ...]
+    ) -> pygame.Surface:
+        if self._page is None or self._page.get_size() != view.size:
+            self._page = pygame.Surface(view.size, 0, 32)
+        self._look, self._camera, self._drawn = look, view.camera, items
+        self._paint(self._page, view, sketch, items, view.clip)
+        self.full += 1
+        return self._page
+
+    def _scroll(self, page: pygame.Surface, view: View) -> list[pygame.Rect] | None:
+        """Move the page with the camera; return what came into sight, None where it cannot be moved."""
+        assert self._camera is not None
+        before = self._camera.to_pixels(np.array(view.camera.center))
+        dx, dy = (np.array(view.camera.middle) - before).tolist()
+        whole_x, whole_y = round(dx), round(dy)
+        clip = view.clip
+        far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
+        if far or abs(dx - whole_x) > 0.02 or abs(dy - whole_y) > 0.02:
+            return None
+        self._camera = view.camera
+        self.scrolled += 1
+        page.set_clip(clip)
+        page.scroll(whole_x, whole_y)
+        page.set_clip(None)
+        boxes = []
+        if whole_x:
+            left = clip.left if whole_x > 0 else clip.right + whole_x
+            boxes.append(pygame.Rect(left, clip.top, abs(whole_x), clip.height))
+        if whole_y:
+            # beside the strip that is there already, so that the two do not overlap
+            top = clip.top if whole_y > 0 else clip.bottom + whole_y
+            left = clip.left + max(whole_x, 0)
+            boxes.append(pygame.Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
+        return boxes
+
+    def _box(self, view: View, item: Item) -> pygame.Rect:
+        """Return the pixels that an obstacle takes."""
+        low_x, low_y, high_x, high_y = self.outlines.of(item).bounds.tolist()
+        if not np.isfinite(low_x):
+            return pygame.Rect(0, 0, 0, 0)
+        ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+        (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
+        edge = round(_EDGE * view.scale)
+        return pygame.Rect(
+            int(left) - edge,
+            int(top) - edge,
+            int(right - left) + 2 * edge + 2,
+            int(bottom - top) + 2 * edge + 2,
+        )
+
+    # painting
+
+    def _paint(
+        self, page: pygame.Surface, view: View, sketch: Sketch, items: dict[int, Item], box: pygame.Rect
+    ) -> None:
+        page.set_clip(box)
+        theme, camera, canvas = view.theme, view.camera, view.canvas(page)
+        page.fill(outside_colour(theme), box)
+        ring = None
+        if sketch.boundary is not None and len(sketch.boundary) > 2:
+            ring = camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
+            canvas.polygon(ring, theme.background)
+        picture = sketch.background if "picture" in view.shown else None
+        if picture is not None:
+            self.underlaid.draw(page, picture, view.folder, camera, view.clip)
+        if "grid" in view.shown:
+            self._grid(page, view, box, fine=picture is None or not picture.shown)
+        density = sketch.density
+        if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
+            draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
+        self._draw_beyond(canvas, sketch)
+        corners = np.array([box.bottomleft, box.topright], dtype=float)
+        (low_x, low_y), (high_x, high_y) = camera.to_world(corners).tolist()
+        edge = _EDGE * view.scale / camera.zoom
+        wanted = (low_x - edge, low_y - edge, high_x + edge, high_y + edge)
+        there = [item for item in self.outlines.touching(sketch, wanted) if items.get(item.key) is item]
+        if picture is None or not picture.shown:
+            self.draw_items(canvas, there)
+        else:
+            over = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+            shifted = camera.within((camera.view[0] - box.x, camera.view[1] - box.y, *camera.view[2:]))
+            self.draw_items(Canvas(over, shifted, theme, view.scale, robot_hues(0)), there)
+            over.set_alpha(round(255 * SEEN_THROUGH))
+            page.blit(over, box)
+        if ring is not None:
+            canvas.outline(ring, theme.boundary, canvas.width(theme.boundary_line))
+        if "names" in view.shown:
+            self._names(canvas, there)
+        page.set_clip(None)
+
+    def _grid(self, page: pygame.Surface, view: View, box: pygame.Rect, *, fine: bool) -> None:
+        """Draw the grid: lines where it snaps if they are far enough apart, strong ones at round places."""
+        zoom, theme = view.camera.zoom, view.theme
+        close, wide = grid_steps(view.grid, zoom, view.scale)
+        floor = theme.background
+        soft, strong = (
+            mix(floor, theme.grid, part) for part in ((0.32, 0.75) if theme is LIGHT else (0.2, 0.5))
+        )
+        low_x, low_y, high_x, high_y = view.camera.visible()
+        width = max(1, round(view.scale))
+        for step, colour in ((close, soft), (wide, strong))[0 if fine else 1 :]:
+            xs = np.arange(np.ceil(low_x / step), np.floor(high_x / step) + 1) * step
+            ys = np.arange(np.ceil(low_y / step), np.floor(high_y / step) + 1) * step
+            columns = view.camera.to_pixels(np.column_stack([xs, np.zeros(len(xs))]))[:, 0]
+            rows = view.camera.to_pixels(np.column_stack([np.zeros(len(ys)), ys]))[:, 1]
+            for x in columns[(columns >= box.left - 2) & (columns <= box.right + 2)].tolist():
+                page.fill(colour, pygame.Rect(round(x - width / 2), box.top, width, box.height))
+            for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
+                page.fill(colour, pygame.Rect(box.left, round(y - width / 2), box.width, width))
+
+    def _draw_beyond(self, canvas: Canvas, sketch: Sketch) -> None:
+        """Draw what robots take for free although it lies outside the boundary: it is in their hull."""
+        if self._beyond[0] is not sketch.boundary:
+            self._beyond = sketch.boundary, beyond(sketch)
+        geometry = self._beyond[1]
+        if geometry is None or geometry.is_empty:
+            return
+        fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
+        for part in shapely.get_parts(geometry):
+            if isinstance(part, shapely.Polygon):
+                corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+                canvas.polygon(corners, fill)
+                canvas.outline(corners, mix(fill, canvas.theme.obstacle_edge, 0.5), 1)
+
+    def draw_items(
+        self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
+    ) -> None:
+        """Draw obstacles: first what they cover, then their edges, so that each can be told apart."""
+        fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
+        plain = [self.outlines.of(item) for item in items]
+        rings = [ring for each in plain if not each.has_holes for ring in each.rings]
+        if rings:
+            corners, ends = _joined(canvas, rings)
+            canvas.polygons(corners, ends, [fill] * len(ends))
+        for each in plain:
+            if each.has_holes:
+                _draw_holed(canvas, each, fill)
+        rings = [ring for each in plain for ring in each.rings]
+        if rings:
+            corners, ends = _joined(canvas, rings)
+            _draw_rings(canvas, corners, ends, edge)
+        for each in plain:
+            for line in each.lines:
+                points = canvas.camera.to_pixels(line)
+                if len(points) > 1:
+                    canvas.outline(points, canvas.theme.trajectory, canvas.width(1.5), closed=False)
+
+    def _names(self, canvas: Canvas, items: list[Item]) -> None:
+        size = canvas.text_size(canvas.theme.small_text)
+        colour = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
+        for item in items:
+            name = item.shape.name
+            if not name:
+                continue
+            outline = self.outlines.of(item)
+            low_x, low_y, high_x, high_y = outline.bounds.tolist()
+            zoom = canvas.camera.zoom
+            if (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
+                continue
+            x, y, room, high = outline.name_place
+            words = shortened(name, size, room * zoom - _ROOM * canvas.scale)
+            if high * zoom > size + 2 and (words == name or len(words) > LEAST_LETTERS):
+                at = canvas.camera.to_pixels(np.array([x, y])).tolist()
+                canvas.text(words, at, size=canvas.theme.small_text, colour=colour, anchor="middle")
+
+
+def beyond(sketch: Sketch) -> shapely.Geometry | None:
+    """Return what of the boundary's convex hull lies outside the boundary; None without a boundary."""
+    if sketch.boundary is None or len(sketch.boundary) < 3:
+        return None
+    ring = shapely.Polygon(sketch.boundary)
+    if not ring.is_valid:
+        return None
+    return shapely.difference(ring.convex_hull, ring)
+
+
+def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
+    """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear.
+
+    >>> grid_steps(0.1, 60.0, 1.0)
+    (0.2, 1.0)
+    """
+    least = FINE * scale / zoom
+    fine = grid
+    if fine < least:
+        times = round_length(least / grid)
+        fine = grid * (times if times >= least / grid else round_length(2.5001 * times))
+    times = round_length(max(COARSE * scale / zoom / fine, 1.0))
+    coarse = fine * (times if times * fine >= COARSE * scale / zoom else round_length(2.5001 * times))
+    return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
+
+
+def _joined(canvas: Canvas, rings: list[Array]) -> tuple[Array, list[int]]:
+    ends = np.cumsum([len(ring) for ring in rings]).tolist()
+    return canvas.camera.to_pixels(np.concatenate(rings)), ends
+
+
+def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
+    """Draw the smooth outlines of many rings."""
+    width = canvas.width(canvas.theme.line)
+    if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
+        points, begin = corners.tolist(), 0
+        for end in ends:
+            if end - begin > 1:
+                pygame.draw.aalines(canvas.surface, colour, True, points[begin:end])
+            begin = end
+        return
+    following = np.arange(1, len(corners) + 1)
+    following[np.array(ends) - 1] = [0, *ends[:-1]]
+    edges = np.hstack([corners, corners[following]])
+    # what lies beside the page would only take time
+    clip = canvas.surface.get_clip()
+    low, high = np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])
+    seen = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
+    seen &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
+    canvas.segments(edges[seen], colour, width)
+
+
+def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
+    """Draw an obstacle with holes on a page of its own, so that what lies below shows in them."""
+    clip = canvas.surface.get_clip()
+    page = pygame.Surface(clip.size, pygame.SRCALPHA, 32)
+    shift = np.array(clip.topleft, dtype=float)
+    own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
+    for ring, outer in zip(outline.rings, outline.outer, strict=True):
+        own.polygon(canvas.camera.to_pixels(ring) - shift, (*fill, 255) if outer else (0, 0, 0, 0))
+    canvas.surface.blit(page, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def _merged(boxes: list[pygame.Rect]) -> list[pygame.Rect]:
+    """Return boxes that cover the same, no two of which overlap; fewer, where there are many."""
+    merged: list[pygame.Rect] = []
+    for box in boxes if len(boxes) <= 40 else [boxes[0].unionall(boxes[1:])]:
+        each = box.copy()
+        while (k := each.collidelist(merged)) >= 0:
+            each.union_ip(merged.pop(k))
+        merged.append(each)
+    return merged

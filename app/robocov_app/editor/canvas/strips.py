@@ -1,0 +1,122 @@
+"""The strips above and below the sheet: the legend; scale bar, whose map it is and what it is like."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pygame
+
+from robocov_app.editor.canvas.findings import legend_entries
+from robocov_app.editor.canvas.sheet import beyond
+from robocov_app.render.density import density_entry
+from robocov_app.render.fonts import shortened
+from robocov_app.render.furniture import (
+    EDGE,
+    LEGEND_ROW,
+    STRIP,
+    bar_length,
+    draw_bar,
+    legend_rows,
+    legend_strip,
+)
+from robocov_app.render.phi import range_words, value_range
+
+if TYPE_CHECKING:
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.team import Team
+    from robocov_app.render.canvas import Canvas
+    from robocov_app.render.layers import LegendEntry
+    from robocov_app.viewer.layout import Box
+
+
+class Strips:
+    """Draws the strips, and says what they leave to the sheet.
+
+    Parameters
+    ----------
+    desk : Desk
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._entries: list[LegendEntry] = []
+        self._rows = 1
+        self._rows_for: object = None
+        self._unfree: tuple[object, bool] = (None, False)
+        self._kept: tuple[object, pygame.Surface | None] = (None, None)
+
+    def room(self, arena: Box, scale: float) -> tuple[float, float, float, float]:
+        """Return what of the arena is left: left, top, width and height, px."""
+        left, top, width, height = arena
+        above = round((10 + LEGEND_ROW * self._rows) * scale) if "legend" in self._desk.shown else 0
+        return (
+            float(left),
+            float(top + above),
+            float(width),
+            float(max(height - above - round(STRIP * scale), 1)),
+        )
+
+    def update(self, canvas: Canvas, team: Team | None) -> None:
+        """Look what there is to tell, on a canvas as wide as the arena.
+
+        The legend does not become lower again while things come and go: the map is not to jump.
+        """
+        desk = self._desk
+        self._entries = self._found(team)
+        rows = max(len(legend_rows(canvas, self._entries)), 1)
+        key = (canvas.surface.get_width(), canvas.scale, desk.paper, "legend" in desk.shown)
+        self._rows = max(rows, self._rows) if key == self._rows_for else rows
+        self._rows_for = key
+
+    def _found(self, team: Team | None) -> list[LegendEntry]:
+        sketch, shown = self._desk.sketch, self._desk.shown
+        if "legend" not in shown:
+            return []
+        if self._unfree[0] is not sketch.boundary:
+            geometry = beyond(sketch)
+            self._unfree = sketch.boundary, geometry is not None and geometry.area > 1e-6
+        standing = "robots" in shown and team is not None and bool(team.places)
+        readout = self._desk.readout if "impassable" in shown else None
+        found = legend_entries(readout, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
+        density = sketch.density
+        if density is not None and not density.uniform and sketch.boundary:
+            x, y = zip(*sketch.boundary, strict=True)
+            span = value_range(density, (min(x), min(y), max(x), max(y)))
+            found.append(density_entry(range_words(span)))
+        return found
+
+    def draw(self, screen: pygame.Surface, canvas: Canvas, arena: Box) -> None:
+        """Draw both strips."""
+        left, top, width, height = arena
+        if self._entries:
+            key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
+            if self._kept[0] != key:
+                wide = replace(canvas, surface=pygame.Surface((width, 1)))
+                self._kept = key, legend_strip(self._entries, wide)
+            assert self._kept[1] is not None
+            screen.blit(self._kept[1], (left, top))
+        high = round(STRIP * canvas.scale)
+        foot = screen.subsurface(pygame.Rect(left, top + height - high, width, high))
+        own = replace(canvas, surface=foot)
+        draw_bar(own)
+        taken = (EDGE + 90) * canvas.scale + bar_length(own) * canvas.camera.zoom
+        size = canvas.text_size(canvas.theme.text)
+        words = shortened(map_words(self._desk), size, width - taken - EDGE * canvas.scale)
+        own.text(words, (width - EDGE * canvas.scale, high / 2), anchor="right")
+
+
+def map_words(desk: Desk) -> str:
+    """Return what the strip below the sheet says: whose map it is, and what it is like."""
+    sketch, readout = desk.sketch, desk.readout
+    count = len(sketch.obstacles)
+    said = [
+        f"{'● ' if desk.paper.unsaved else ''}{desk.paper.title}",
+        f"{count} obstacle{'' if count == 1 else 's'}",
+    ]
+    if readout is not None:
+        said.append(f"{readout.free_area:.2f} m² free")
+        grave = sum(problem.grave for problem in readout.problems)
+        if grave:
+            said.append(f"draft: {grave} problem{'' if grave == 1 else 's'}")
+    return "   ·   ".join(said)

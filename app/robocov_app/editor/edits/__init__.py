@@ -1,0 +1,1 @@
+"""Pure edits: a sketch in, a sketch out."""

@@ -1,0 +1,167 @@
+"""Selected obstacles united, subtracted, intersected: by shapely, holes kept.
+
+Walls and circles become polygons. The result may be several obstacles; they take the place, the name and
+the note of the lowest. As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for
+people.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import TYPE_CHECKING
+
+import shapely
+from shapely import Polygon
+
+from robocov.environment import GRID, CircleObstacle, PolygonObstacle
+from robocov.errors import MapError, counted
+from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov_app.editor.model.document import Item, Sketch
+from robocov_app.editor.model.outlines import outlines
+from robocov_app.editor.model.plane import tenths
+from robocov_app.editor.model.selection import Change, Selection, called, exchanged
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.environment import Obstacle
+
+
+def united(sketch: Sketch, selection: Selection) -> Change:
+    """Unite the selected obstacles: at least two."""
+    items = _chosen(sketch, selection, "unite")
+    whole = _union(items)
+    return _in_place(sketch, items, [whole], f"{counted(len(items), 'obstacle')} united")
+
+
+def subtracted(sketch: Sketch, selection: Selection) -> Change:
+    """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
+    lowest, *uppers = _chosen(sketch, selection, "subtract")
+    left = shapely.difference(lowest.geometry, _union(uppers), grid_size=GRID)
+    what = called(sketch, lowest.key)
+    cutters = counted(len(uppers), "obstacle")
+    return _in_place(
+        sketch, [lowest, *uppers], [left], f"{cutters} cut out of {what}", f"nothing is left of {what}"
+    )
+
+
+def intersected(sketch: Sketch, selection: Selection) -> Change:
+    """Keep what all selected obstacles have in common."""
+    items = _chosen(sketch, selection, "intersect")
+    common = reduce(_intersection, (item.geometry for item in items))
+    words = f"{counted(len(items), 'obstacle')} intersected"
+    return _in_place(sketch, items, [common], words, "they have nothing in common")
+
+
+def divided(sketch: Sketch, selection: Selection) -> Change:
+    """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
+    lowest, *uppers = _chosen(sketch, selection, "divide")
+    cutter = _union(uppers)
+    outside = shapely.difference(lowest.geometry, cutter, grid_size=GRID)
+    parts = [outside, _intersection(lowest.geometry, cutter)]
+    return _in_place(sketch, [lowest, *uppers], parts, f"{called(sketch, lowest.key)} divided")
+
+
+def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
+    """Grow the selected obstacles by so many metres on every side, with sharp corners; shrink with by < 0."""
+    if not (math.isfinite(by) and SMALLEST <= abs(by) <= LARGEST):
+        raise MapError(f"a length of at least {1000 * SMALLEST:g} mm was wanted")
+    if not selection.items:
+        raise MapError("select obstacles first")
+    shapes: dict[int, Sequence[Obstacle]] = {}
+    for item in sketch.obstacles:
+        if item.key not in selection.items:
+            continue
+        if isinstance(item.shape, CircleObstacle):
+            radius = tenths(item.shape.radius + by)
+            grown: Sequence[Obstacle] = [replace(item.shape, radius=radius)] if radius >= SMALLEST else []
+        else:
+            # corners sharper than a right angle would reach far out: they are cut off
+            buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
+            grown = outlines(buffered, item.shape.name)
+        if not grown:
+            raise MapError(f"nothing would be left of the {called(sketch, item.key)}")
+        shapes[item.key] = grown
+    words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
+    return exchanged(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
+
+
+def clipped(sketch: Sketch, selection: Selection) -> Change:
+    """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected.
+
+    What lies outside as a whole goes; what lies inside stays as it is.
+    """
+    if sketch.boundary is None or len(sketch.boundary) < 3 or not Polygon(sketch.boundary).is_valid:
+        raise MapError("the boundary must be sound first")
+    inside = Polygon(sketch.boundary)
+    shapely.prepare(inside)
+    shapes: dict[int, Sequence[Obstacle]] = {}
+    for item in sketch.obstacles:
+        if selection.items and item.key not in selection.items:
+            continue
+        if not inside.covers(item.geometry):
+            shapes[item.key] = outlines(_intersection(item.geometry, inside), item.shape.name)
+    if not shapes:
+        raise MapError("nothing sticks out of the boundary")
+    return exchanged(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
+
+
+def repaired(sketch: Sketch, selection: Selection) -> Change:
+    """Make polygons of outlines that cross themselves, by shapely's make_valid; the boundary too.
+
+    Of the selected things, or of all if none is selected. The boundary keeps its largest part.
+    """
+    everything = not (selection.items or selection.boundary)
+    shapes: dict[int, Sequence[Obstacle]] = {}
+    for item in sketch.obstacles:
+        if (everything or item.key in selection.items) and isinstance(item.shape, PolygonObstacle):
+            shape = item.shape
+            if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
+                shapes[item.key] = outlines(item.geometry, shape.name)
+    boundary = sketch.boundary
+    if (everything or selection.boundary) and boundary is not None and len(boundary) >= 3:
+        polygon = Polygon(boundary)
+        if not polygon.is_valid:
+            parts = outlines(shapely.make_valid(polygon))
+            boundary = parts[0].vertices if parts else None
+    count = len(shapes) + (boundary is not sketch.boundary)
+    if not count:
+        raise MapError("there is nothing to repair: no outline crosses itself")
+    change = exchanged(replace(sketch, boundary=boundary), shapes, f"{counted(count, 'outline')} repaired")
+    with_boundary = replace(
+        change.selection, boundary=boundary is not sketch.boundary and boundary is not None
+    )
+    return replace(change, selection=with_boundary)
+
+
+def _union(items: Sequence[Item]) -> BaseGeometry:
+    return shapely.union_all([item.geometry for item in items], grid_size=GRID)
+
+
+def _intersection(a: BaseGeometry, b: BaseGeometry) -> BaseGeometry:
+    return shapely.intersection(a, b, grid_size=GRID)
+
+
+def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
+    """Return the selected obstacles, the lowest first."""
+    items = [item for item in sketch.obstacles if item.key in selection.items]
+    if len(items) < 2:
+        raise MapError(f"select two or more obstacles to {verb}")
+    for item in items:
+        if not item.geometry.area > 0.0:
+            raise MapError(f"the {called(sketch, item.key)} covers nothing: repair or delete it first")
+    return items
+
+
+def _in_place(
+    sketch: Sketch, items: Sequence[Item], parts: Sequence[BaseGeometry], words: str, empty: str = ""
+) -> Change:
+    """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
+    lowest, *others = items
+    shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]
+    if not shapes:
+        raise MapError(empty or "nothing is left")
+    return exchanged(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)

@@ -1,0 +1,116 @@
+"""Copy and paste, as JSON text: within a window, between windows, and into a text editor.
+
+Besides its own format, what is pasted may be a whole map, an obstacle as a map has it, a list of obstacles,
+or a list of points, which becomes a polygon.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from robocov.environment import PolygonObstacle
+from robocov.errors import MapError
+from robocov.files.strictjson import parse
+from robocov.mapfile import dump_document
+from robocov.mapfile.models import FORMAT as MAP_FORMAT
+from robocov.mapfile.models import VERSION
+from robocov_app.editor.edits.adding import free_name
+from robocov_app.editor.edits.affine import Affine
+from robocov_app.editor.edits.placing import bounds_of, moved
+from robocov_app.editor.model.document import Sketch, draft_document, sketch_of
+from robocov_app.editor.model.selection import Change, Selection
+
+if TYPE_CHECKING:
+    from robocov.environment import Point
+
+FORMAT = "robocov-clipboard"
+"""What the copied text says that it is."""
+
+
+def copied(sketch: Sketch, selection: Selection) -> str:
+    """Return the text that stands for what is selected: obstacles with notes, starts, the boundary.
+
+    Raises
+    ------
+    MapError
+        When nothing is selected that can be copied.
+    """
+    part = Sketch(
+        name=sketch.name,
+        boundary=sketch.boundary if selection.boundary else None,
+        obstacles=tuple(item for item in sketch.obstacles if item.key in selection.items),
+        starts=tuple((name, spec) for name, spec in sketch.starts if name in selection.starts),
+    )
+    if part.boundary is None and not part.obstacles and not part.starts:
+        raise MapError("select obstacles, starts or the boundary to copy")
+    return dump_document({**draft_document(part), "format": FORMAT})
+
+
+def pasted(sketch: Sketch, text: str, at: Point | None = None) -> Change:
+    """Paste what `copied` returned; it is selected then.
+
+    A boundary becomes the map's if it has none, else a polygon. Starts get free names.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    text : str
+    at : (x, y) or None, m
+        Where the middle of its bounding box is to be; None leaves it where it was.
+
+    Raises
+    ------
+    MapError
+        When the text is nothing that can be pasted; one sentence.
+    """
+    part = _part(text)
+    shapes = [(item.shape, item.note) for item in part.obstacles]
+    if part.boundary is not None and sketch.boundary is not None:
+        shapes.append((PolygonObstacle(part.boundary), ""))
+    after, keys = sketch.added(shapes)
+    new_boundary = part.boundary is not None and sketch.boundary is None
+    if new_boundary:
+        after = replace(after, boundary=part.boundary)
+    names = []
+    for name, spec in part.starts:
+        names.append(free_name(after, name or "start"))
+        after = after.with_start(names[-1], spec)
+    selection = replace(Selection.of(*keys, *names), boundary=new_boundary)
+    if not selection:
+        raise MapError("there is nothing to paste in what was copied")
+    bounds = bounds_of(after, selection)
+    # by nothing too: what is pasted lies on tenths of millimetres, as far as maps reach
+    shift = Affine()
+    if at is not None and bounds is not None:
+        shift = Affine.shift(at[0] - (bounds[0] + bounds[2]) / 2, at[1] - (bounds[1] + bounds[3]) / 2)
+    after = moved(after, selection, shift.x0, shift.y0).sketch
+    return Change(after, selection, f"{selection.words(after)} pasted")
+
+
+def _part(text: str) -> Sketch:
+    """Return what a text stands for, as a sketch of its own."""
+    if not text.strip():
+        raise MapError("there is nothing to paste")
+    if text.lstrip()[:1] not in ("{", "["):
+        raise MapError("what was copied is no part of a map")
+    try:
+        return sketch_of(_map_of(parse(text, "what was copied")), "what was copied")
+    except MapError as error:
+        raise MapError(f"this cannot be pasted: {error}") from None
+
+
+def _map_of(value: Any) -> dict[str, Any]:
+    """Return the map document that holds a pasted value."""
+    empty = {"format": MAP_FORMAT, "version": VERSION}
+    if isinstance(value, dict):
+        if value.get("format") == FORMAT:
+            return {**value, "format": MAP_FORMAT}
+        if "format" in value:
+            return value
+        return {**empty, "obstacles": [value]}
+    if isinstance(value, list) and value and all(isinstance(each, dict) for each in value):
+        return {**empty, "obstacles": value}
+    if not isinstance(value, list) or len(value) < 3:
+        raise MapError("three points at least, obstacles or a map were wanted")
+    return {**empty, "obstacles": [{"kind": "polygon", "vertices": value}]}

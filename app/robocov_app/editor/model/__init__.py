@@ -1,0 +1,1 @@
+"""What is edited: sketches, their files, their problems. Knows no pygame."""

@@ -1,0 +1,129 @@
+"""What was done to a sketch, in words, and back again: without a limit."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.selection import Change, Selection
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What was there before something was done, and after it."""
+
+    before: Sketch
+    selected_before: Selection
+    after: Change
+    drag: Hashable | None
+
+
+class History:
+    """A sketch and all that it was; undo is exact, because what it was is kept, not what was done.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    saved : bool
+        Whether a file holds just that.
+
+    Attributes
+    ----------
+    sketch : Sketch
+        As it is now.
+    selection : Selection
+        What is selected; a window that selects something else sets it.
+    """
+
+    def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
+        self.sketch = sketch
+        self.selection = Selection()
+        self._done: list[_Step] = []
+        self._undone: list[_Step] = []
+        self._saved = sketch if saved else None
+        self._broken = False
+
+    def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
+        """Take a change; say whether it changed anything. What had been undone cannot be done again then.
+
+        Changes one after another with the same `drag` become one, such as those of one drag, of keys
+        pressed quickly, or of a field that is typed in. One that leads back to where they began is none.
+        """
+        before, selected = self.sketch, self.selection
+        last = self._done[-1] if self._done else None
+        merges = drag is not None and not self._broken and last is not None and last.drag == drag
+        self._broken = False
+        self.selection = change.selection
+        if change.sketch == before:
+            return False
+        if merges and last is not None:
+            self._done.pop()
+            before, selected = last.before, last.selected_before
+        self.sketch = change.sketch
+        self._undone = []
+        if change.sketch != before:
+            self._done.append(_Step(before, selected, change, drag))
+        return True
+
+    def undo(self) -> Change | None:
+        """Take the newest change back; return what was there before with the words of what was taken back.
+
+        None if there is nothing.
+        """
+        if not self._done:
+            return None
+        step = self._done.pop()
+        self._undone.append(step)
+        return self._now(Change(step.before, step.selected_before, step.after.words))
+
+    def redo(self) -> Change | None:
+        """Do again what was undone last; None if there is nothing."""
+        if not self._undone:
+            return None
+        step = self._undone.pop()
+        self._done.append(step)
+        return self._now(step.after)
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is something to take back."""
+        return bool(self._done)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is something to do again."""
+        return bool(self._undone)
+
+    @property
+    def past(self) -> tuple[str, ...]:
+        """What can be taken back, in words, the newest first."""
+        return tuple(step.after.words for step in reversed(self._done))
+
+    @property
+    def future(self) -> tuple[str, ...]:
+        """What can be done again, in words, the next first."""
+        return tuple(step.after.words for step in reversed(self._undone))
+
+    def break_drag(self) -> None:
+        """Let the next change stand alone, as when the mouse is released."""
+        self._broken = True
+
+    def mark_saved(self) -> None:
+        """Remember that a file holds what is there now."""
+        self._saved = self.sketch
+        self._broken = True
+
+    def mark_unsaved(self) -> None:
+        """Remember that no file holds any of it, as when the file has changed or gone."""
+        self._saved = None
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something would be lost; undoing back to what was saved makes it false again."""
+        return self._saved is not self.sketch and self._saved != self.sketch
+
+    def _now(self, change: Change) -> Change:
+        self.sketch, self.selection = change.sketch, change.selection
+        self._broken = True
+        return change

@@ -1,0 +1,210 @@
+"""What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass.
+
+All of it may take longer than a frame: a window asks a `ReadoutWorker`, which works in a process of its own.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Polygon
+
+from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
+from robocov.robots import DEFAULT_RADIUS
+from robocov_app.editor.model.document import BOUNDARY, Sketch
+from robocov_app.editor.model.faults import place_words
+from robocov_app.editor.model.problems import Problem, examined
+from robocov_app.editor.model.selection import rings_of
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from robocov.arrays import Array, IntArray
+
+_TOUCHING = 1e-5
+"""Metres within which an edge lies on a wall."""
+
+_EXACTLY = 1e-6
+"""Metres by which a gap may be narrower than a robot that passes: it fits where it just fits."""
+
+_MOST_GAPS = 20
+"""Gaps that are told of one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """What a sketch is like, for robots of some radius.
+
+    Attributes
+    ----------
+    free_area : float, m²
+    components : tuple of float, m²
+        Areas of the connected parts of the free space, the largest first.
+    reached : tuple of float, m²
+        Areas that a robot can sweep without passing a gap that is too narrow, the largest first: more than
+        one means that some places are out of reach from others.
+    gap : Gap or None
+        The narrowest passage; None where there is none.
+    impassable : MultiPolygon
+        Free space that keeps such robots out: at passages that are too narrow, the largest disc that passes;
+        all that no robot touches from anywhere, but for corners that are merely too sharp for a disc.
+    sealed : MultiPolygon
+        Free space where robots fit, but that is cut off from the largest part for them.
+    vertices : int
+        Of boundary, walls, polygons and their holes.
+    problems : tuple of Problem
+    radius : float, m
+        Of the robots that were asked about.
+    seconds : float
+        What it took.
+    """
+
+    free_area: float
+    components: tuple[float, ...]
+    reached: tuple[float, ...]
+    gap: Gap | None
+    impassable: MultiPolygon
+    sealed: MultiPolygon
+    vertices: int
+    problems: tuple[Problem, ...]
+    radius: float
+    seconds: float
+
+
+def readout(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Readout:
+    """Measure a sketch; one that has no boundary, or a broken one, has as much free space as can be made out.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    radius : float, m
+        Of the robots.
+    """
+    began = time.perf_counter()
+    found, free = examined(sketch, radius)
+    narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
+    gap = narrow[0] if narrow else narrowest_gap(free)
+    reached, untouched = reach_of(free, radius)
+    impassable = shapely.union_all([*map(_disc_in, narrow), untouched]) & free
+    marks = _polygons(impassable)
+    owners = [BOUNDARY, *(item.key for item in sketch.obstacles)]
+    return Readout(
+        free_area=float(free.area),
+        components=tuple(float(part.area) for part in free.geoms),
+        reached=tuple(float(part.area) for part in reached),
+        gap=gap,
+        impassable=MultiPolygon(marks),
+        sealed=MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)]),
+        vertices=sum(len(points) for owner in owners for _, points, _ in rings_of(sketch, owner)),
+        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, free, radius)),
+        radius=radius,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[BaseGeometry, ...], MultiPolygon]:
+    """Return what a robot sweeps from anywhere in each part that it can drive in, and what it never touches.
+
+    Its centre can be where the free space is eroded by its radius; grown back by the radius, each connected
+    part of that is what it sweeps (their union is the free space's opening by a disc). What is left of the
+    free space are long passages and niches that are too narrow, and crumbs in corners, which are left out:
+    they touch the rest in one arc, and no point of them is farther from it than the radius. Curves are
+    polygons of 64 sides, so that this is right to about a hundredth of the radius.
+
+    Returns
+    -------
+    swept : tuple of geometries
+        The largest first.
+    untouched : MultiPolygon
+    """
+    centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
+    swept = [part.buffer(radius) & free for part in centres]
+    swept.sort(key=lambda part: -part.area)
+    opened = shapely.union_all(swept)
+    left = free - opened.buffer(SAGITTA / 2)
+    parts = np.array([part for part in _polygons(left) if part.area > 0.0], dtype=object)
+    if not len(parts):
+        return tuple(swept), MultiPolygon()
+    points, of = shapely.get_coordinates(parts, return_index=True)
+    deep = np.full(len(parts), opened.is_empty)
+    if not opened.is_empty:
+        # `dwithin` is prepared, which `distance` would not be: that counts with thousands of walls
+        shapely.prepare(opened)
+        np.logical_or.at(deep, of, ~shapely.dwithin(opened, shapely.points(points), radius))
+    wanted = deep | (_arcs(parts, free) != 1)
+    # what is no wider than a crack is taken for touching
+    wide = ~shapely.is_empty(shapely.buffer(parts, -SAGITTA, quad_segs=2))
+    return tuple(swept), MultiPolygon(list(parts[wanted & wide]))
+
+
+def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
+    """Return for each polygon in how many stretches its outline leaves the walls."""
+    walls = free.boundary
+    shapely.prepare(walls)
+    rings, of = shapely.get_rings(parts, return_index=True)
+    points, ring_of = shapely.get_coordinates(rings, return_index=True)
+    is_edge = ring_of[1:] == ring_of[:-1]
+    ring = ring_of[1:][is_edge]
+    middles = ((points[1:] + points[:-1]) / 2)[is_edge]
+    off = ~shapely.dwithin(walls, shapely.points(middles), _TOUCHING)
+    first = np.searchsorted(ring, np.arange(len(rings)))
+    before = np.arange(len(ring)) - 1
+    before[first] = np.append(first[1:], len(ring)) - 1
+    counts = np.zeros(len(parts), dtype=np.intp)
+    np.add.at(counts, of[ring[off & ~off[before]]], 1)
+    # an outline that touches no wall at all
+    np.add.at(counts, of[np.logical_and.reduceat(off, first)], 1)
+    return counts
+
+
+def _disc_in(gap: Gap) -> BaseGeometry:
+    """Return the largest disc that passes a gap, in the midst of it."""
+    return shapely.Point(_middle(gap)).buffer(gap.width / 2)
+
+
+def _middle(gap: Gap) -> tuple[float, float]:
+    (ax, ay), (bx, by) = gap.between
+    return (ax + bx) / 2, (ay + by) / 2
+
+
+def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
+    """Warn of each passage that is too narrow: of several gaps in one marked place, of the narrowest."""
+    found: dict[int, Problem] = {}
+    tree = shapely.STRtree(marks)
+    for gap in narrow:
+        mark = int(tree.nearest(shapely.Point(_middle(gap))))
+        if mark not in found:
+            at = place_words(*_middle(gap))
+            words = f"the gap at {at} is {gap.width:.3g} m wide: too narrow for robots of radius {radius:g} m"
+            found[mark] = Problem(words, LineString(gap.between), None, False)
+    problems = list(found.values())
+    more = problems[_MOST_GAPS:]
+    if more:
+        words = f"{len(more)} more gaps are too narrow for robots of radius {radius:g} m"
+        where = shapely.union_all([problem.where for problem in more])
+        return [*problems[:_MOST_GAPS], Problem(words, where, None, False)]
+    return problems
+
+
+def _cut_off(reached: tuple[BaseGeometry, ...], free: MultiPolygon, radius: float) -> list[Problem]:
+    """Warn of places that are out of reach from the largest part, because of gaps that are too narrow."""
+    rooms = [part for part in free.geoms if part.area >= np.pi * radius**2]
+    if not free.is_empty and not reached:
+        return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
+    if len(reached) <= len(rooms):
+        return []
+    area = sum(part.area for part in reached[1:])
+    words = (
+        f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space: "
+        f"{area:.3g} m² are cut off from the largest"
+    )
+    where = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
+    return [Problem(words, where, None, False)]
+
+
+def _polygons(geometry: BaseGeometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]

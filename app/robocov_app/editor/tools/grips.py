@@ -1,0 +1,108 @@
+"""What can be taken hold of: vertices, corners and sides of the box around a selection, its knob."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from robocov_app.editor.edits.edits import bounds_of
+from robocov_app.editor.model.selection import Selection, points_of
+from robocov_app.editor.tools.tool import apart
+
+if TYPE_CHECKING:
+    from robocov.environment import Point
+    from robocov_app.editor.model.document import Owner, Sketch
+    from robocov_app.editor.model.selection import Vertex
+
+Kind: TypeAlias = Literal["vertex", "scale", "turn"]
+
+BESIDE = 11.0
+"""Pixels at scale 1 between what is selected and the box around it."""
+
+KNOB = 24.0
+"""Pixels at scale 1 that the knob is above the box."""
+
+ROOMY = 34.0
+"""Pixels at scale 1 that a side of the box has at least when there is a grip in its middle."""
+
+MOST_VERTICES = 4000
+"""Vertices that are shown at most: more could not be told apart."""
+
+
+@dataclass(frozen=True)
+class Grip:
+    """Something that can be taken hold of.
+
+    Attributes
+    ----------
+    kind : str
+        ``vertex``, ``scale`` or ``turn``.
+    at : (x, y), m
+        Where it is shown.
+    vertex : Vertex or None
+    side : (x, y)
+        Of a grip that scales: -1, 0 or 1 along each axis.
+    """
+
+    kind: Kind
+    at: Point
+    vertex: Vertex | None = None
+    side: tuple[int, int] = (0, 0)
+
+
+def handled(selection: Selection) -> tuple[Owner, ...]:
+    """Return whose vertices are shown: of the one thing that is selected, or of selected vertices."""
+    of_vertices = {vertex.of for vertex in selection.vertices}
+    owners = selection.owners
+    if of_vertices:
+        return tuple(sorted(of_vertices | owners, key=str))
+    return tuple(owners) if len(owners) == 1 else ()
+
+
+def box_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
+    """Return the box that is shown around whole things, m; `pixel` is how many metres one is at scale 1."""
+    bounds = None if selection.vertices else bounds_of(sketch, selection)
+    if bounds is None:
+        return None
+    far = BESIDE * pixel
+    return bounds[0] - far, bounds[1] - far, bounds[2] + far, bounds[3] + far
+
+
+def grips(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Grip, ...]:
+    """Return all grips, those that are taken first last."""
+    found: list[Grip] = []
+    box = box_of(sketch, selection, pixel)
+    if box is not None:
+        low_x, low_y, high_x, high_y = box
+        xs, ys = (
+            {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x},
+            {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y},
+        )
+        roomy = high_x - low_x > ROOMY * pixel, high_y - low_y > ROOMY * pixel
+        for x in (-1, 0, 1):
+            for y in (-1, 0, 1):
+                middle = (x == 0 and not roomy[0]) or (y == 0 and not roomy[1])
+                if (x or y) and not middle:
+                    found.append(Grip("scale", (xs[x], ys[y]), side=(x, y)))
+        found.append(Grip("turn", (xs[0], high_y + KNOB * pixel)))
+    for owner in handled(selection):
+        points = points_of(sketch, owner)
+        found += [Grip("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
+    return tuple(found)
+
+
+def grip_at(found: tuple[Grip, ...], point: Point, reach: float) -> Grip | None:
+    """Return the grip within `reach` metres of a point: the nearest, a vertex before others."""
+    best: tuple[bool, float, Grip] | None = None
+    for grip in found:
+        far = apart(grip.at, point)
+        if far <= reach:
+            rank = (grip.kind != "vertex", far)
+            if best is None or rank < best[:2]:
+                best = (*rank, grip)
+    return best[2] if best else None
+
+
+def things(selection: Selection) -> Selection:
+    """Return the whole things of a selection, without single vertices."""
+    return Selection(selection.items, frozenset(), selection.starts, selection.boundary)

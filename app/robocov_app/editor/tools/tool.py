@@ -1,0 +1,236 @@
+"""What a tool of the editor is: what the mouse does on the sheet. Coordinates are metres; no pygame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.errors import MapError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robocov.environment import Obstacle, Point, Ring, StartSpec
+    from robocov_app.editor.tools.snapping import Guide
+    from robocov_app.editor.ui.desk import Desk
+
+ANGLE = 15.0
+"""Degrees: with Shift, lines are drawn at multiples of this."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Where the mouse points, and what is held down with it.
+
+    Attributes
+    ----------
+    point : (x, y), m
+        Where it means, after snapping.
+    raw : (x, y), m
+        Where it is.
+    reach : float, m
+        So many metres a finger is wide.
+    shift, alt, ctrl : bool
+    """
+
+    point: Point
+    raw: Point
+    reach: float
+    shift: bool = False
+    alt: bool = False
+    ctrl: bool = False
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a tool shows of what it is about to do.
+
+    Attributes
+    ----------
+    line : points, m
+        Drawn as a line with a mark at each point.
+    closed : bool
+        Whether it goes back to its first point.
+    lengths : bool
+        Whether each edge tells its length.
+    shapes : tuple of obstacles
+        Drawn as they would be.
+    start : StartSpec or None
+        Drawn as it would be.
+    box : two opposite corners, m, or None
+        What is being selected.
+    touched : bool
+        The box takes all that it touches, not only what lies in it.
+    words : str
+        Beside the cursor.
+    rings : tuple of rings, m
+        Drawn as outlines.
+    dots : tuple of points, m
+        Drawn as marks.
+    chosen : int or None
+        Which of these stands out.
+    """
+
+    line: tuple[Point, ...] = ()
+    closed: bool = False
+    lengths: bool = False
+    shapes: tuple[Obstacle, ...] = ()
+    start: StartSpec | None = None
+    box: tuple[Point, Point] | None = None
+    touched: bool = False
+    words: str = ""
+    rings: tuple[Ring, ...] = ()
+    dots: tuple[Point, ...] = ()
+    chosen: int | None = None
+
+
+class Tool:
+    """A tool that does nothing; the others are like it.
+
+    Attributes
+    ----------
+    name, title, hint : str
+        The hint says what to do next.
+    snaps : bool
+        Whether the point that it gets has snapped to something.
+    takes_numbers : bool
+        Whether numbers can be typed while it is `busy`.
+    """
+
+    name = ""
+    title = ""
+    hint = ""
+    snaps = True
+    takes_numbers = True
+
+    def __init__(self) -> None:
+        self.guides: tuple[Guide, ...] = ()
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is half done."""
+        return False
+
+    @property
+    def origin(self) -> Point | None:
+        """Where the line that is drawn comes from."""
+        return None
+
+    @property
+    def drawn(self) -> tuple[Point, ...]:
+        """What has been drawn so far, to snap to."""
+        return ()
+
+    def press(self, desk: Desk, aim: Aim) -> None:
+        """Take a press of the left button."""
+
+    def twice(self, desk: Desk, aim: Aim) -> None:
+        """Take the second press of a double click; by default it finishes."""
+        self.finish(desk)
+
+    def move(self, desk: Desk, aim: Aim) -> None:
+        """Take a move of the mouse, pressed or not."""
+
+    def release(self, desk: Desk, aim: Aim, *, clicked: bool) -> None:
+        """Take the button's release; `clicked` if it has not moved since it was pressed."""
+
+    def finish(self, desk: Desk) -> bool:
+        """Take Enter; say whether there was something to finish."""
+        return False
+
+    def back(self, desk: Desk) -> bool:
+        """Take Backspace: the last point goes; say whether there was one."""
+        return False
+
+    def cancel(self, desk: Desk) -> bool:
+        """Take Escape; say whether there was something to give up."""
+        return False
+
+    def enter(self, desk: Desk, text: str) -> None:
+        """Take what was typed.
+
+        Raises
+        ------
+        MapError
+            When it means nothing.
+        """
+        raise MapError(f"“{text}”: there is nothing to type here")
+
+    def preview(self, desk: Desk) -> Preview | None:
+        """Return what to show."""
+        return None
+
+    def shape_of_cursor(self, desk: Desk) -> str:
+        """Return what the cursor looks like over the sheet: arrow, cross, hand, move, ..."""
+        return "cross"
+
+
+def apart(a: Point, b: Point) -> float:
+    """Return the distance of two points, m."""
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+
+
+def straightened(origin: Point, point: Point) -> Point:
+    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another.
+
+    >>> straightened((0.0, 0.0), (3.0, 0.1))
+    (3.0, 0.0)
+    """
+    dx, dy = point[0] - origin[0], point[1] - origin[1]
+    step = np.radians(ANGLE)
+    angle = step * np.round(np.arctan2(dy, dx) / step)
+    along = dx * np.cos(angle) + dy * np.sin(angle)
+    x, y = origin[0] + along * np.cos(angle), origin[1] + along * np.sin(angle)
+    return round(float(x), 9) + 0.0, round(float(y), 9) + 0.0
+
+
+def bearing_words(a: Point, b: Point) -> str:
+    """Return length and direction from one point to another, in words.
+
+    >>> bearing_words((0.0, 0.0), (0.0, 2.4))
+    '2.40 m  ∠ 90°'
+    """
+    angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    shown = 0.0 if abs(angle) < 0.05 else angle
+    return f"{length_words(apart(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
+
+
+def length_words(metres: float) -> str:
+    """Return a length as it stands beside the cursor.
+
+    >>> length_words(0.0234), length_words(12.3456), length_words(1234.5)
+    ('2.3 cm', '12.35 m', '1234.5 m')
+    """
+    if metres < 0.1:
+        return f"{100 * metres:.1f} cm"
+    return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
+
+
+def place_words(point: Point) -> str:
+    """Return a place in words.
+
+    >>> place_words((1.0, -0.001))
+    '(1.00, 0.00) m'
+    """
+    x, y = (round(value, 2) + 0.0 for value in point)
+    return f"({x:.2f}, {y:.2f}) m"
+
+
+def swept(points: Sequence[Point]) -> float:
+    """Return the area of a ring, m².
+
+    >>> swept([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
+    2.0
+    """
+    ring = np.asarray(points)
+    x, y = ring.T
+    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
+
+
+def held(aim: Aim, origin: Point | None) -> Point:
+    """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
+    if aim.shift and origin is not None:
+        return straightened(origin, aim.raw)
+    return aim.point

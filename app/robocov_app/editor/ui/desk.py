@@ -1,0 +1,414 @@
+"""The editor's desk: what is open, selected and shown, and how every change is made. Knows no pygame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from robocov.errors import MapError, RobocovError
+from robocov.mapfile.models import SMALLEST
+from robocov.robots import DEFAULT_RADIUS
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.tools.grips import Grip, grips, handled
+from robocov_app.editor.tools.snapper import Snapper, vertex_count
+from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
+from robocov_app.editor.tools.toolbox import toolbox
+from robocov_app.editor.ui.settings import SHOWN, SNAPS, snapping_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+    from robocov.environment import Point
+    from robocov_app.editor.model.document import Owner, Sketch
+    from robocov_app.editor.model.paper import Paper
+    from robocov_app.editor.model.problems import Problem
+    from robocov_app.editor.model.readout import Readout
+    from robocov_app.editor.model.selection import Change
+    from robocov_app.editor.tools.selecting import Select
+    from robocov_app.editor.tools.tool import Tool
+    from robocov_app.editor.ui.asking import ListQuestion, Question
+    from robocov_app.editor.ui.importing import ImportQuestion
+
+SAID_FOR = 5.0
+"""Seconds for which a message stays."""
+
+TROUBLE_FOR = 8.0
+"""The same for what went wrong."""
+
+SNAPS_WITHIN = 0.6
+"""Part of a finger's width within which points snap: a line that is far off is not to beat the grid."""
+
+FEW = 1500
+"""Vertices up to which a map is measured while something is dragged."""
+
+GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Spacings of the grid to choose from, m."""
+
+
+class Pasteboard(Protocol):
+    """The system's clipboard."""
+
+    def put(self, text: str) -> None:
+        """Put a text there."""
+
+    def get(self) -> str:
+        """Return the text that is there, empty if none is."""
+
+
+class Readings(Protocol):
+    """Who measures sketches, as `robocov_app.editor.model.readout_worker.ReadoutWorker` does."""
+
+    def ask(self, sketch: Sketch, radius: float) -> None:
+        """Ask about a sketch."""
+
+    def poll(self) -> Readout | None:
+        """Return the newest answer, if there is one."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether an answer is to come."""
+
+
+class Desk:
+    """What the user does, and what of it is shown.
+
+    Parameters
+    ----------
+    paper : Paper
+    readings : Readings
+    pasteboard : Pasteboard
+    folder : Path
+        Where things are saved.
+
+    Attributes
+    ----------
+    tool : Tool
+    version : int
+        Grows whenever panel and sheet have to look again at what there is.
+    message : str
+        What was said last, empty when it is old.
+    pixel : float, m
+        What a pixel at scale 1 is on the sheet.
+    cursor : (x, y) or None, m
+        Where the mouse is.
+    moves_since : float or None, s
+        Since when obstacles that move are shown moving.
+    asked : Question, ListQuestion, ImportQuestion or None
+        What is waiting for an answer.
+    problem : Problem or None
+        The one that is shown with its words.
+    """
+
+    def __init__(self, paper: Paper, readings: Readings, pasteboard: Pasteboard, folder: Path) -> None:
+        self.paper, self.readings, self.pasteboard, self.folder = paper, readings, pasteboard, folder
+        self.tools = toolbox()
+        self.tool: Tool = self.tools["select"]
+        self.version = 0
+        self.theme = "light"
+        self.panel = True
+        self.shown = {name for name in SHOWN if name != "robots"}
+        self.snaps = set(SNAPS)
+        self.grid, self.snap_angle = 0.1, 15.0
+        self.wall_width = 0.1
+        self.radius, self.robots, self.seed = DEFAULT_RADIUS, 6, 0
+        self.start: str | None = None
+        self.recent: list[str] = []
+        self.readout: Readout | None = None
+        self.problem: Problem | None = None
+        self.asked: Question | ListQuestion | ImportQuestion | None = None
+        self.message = ""
+        self.trouble = False
+        self.pixel = 0.01
+        self.cursor: Point | None = None
+        self.typed = ""
+        self.now = 0.0
+        self.moves_since: float | None = None
+        self._said = 0.0
+        self.snapper = Snapper()
+        self._grips: tuple[object, tuple[Grip, ...]] = (None, ())
+        self._about: tuple[object, float] | None = None
+
+    # what there is
+
+    @property
+    def sketch(self) -> Sketch:
+        """The map as it is now."""
+        return self.paper.history.sketch
+
+    @property
+    def selection(self) -> Selection:
+        """What is selected."""
+        return self.paper.history.selection
+
+    @property
+    def selector(self) -> Select:
+        """The tool that selects."""
+        return self.tools["select"]  # type: ignore[return-value]
+
+    @property
+    def pending(self) -> Change | None:
+        """What letting go of the mouse would make."""
+        drag = self.selector.drag
+        return drag.change if drag is not None else None
+
+    @property
+    def preview(self) -> tuple[Sketch, Selection]:
+        """The map and what is selected as they are shown: in a drag, what letting go would make."""
+        pending = self.pending
+        return (self.sketch, self.selection) if pending is None else (pending.sketch, pending.selection)
+
+    @property
+    def handled(self) -> tuple[Owner, ...]:
+        """Whose vertices are shown."""
+        return handled(self.selection)
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        """What of the selection can be taken hold of."""
+        key = (self.sketch, self.selection, self.pixel)
+        before = self._grips[0]
+        if (
+            not isinstance(before, tuple)
+            or any(a is not b for a, b in zip(before[:2], key[:2], strict=True))
+            or (before[2] != key[2])
+        ):
+            self._grips = key, grips(self.sketch, self.selection, self.pixel)
+        return self._grips[1]
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """What is wrong, as far as is known."""
+        return self.readout.problems if self.readout is not None else ()
+
+    @property
+    def start_names(self) -> list[str]:
+        """The starts that a team may be shown at."""
+        return [name for name, _ in self.sketch.starts]
+
+    @property
+    def start_name(self) -> str | None:
+        """The start at which the team is shown: the selected one, the chosen one, or the first."""
+        names = self.start_names
+        selected = sorted(self.selection.starts)
+        for name in (*selected, self.start):
+            if name in names:
+                return name
+        return names[0] if names else None
+
+    # snapping
+
+    def snapping(self, reach: float) -> Snapping:
+        """Return what to snap to, for a finger that is so many metres wide."""
+        return snapping_for(SNAPS_WITHIN * reach, self.grid, self.snap_angle, self.snaps)
+
+    def snap(self, raw: Point, reach: float) -> Snap:
+        """Return where a place means for the tool that is chosen."""
+        tool = self.tool
+        if not tool.snaps or not self.snaps:
+            return Snap(raw)
+        return self.snapped(raw, reach, tool.origin, tool.drawn)
+
+    def snapped(
+        self, raw: Point, reach: float, origin: Point | None = None, more: tuple[Point, ...] = ()
+    ) -> Snap:
+        """Return where a place means, whatever tool is chosen."""
+        targets = self.snapper.targets(self.sketch, (), more)
+        return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
+
+    # changing
+
+    def change(self, change: Change, *, drag: Hashable | None = None) -> None:
+        """Make a change, and tell what it was."""
+        if self.paper.history.do(change, drag=drag):
+            self.say(change.words)
+        self._changed()
+
+    def _changed(self) -> None:
+        self.version += 1
+        self.problem = None
+        self.paper.keep()
+        self.ask_readings()
+
+    def ask_readings(self) -> None:
+        """Ask what the map is like, also one of few vertices that is being dragged; not the same again."""
+        sketch, pending = self.sketch, self.pending
+        if pending is not None and vertex_count(pending.sketch) < FEW:
+            sketch = pending.sketch
+        about = self._about
+        if about is None or about[0] is not sketch or about[1] != self.radius:
+            self._about = sketch, self.radius
+            self.readings.ask(sketch, self.radius)
+
+    def select(self, selection: Selection) -> None:
+        """Select something else."""
+        if selection != self.selection:
+            self.paper.history.selection = selection
+            self.version += 1
+
+    def undo(self) -> None:
+        """Take the newest change back."""
+        change = self.paper.history.undo()
+        self.say(f"undone: {change.words}" if change else "nothing to undo")
+        self._changed()
+
+    def redo(self) -> None:
+        """Do again what was undone last."""
+        change = self.paper.history.redo()
+        self.say(f"done again: {change.words}" if change else "nothing to do again")
+        self._changed()
+
+    def travel(self, steps: int) -> None:
+        """Undo so many changes, or with a negative number do them again."""
+        history = self.paper.history
+        for _ in range(abs(steps)):
+            if (history.undo if steps > 0 else history.redo)() is None:
+                break
+        self._changed()
+
+    def put(self, paper: Paper) -> None:
+        """Put another document on the desk."""
+        self.paper = paper
+        self.readout, self._about = None, None
+        self.selector.cancel(self)
+        self.choose("select", tell=False)
+        self._changed()
+
+    def choose(self, name: str, *, tell: bool = True) -> None:
+        """Take a tool."""
+        self.tool.cancel(self)
+        self.tool, self.typed = self.tools[name], ""
+        self.version += 1
+        if tell:
+            self.say(self.tool.hint)
+
+    # messages
+
+    def say(self, words: str, *, trouble: bool = False) -> None:
+        """Tell something for a while."""
+        if words:
+            self.message, self.trouble, self._said = words, trouble, self.now
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Do something; what cannot be done is told, in a sentence."""
+        try:
+            words = action()
+        except RobocovError as error:
+            self.say(plain(str(error)), trouble=True)
+        else:
+            if isinstance(words, str):
+                self.say(words)
+        self.version += 1
+
+    def pass_time(self, seconds: float) -> None:
+        """Let the clock go on: old messages go, answers come."""
+        self.now += seconds
+        if self.message and self.now - self._said > (TROUBLE_FOR if self.trouble else SAID_FOR):
+            self.message = ""
+        answer = self.readings.poll()
+        if answer is not None:
+            self.readout = answer
+            self.version += 1
+
+    def command(self, text: str) -> None:
+        """Do what was typed, see `typed.command`: ``rotate 30``, ``grid 0.25``, ..."""
+        from robocov_app.editor.ui.typed import command
+
+        command(self, text)
+
+    # typing while something is drawn
+
+    @property
+    def takes_numbers(self) -> bool:
+        """Whether digits are for the tool."""
+        return self.tool.takes_numbers and (self.tool.busy or bool(self.typed))
+
+    def enter(self) -> None:
+        """Give the tool what was typed."""
+        text, self.typed = self.typed, ""
+        self.attempt(lambda: self.tool.enter(self, text))
+
+    # settings
+
+    def switch(self, kind: str, name: str) -> None:
+        """Show something, or snap to it, or not."""
+        chosen = self.shown if kind == "show" else self.snaps
+        if kind == "snap" and name == "all":
+            self.snaps = set() if self.snaps else set(SNAPS)
+            self.say("snaps to everything" if self.snaps else "snaps to nothing")
+        else:
+            chosen ^= {name}
+            titles = SHOWN if kind == "show" else {key: title for key, (title, _) in SNAPS.items()}
+            self.say(f"{titles[name]}: {'on' if name in chosen else 'off'}")
+        self.version += 1
+
+    def set_grid(self, spacing: float) -> None:
+        """Give the grid another spacing, m.
+
+        Raises
+        ------
+        MapError
+            When it is out of range.
+        """
+        _require_length("grid", spacing, 100.0)
+        self.grid = spacing
+        self.version += 1
+        self.say(f"the grid is {spacing:g} m")
+
+    def change_grid(self, by: int) -> None:
+        """Take the next finer or coarser grid."""
+        if by > 0:
+            self.set_grid(next((each for each in GRIDS if each > self.grid * 1.001), GRIDS[-1]))
+        else:
+            self.set_grid(next((each for each in reversed(GRIDS) if each < self.grid * 0.999), GRIDS[0]))
+
+    def set_radius(self, radius: float) -> None:
+        """Take robots of another radius, m.
+
+        Raises
+        ------
+        MapError
+            When it is out of range.
+        """
+        _require_length("radius", radius, 10.0)
+        self.radius = radius
+        self.version += 1
+        self.ask_readings()
+
+    def set_robots(self, count: int) -> None:
+        """Show a team of another size.
+
+        Raises
+        ------
+        MapError
+            When it is out of range.
+        """
+        if not 1 <= count <= 1000:
+            raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
+        self.robots = count
+        self.version += 1
+
+    def set_wall_width(self, width: float) -> None:
+        """Draw walls of another width, m.
+
+        Raises
+        ------
+        MapError
+            When it is out of range.
+        """
+        _require_length("wall width", width, 100.0)
+        self.wall_width = width
+        self.version += 1
+
+
+def _require_length(what: str, length: float, most: float) -> None:
+    if not SMALLEST <= length <= most:
+        raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
+
+
+def plain(message: str) -> str:
+    """Return a message without the places in files that mean nothing in a window.
+
+    >>> plain("map: obstacles[2]: crosses itself")
+    'obstacles[2]: crosses itself'
+    """
+    return message.removeprefix("map: ")

@@ -1,0 +1,413 @@
+"""Documents opened, saved and left, with the questions that have to be asked. Knows no pygame."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps, map_file
+from robocov_app.editor.edits.edits import underlaid
+from robocov_app.editor.model.background import picture_laid
+from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.drafts import opened_elsewhere
+from robocov_app.editor.model.files import ChangedError
+from robocov_app.editor.model.paper import SUFFIX, Paper
+from robocov_app.editor.ui import import_process
+from robocov_app.editor.ui.asking import Answer, FileQuestion, Picker, Question
+from robocov_app.editor.ui.importing import ImportQuestion
+from robocov_app.editor.ui.settings import MOST_RECENT
+from robocov_app.live.latest import DirectWorker, LatestWorker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.editor.model.drafts import Draft
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.import_process import Imported
+    from robocov_app.editor.ui.importing import Worker
+    from robocov_app.importers import Importer
+
+_PATIENCE = 2.0
+"""Seconds after which an import with settings that have changed since is given up."""
+
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
+
+
+class Documents:
+    """What can be done with whole documents.
+
+    Parameters
+    ----------
+    desk : Desk
+    drafts : Path or None
+        Where drafts are kept.
+    fit : callable
+        Shows the whole map.
+    patient : bool
+        Imports are waited for.
+    """
+
+    def __init__(
+        self, desk: Desk, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
+    ) -> None:
+        self.desk, self.drafts, self._fit, self._patient = desk, drafts, fit, patient
+        self.leaving = False
+
+    def close(self) -> None:
+        """End what is going on beside the window."""
+        if isinstance(self.desk.asked, ImportQuestion):
+            self.desk.asked.close()
+
+    def deeds(self) -> dict[str, Callable[[], object]]:
+        """Return what the actions do, by their names."""
+        return {
+            "new": lambda: self.leave(self.new),
+            "open": self.ask_file,
+            "recent": self.ask_recent,
+            "save": self.save,
+            "save:as": self.ask_name,
+            "export": self.ask_export,
+            "reload": self.reload,
+            "background": self.ask_picture,
+            "quit": self.quit,
+        }
+
+    # leaving what is open
+
+    def leave(self, then: Callable[[], object]) -> None:
+        """Put another document in place of this one, after asking what is to become of it."""
+        paper = self.desk.paper
+        if not paper.unsaved:
+            then()
+            paper.close(discard=True)
+            return
+
+        def save() -> None:
+            self.save(then=lambda: self.leave(then))
+
+        def discard() -> None:
+            then()
+            paper.close(discard=True)
+
+        words = f"“{paper.title}” has changes that are in no file."
+        answers = (
+            Answer("Save", "s", save),
+            Answer("Discard", "d", discard),
+            Answer("Cancel", "c", _nothing),
+        )
+        self.desk.asked = Question("Save the changes?", words, answers)
+
+    def quit(self) -> None:
+        """End, after asking what is to become of what is open."""
+        self.leave(self._leave_for_good)
+
+    def _leave_for_good(self) -> None:
+        self.leaving = True
+
+    def _put(self, paper: Paper, words: str = "") -> None:
+        self.desk.put(paper)
+        self._fit()
+        if paper.path is not None:
+            self.remember(paper.path)
+        self.desk.say(words)
+
+    # opening
+
+    def new(self) -> str:
+        """Put an empty sheet on the desk."""
+        self._put(Paper.new(self.drafts))
+        return "a new map: 10 x 10 m; B draws another boundary"
+
+    def ask_file(self) -> None:
+        """Ask which file to open."""
+        from robocov_app.importers import IMPORTERS
+
+        foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
+        suffixes = [SUFFIX, *foreign]
+
+        def chosen(text: str) -> None:
+            self.open(Path(text))
+
+        self.desk.asked = FileQuestion("Open a map", self.desk.folder, chosen, suffixes)
+
+    def ask_recent(self) -> None:
+        """Ask which of the maps to open that were open lately, or come with robocov."""
+        names = [(path, "recent") for path in self.desk.recent if Path(path).exists()]
+        names += [(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
+
+        def chosen(text: str) -> None:
+            self.open(map_file(text))
+
+        self.desk.asked = Picker("Open a recent or bundled map", names, chosen)
+
+    def open(self, path: Path) -> None:
+        """Open a file: a map, or one of a foreign format as a new map.
+
+        Raises
+        ------
+        RobocovError
+            When it cannot be read; what is open stays.
+        """
+        own = self.desk.paper.path
+        if own is not None and own.exists() and path.exists() and path.samefile(own):
+            self.reload()
+            return
+        if opened_elsewhere(self.drafts, path):
+            raise MapError(f"{path.name}: another editor has it open")
+        found = opened(path, self.drafts)
+        if isinstance(found, Paper):
+            self.leave(lambda: self._put(found, heading(found)))
+        else:
+            self.ask_import(path, found)
+
+    def ask_import(self, path: Path, importer: Importer) -> None:
+        """Ask how a foreign file is to be imported, and show what would come of it."""
+
+        def put(imported: Imported) -> None:
+            sketch = Sketch.from_environment(imported.environment)
+            paper = Paper(sketch, self.drafts, saved=False, stem=path.stem)
+            self.leave(lambda: self._put(paper, f"imported: {path.name}, not saved yet"))
+
+        self.desk.asked = ImportQuestion(path, importer, self._import_worker(), put)
+
+    def _import_worker(self) -> Worker:
+        if self._patient:
+            return DirectWorker(import_process.SERVICE)
+        return LatestWorker("robocov_app.editor.ui.import_process", "imports", patience=_PATIENCE)
+
+    def recover(self, draft: Draft) -> None:
+        """Go on with work that was left behind.
+
+        Raises
+        ------
+        RobocovError
+            When it cannot be read, or another editor goes on with it.
+        """
+        self._put(Paper.recovered(draft, self.drafts))
+        self.desk.say(f"recovered: {draft.words()}")
+
+    def remember(self, path: Path) -> None:
+        """Note a file as one that was open lately."""
+        name = str(path)
+        self.desk.recent = [name, *(each for each in self.desk.recent if each != name)][:MOST_RECENT]
+
+    # saving
+
+    def save(self, then: Callable[[], object] | None = None) -> str | None:
+        """Save to the document's file; ask for one if it has none."""
+        if self.desk.paper.path is None:
+            self.ask_name(then)
+            return None
+        return self._save(self.desk.paper.path, then)
+
+    def ask_name(self, then: Callable[[], object] | None = None) -> None:
+        """Ask where to save."""
+        suggested = self.desk.paper.suggested(self.desk.folder)
+        text = str(suggested)
+        if suggested.parent == self.desk.folder:
+            text = suggested.name
+
+        def chosen(typed: str) -> str | None:
+            return self._save(Path(typed), then)
+
+        self.desk.asked = FileQuestion("Save as", self.desk.folder, chosen, [SUFFIX], text=text, saves=True)
+
+    def _save(self, path: Path, then: Callable[[], object] | None, *, over: bool = False) -> str | None:
+        desk = self.desk
+        try:
+            words = desk.paper.save(path, over=over)
+        except ChangedError as error:
+            answers = (
+                Answer("Save as…", "a", lambda: self.ask_name(then)),
+                Answer("Replace it", "r", lambda: self._save(path, then, over=True)),
+                Answer("Cancel", "c", _nothing),
+            )
+            desk.asked = Question("Replace the file?", str(error), answers)
+            return None
+        assert desk.paper.path is not None
+        self.remember(desk.paper.path)
+        grave = [problem for problem in desk.problems if problem.grave]
+        if grave:
+            words += f", as a draft: {grave[0].words}"
+        if then is not None:
+            then()
+        return words
+
+    # exporting
+
+    def ask_export(self) -> None:
+        """Ask where to write the map in a foreign format, which goes by the suffix.
+
+        Raises
+        ------
+        MapError
+            When the map is only a draft.
+        """
+        from robocov_app.exporters import EXPORTERS
+
+        self.desk.sketch.environment()
+        suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
+
+        def chosen(text: str) -> str | None:
+            return self._export(Path(text))
+
+        title = f"Export to a file ending in {', '.join(suffixes)}"
+        name = Path(self.desk.paper.suggested(self.desk.folder).name).stem
+        self.desk.asked = FileQuestion(
+            title, self.desk.folder, chosen, suffixes, text=f"{name}.svg", saves=True
+        )
+
+    def _export(self, path: Path, *, over: bool = False) -> str | None:
+        from robocov_app.exporters import export_map
+
+        if path.exists() and not over:
+            answers = (
+                Answer("Another name…", "a", self.ask_export),
+                Answer("Replace it", "r", lambda: self._export(path, over=True)),
+                Answer("Cancel", "c", _nothing),
+            )
+            self.desk.asked = Question("Replace the file?", f"{path} is there already.", answers)
+            return None
+        report = export_map(self.desk.sketch.environment(), path)
+        said = [
+            f"exported: {', '.join(str(file) for file in report.files)}",
+            *report.warnings,
+            *report.dropped,
+        ]
+        return "; ".join(said)
+
+    # what happens on the disk
+
+    def look(self) -> None:
+        """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
+        desk = self.desk
+        if isinstance(asked := desk.asked, ImportQuestion) and (imported := asked.poll()) is not None:
+            asked.close()
+            desk.asked = None
+            desk.attempt(lambda: asked.call(imported))
+        if desk.asked is not None:
+            return
+        state = desk.paper.look(desk.now)
+        if state == "gone":
+            desk.say(f"{desk.paper.title} is no longer there; Ctrl S writes it again", trouble=True)
+        elif state == "changed":
+            answers = (
+                Answer("Reload", "r", self.reload),
+                Answer("Keep mine", "k", desk.paper.keep_mine),
+            )
+            words = f"Something else has changed {desk.paper.title}. Reloading can be undone."
+            desk.asked = Question("The file has changed", words, answers)
+
+    def reload(self) -> str:
+        """Read the file again."""
+        if self.desk.paper.path is None:
+            raise MapError("the map has no file yet")
+        self.desk.paper.reload()
+        self.desk.readout = None
+        self.desk.version += 1
+        self.desk.ask_readings()
+        return f"read again: {self.desk.paper.title}"
+
+    # the picture under the map
+
+    def ask_picture(self) -> None:
+        """Ask which picture to put under the map."""
+
+        def chosen(text: str) -> None:
+            self.underlay(Path(text))
+
+        self.desk.asked = FileQuestion("Picture under the map", self.desk.folder, chosen, PICTURES)
+
+    def underlay(self, path: Path) -> None:
+        """Put a picture under the map.
+
+        Raises
+        ------
+        MapError
+            When it is no picture.
+        """
+        lay_under(self.desk, path)
+        self.desk.choose("picture")
+        self._fit()
+
+
+def lay_under(desk: Desk, path: Path) -> None:
+    """Put a picture under the map, as wide as the map is, or 20 m.
+
+    Raises
+    ------
+    MapError
+        When it is no picture.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            pixels = picture.size
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
+        raise MapError(f"{path}: not a picture that can be read") from None
+    bounds = desk.sketch.bounds
+    laid = picture_laid(_from_map(path, desk.paper.path), pixels)
+    if bounds is not None and desk.sketch.background is None:
+        laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
+    desk.change(underlaid(desk.sketch, laid))
+
+
+def _from_map(path: Path, of: Path | None) -> str:
+    """Return how a map names a picture: from its own folder where that is near, else from the root."""
+    path = path.resolve()
+    if of is not None:
+        try:
+            near = os.path.relpath(path, of.resolve().parent)
+        except ValueError:  # on another drive
+            return path.as_posix()
+        if near.count("..") < 2:
+            return Path(near).as_posix()
+    return path.as_posix()
+
+
+def opened(path: Path, drafts: Path | None) -> Paper | Importer:
+    """Return the document of a file; or the format of one that has to be imported.
+
+    Raises
+    ------
+    RobocovError
+        When it cannot be read.
+    """
+    if path.suffix.lower() == SUFFIX and not path.exists():
+        return Paper.new(drafts, path)
+    try:
+        return Paper.opened(path, drafts)
+    except MapError as error:
+        if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
+            from robocov_app.importers import detect
+
+            try:
+                return detect(path)
+            except MapError:  # which names it for what it is
+                if path.suffix.lower() != SUFFIX and not _is_map(path):
+                    raise
+        raise error from None
+
+
+def heading(paper: Paper) -> str:
+    """Return what is said of a document that was opened."""
+    if paper.path is None:
+        return f"{paper.title}: opened as a copy"
+    if not paper.path.exists():
+        return f"a new map, {paper.path.name}: 10 x 10 m; B draws another boundary"
+    return f"opened: {paper.title}"
+
+
+def _is_map(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return b"robocov-map" in file.read(4096)
+    except OSError:
+        return True
+
+
+def _nothing() -> None:
+    """Change nothing."""

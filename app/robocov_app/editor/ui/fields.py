@@ -1,0 +1,280 @@
+"""What the fields of the panel show, and what becomes of what is typed into them. Knows no pygame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from robocov.environment import CircleObstacle, DiscStart, WallObstacle
+from robocov.errors import MapError
+from robocov_app.editor.edits import edits, vertices
+from robocov_app.editor.edits.edits import bounds_of, underlaid
+from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
+from robocov_app.editor.model.selection import place_of
+from robocov_app.editor.ui.deeds import whole
+from robocov_app.editor.ui.typed import command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.environment import Point
+    from robocov_app.editor.model.background import Background
+    from robocov_app.editor.ui.desk import Desk
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of the panel.
+
+    Attributes
+    ----------
+    text : callable
+        Returns what it shows.
+    take : callable
+        Takes what was typed; raises a MapError where that means nothing.
+    tip : str
+    """
+
+    text: Callable[[Desk], str]
+    take: Callable[[Desk, str], object]
+    tip: str = ""
+
+
+def number(value: float) -> str:
+    """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros.
+
+    >>> number(2.0), number(0.30004), number(-0.00001)
+    ('2', '0.3', '0')
+    """
+    text = f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def coordinate(text: str, now: float) -> float:
+    """Return a typed coordinate, m: a number with a unit or without, or a step as ``+0.5``."""
+    # two coordinates are read where only one is typed, so that signs and units mean the same
+    return (
+        point_of(f"{text.strip()} 0", last=(now, 0.0))[0]
+        if not text.strip().startswith(("+", "@"))
+        else (now + length_of(text.strip().lstrip("+@")))
+    )
+
+
+def _corner(desk: Desk) -> Point:
+    """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
+    sketch, selection = desk.preview
+    if len(selection.vertices) == 1:
+        (vertex,) = selection.vertices
+        return place_of(sketch, vertex)
+    center = _center(desk)
+    if center is not None:
+        return center
+    bounds = bounds_of(sketch, whole(selection))
+    if bounds is None:
+        raise MapError("nothing is selected")
+    return bounds[0], bounds[1]
+
+
+def _center(desk: Desk) -> Point | None:
+    sketch, selection = desk.preview
+    if selection.vertices or len(selection.owners) != 1:
+        return None
+    (owner,) = selection.owners
+    if isinstance(owner, str):
+        spec = dict(sketch.starts).get(owner)
+        return spec.center if isinstance(spec, DiscStart) else None
+    if owner not in sketch.places:
+        return None
+    shape = sketch.item(owner).shape
+    return shape.center if isinstance(shape, CircleObstacle) else None
+
+
+def _put(desk: Desk, axis: int, text: str) -> None:
+    """Put what is selected at a typed coordinate."""
+    now = _corner(desk)
+    by = coordinate(text, now[axis]) - now[axis]
+    selection = desk.selection
+    dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
+    act = vertices.moved if selection.vertices else edits.moved
+    desk.change(act(desk.sketch, selection, dx, dy))
+
+
+def _size(desk: Desk, axis: int) -> str:
+    sketch, selection = desk.preview
+    bounds = bounds_of(sketch, whole(selection))
+    return "" if bounds is None else number(bounds[axis + 2] - bounds[axis])
+
+
+def _resize(desk: Desk, axis: int, text: str) -> None:
+    """Give what is selected a typed width or height; the other stays, but of circles."""
+    selection = whole(desk.selection)
+    bounds = bounds_of(desk.sketch, selection)
+    if bounds is None:
+        raise MapError("nothing is selected")
+    now = bounds[2] - bounds[0], bounds[3] - bounds[1]
+    to = length_of(text, now=now[axis])
+    wide, high = (to, now[1]) if axis == 0 else (now[0], to)
+    desk.change(edits.resized(desk.sketch, selection, wide or None, high or None))
+
+
+def _shown_name(desk: Desk) -> str:
+    owners = whole(desk.selection).owners
+    if len(owners) != 1:
+        return ""
+    (owner,) = owners
+    if isinstance(owner, str):
+        return owner
+    return desk.sketch.item(owner).shape.name or "" if owner in desk.sketch.places else ""
+
+
+def _rename(desk: Desk, text: str) -> None:
+    (owner,) = whole(desk.selection).owners
+    if text.strip() != _shown_name(desk):
+        desk.change(edits.renamed(desk.sketch, owner, text.strip()))
+
+
+def _shown_note(desk: Desk) -> str:
+    notes = {desk.sketch.item(key).note for key in desk.selection.items if key in desk.sketch.places}
+    return notes.pop() if len(notes) == 1 else ""
+
+
+def _note(desk: Desk, text: str) -> None:
+    desk.change(edits.noted(desk.sketch, whole(desk.selection), text.strip()))
+
+
+def _wall_width(desk: Desk) -> str:
+    shapes = [desk.sketch.item(key).shape for key in desk.selection.items if key in desk.sketch.places]
+    widths = {shape.width for shape in shapes if isinstance(shape, WallObstacle)}
+    return number(widths.pop()) if len(widths) == 1 else ""
+
+
+def _set_width(desk: Desk, text: str) -> None:
+    now = _wall_width(desk)
+    width = length_of(text, now=float(now) if now else None)
+    desk.change(edits.widened(desk.sketch, whole(desk.selection), width))
+
+
+def _radius(desk: Desk) -> str:
+    sketch, selection = desk.preview
+    for owner in selection.owners:
+        if isinstance(owner, str):
+            spec = dict(sketch.starts).get(owner)
+            if isinstance(spec, DiscStart):
+                return number(spec.radius)
+        elif owner in sketch.places:
+            shape = sketch.item(owner).shape
+            if isinstance(shape, CircleObstacle):
+                return number(shape.radius)
+    return ""
+
+
+def _set_radius(desk: Desk, text: str) -> None:
+    now = _radius(desk)
+    radius = length_of(text, now=float(now) if now else None)
+    desk.change(edits.sized(desk.sketch, whole(desk.selection), radius))
+
+
+def _picture(desk: Desk) -> Background:
+    if desk.sketch.background is None:
+        raise MapError("there is no picture under the map: Ctrl B takes one")
+    return desk.sketch.background
+
+
+def _set_scale(desk: Desk, text: str) -> None:
+    laid = _picture(desk)
+    scale = length_of(text, now=laid.scale)
+    if not scale > 0.0:
+        raise MapError("a pixel must be larger than 0 m")
+    desk.change(underlaid(desk.sketch, replace(laid, scale=scale)))
+
+
+def _set_turn(desk: Desk, text: str) -> None:
+    desk.change(underlaid(desk.sketch, replace(_picture(desk), turn=angle_of(text))))
+
+
+def _set_opacity(desk: Desk, text: str) -> None:
+    laid = _picture(desk)
+    part = min(max(float(text), 0.0), 1.0)
+    desk.change(underlaid(desk.sketch, replace(laid, opacity=round(part, 2))), drag="opacity")
+
+
+def _on_picture(desk: Desk, words: Callable[[Background], str]) -> str:
+    return words(desk.sketch.background) if desk.sketch.background is not None else ""
+
+
+def _or_empty(text: Callable[[Desk], str]) -> Callable[[Desk], str]:
+    def shown(desk: Desk) -> str:
+        try:
+            return text(desk)
+        except (MapError, LookupError):
+            return ""
+
+    return shown
+
+
+FIELDS: dict[str, Field] = {
+    "title": Field(
+        lambda desk: desk.sketch.name,
+        lambda desk, text: desk.change(edits.titled(desk.sketch, name=text.strip())),
+        "The map's name, for people",
+    ),
+    "description": Field(
+        lambda desk: desk.sketch.description,
+        lambda desk, text: desk.change(edits.titled(desk.sketch, description=text.strip())),
+        "A sentence about the map",
+    ),
+    "radius": Field(
+        lambda desk: number(desk.radius),
+        lambda desk, text: command(desk, f"radius {text}"),
+        "Radius of a robot: what is too narrow for it is hatched",
+    ),
+    "robots": Field(
+        lambda desk: str(desk.robots),
+        lambda desk, text: command(desk, f"robots {text}"),
+        "Robots of the team that is shown at a start, and tried with F5",
+    ),
+    "grid": Field(
+        lambda desk: number(desk.grid),
+        lambda desk, text: command(desk, f"grid {text}"),
+        "Distance of the grid's lines; arrows move by it",
+    ),
+    "angle": Field(
+        lambda desk: number(desk.snap_angle),
+        lambda desk, text: command(desk, f"angle {text}"),
+        "Lines snap to multiples of this",
+    ),
+    "name": Field(_or_empty(_shown_name), _rename, "What people call it"),
+    "note": Field(_or_empty(_shown_note), _note, "Whatever is worth remembering of it"),
+    "x": Field(
+        _or_empty(lambda desk: number(_corner(desk)[0])),
+        lambda desk, text: _put(desk, 0, text),
+        "From the left; +0.5 moves by half a metre",
+    ),
+    "y": Field(
+        _or_empty(lambda desk: number(_corner(desk)[1])),
+        lambda desk, text: _put(desk, 1, text),
+        "From below; +0.5 moves by half a metre",
+    ),
+    "wide": Field(
+        _or_empty(lambda desk: _size(desk, 0)),
+        lambda desk, text: _resize(desk, 0, text),
+        "Also *2, 50% or +0.3",
+    ),
+    "high": Field(
+        _or_empty(lambda desk: _size(desk, 1)),
+        lambda desk, text: _resize(desk, 1, text),
+        "Also *2, 50% or +0.3",
+    ),
+    "width": Field(_or_empty(_wall_width), _set_width, "How thick the wall is"),
+    "size:radius": Field(_or_empty(_radius), _set_radius, "Its radius"),
+    "picture:scale": Field(
+        lambda desk: _on_picture(desk, lambda laid: f"{laid.scale:.6g}"), _set_scale, "Side of a pixel"
+    ),
+    "picture:turn": Field(
+        lambda desk: _on_picture(desk, lambda laid: number(laid.turn)), _set_turn, "Counter-clockwise"
+    ),
+    "picture:opacity": Field(
+        lambda desk: _on_picture(desk, lambda laid: number(laid.opacity)), _set_opacity, ""
+    ),
+}
+"""All fields by name."""

@@ -1,0 +1,74 @@
+"""The editor's keyboard: keys for questions, for numbers while something is drawn, fields, and actions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pygame
+
+from robocov_app.editor.ui.actions import REPEATING, all_actions
+from robocov_app.viewer.keyboard import Keyboard as DemoKeyboard
+from robocov_app.viewer.keyboard import key_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.dialogs import Dialogs
+    from robocov_app.editor.ui.panel import Panel
+    from robocov_app.viewer.overlays import CommandList
+
+_OF_NUMBERS = frozenset("0123456789.,-+@<*/%°×x; ")
+"""What numbers are typed with."""
+
+_GOES_ON = frozenset("mcm'\"rad")
+"""What may follow in a number: units."""
+
+
+class Keyboard(DemoKeyboard):
+    """Turns events of the keyboard into actions, or letters for whatever is open."""
+
+    def __init__(
+        self, desk: Desk, panel: Panel, palette: CommandList, dialogs: Dialogs, do: Callable[[str], None]
+    ) -> None:
+        super().__init__(desk, panel, palette, all_actions(), do, REPEATING)
+        self._editor, self._dialogs = desk, dialogs
+
+    def _pressed(self, event: pygame.event.Event) -> None:
+        name = key_of(event)
+        if self._dialogs.open and event.key != pygame.K_F12:
+            asked = self._editor.asked
+            self._dialogs.key(name)
+            if self._editor.asked is not asked:
+                self._dialogs.opened_by(event.unicode)
+            return
+        if not (self._palette.open or self._panel.typing or self._panel.unfolded) and self._number(
+            event, name
+        ):
+            return
+        super()._pressed(event)
+        if self._dialogs.open:
+            self._dialogs.opened_by(event.unicode)
+
+    def _number(self, event: pygame.event.Event, name: str) -> bool:
+        """Take a key for the number that is typed while something is drawn; say whether it was one."""
+        desk = self._editor
+        if not desk.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
+            return False
+        if desk.typed:
+            if name in ("return", "enter"):
+                desk.enter()
+                return True
+            if name == "backspace":
+                desk.typed = desk.typed[:-1]
+                return True
+            if name == "tab":
+                desk.typed += " "
+                return True
+        sign = event.unicode
+        begins = sign in _OF_NUMBERS and sign not in "x×*/ ;%"
+        follows = bool(desk.typed) and (sign in _OF_NUMBERS or sign in _GOES_ON)
+        if len(sign) == 1 and (begins or follows):
+            desk.typed = (desk.typed + sign)[:40]
+            return True
+        return False

@@ -1,0 +1,204 @@
+"""Opening the editor: with a display or without, from the command line's options."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.errors import InputError
+from robocov_app.editor.model.drafts import discarded, drafts_folder, left_behind, opened_elsewhere
+from robocov_app.editor.model.paper import Paper
+from robocov_app.editor.model.readout import readout
+from robocov_app.editor.model.readout_worker import ReadoutWorker
+from robocov_app.editor.ui.asking import Answer, Question
+from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.ui.documents import heading, lay_under, opened
+from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
+from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
+from robocov_app.viewer.opening import display, fitting, screen_scale
+from robocov_app.viewer.settings import loaded, save_settings, settings_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov_app.editor.model.document import Sketch
+    from robocov_app.editor.model.drafts import Draft
+    from robocov_app.editor.model.readout import Readout
+    from robocov_app.editor.ui.window import EditorWindow
+
+NO_DISPLAY = (
+    "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
+    "and map files can be edited by hand: robocov check --watch FILE"
+)
+
+
+class DirectReadings:
+    """Measures at once: for pictures without a display, and for tests."""
+
+    busy = False
+
+    def __init__(self) -> None:
+        self._answer: Readout | None = None
+
+    def ask(self, sketch: Sketch, radius: float) -> None:
+        """Measure."""
+        self._answer = readout(sketch, radius)
+
+    def poll(self) -> Readout | None:
+        """Return the answer."""
+        answer, self._answer = self._answer, None
+        return answer
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+class EditorOpening:
+    """How the editor is opened.
+
+    Parameters
+    ----------
+    path : Path or None
+        The map; None for an empty sheet.
+    folder : Path
+        Where things are saved.
+    background : Path or None
+        A picture to put under the map.
+    theme, size, scale
+        None for what was used last.
+    headless : bool
+        Draw without a display; no draft is kept and none is offered.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        folder: Path,
+        *,
+        background: Path | None = None,
+        theme: str | None = None,
+        size: tuple[int, int] | None = None,
+        scale: float | None = None,
+        headless: bool = False,
+    ) -> None:
+        self.path, self.folder, self.background = path, folder, background
+        self.theme, self.size, self.scale, self.headless = theme, size, scale, headless
+
+    @contextmanager
+    def window(self) -> Iterator[EditorWindow]:
+        """Give the window; settings are read before and kept afterwards.
+
+        Raises
+        ------
+        InputError
+            When there is no display, or the map cannot be read.
+        """
+        drafts = None if self.headless else drafts_folder()
+        if self.path is not None and not self.headless and opened_elsewhere(drafts, self.path):
+            raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
+        # what is wrong with the file is told before a window flashes up
+        found = Paper.new(drafts) if self.path is None else opened(self.path, drafts)
+        paper = found if isinstance(found, Paper) else Paper.new(drafts)
+        ended = False
+        readings = DirectReadings() if self.headless else ReadoutWorker()
+        try:
+            with display(headless=self.headless, otherwise=NO_DISPLAY):
+                file = None if self.headless else settings_file(FILE)
+                settings, trouble = loaded(EditorSettings, file)
+                desk = self._desk(paper, readings, settings)
+                window = self._opened(desk, settings, drafts)
+                desk.say(trouble or (heading(paper) if self.path is not None and paper is found else ""))
+                if paper.path is not None:
+                    window.documents.remember(paper.path)
+                if not self.headless:
+                    offer(window, left_behind(drafts))
+                if self.path is not None and not isinstance(found, Paper):
+                    window.documents.ask_import(self.path, found)
+                try:
+                    yield window
+                    save_settings(settings_of(window, settings, self.scale), file)
+                    ended = True
+                finally:
+                    window.close()
+                    # what was not saved stays to be offered, unless it was decided about
+                    desk.paper.close(discard=ended and window.documents.leaving)
+        except BaseException:
+            if not ended:
+                paper.close(discard=False)
+            raise
+        finally:
+            readings.close()
+
+    def _desk(self, paper: Paper, readings: DirectReadings | ReadoutWorker, settings: EditorSettings) -> Desk:
+        pasteboard = OwnPasteboard() if self.headless else SystemPasteboard()
+        desk = Desk(paper, readings, pasteboard, self.folder)
+        desk.theme = self.theme or settings.theme
+        desk.shown = set(settings.shown) & set(SHOWN)
+        desk.snaps = set(settings.snaps) & set(SNAPS)
+        desk.grid, desk.snap_angle = settings.grid, settings.angle
+        desk.radius, desk.robots, desk.wall_width = settings.radius, settings.robots, settings.wall
+        desk.recent = list(settings.recent)
+        if self.background is not None:
+            lay_under(desk, self.background)
+            desk.choose("picture", tell=False)
+        return desk
+
+    def _opened(self, desk: Desk, settings: EditorSettings, drafts: Path | None) -> EditorWindow:
+        from robocov_app.editor.ui.window import EditorWindow
+
+        size = self.size or (settings.width, settings.height)
+        scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+        if self.size is None and not self.headless:
+            size = fitting(size)
+        window = EditorWindow(desk, size, scale, drafts, patient=self.headless)
+        window.panel.show_tab(settings.tab)
+        return window
+
+
+def offer(window: EditorWindow, found: tuple[Draft, ...]) -> None:
+    """Offer work that was left behind, the newest first."""
+    if not found:
+        return
+    draft, rest = found[0], found[1:]
+    desk = window.desk
+
+    def recover() -> None:
+        window.documents.leave(lambda: window.documents.recover(draft))
+
+    def discard() -> None:
+        discarded(draft)
+        offer(window, rest)
+
+    answers = (
+        Answer("Recover", "r", recover),
+        Answer("Discard", "d", discard),
+        Answer("Later", "l", lambda: None),
+    )
+    words = f"An editor ended without saving: {draft.words()}."
+    if rest:
+        words += f"\n{len(rest)} more {'are' if len(rest) > 1 else 'is'} kept besides."
+    desk.asked = Question("Recover unsaved work?", words, answers)
+
+
+def settings_of(window: EditorWindow, before: EditorSettings, scale: float | None) -> EditorSettings:
+    """Return what is worth remembering of a window."""
+    desk = window.desk
+    width, height = window.windowed or window.screen.get_size()
+    changes = {
+        "theme": desk.theme,
+        "tab": window.panel.tab,
+        "grid": desk.grid,
+        "angle": desk.snap_angle,
+        "snaps": tuple(name for name in SNAPS if name in desk.snaps),
+        "shown": tuple(name for name in SHOWN if name in desk.shown),
+        "radius": desk.radius,
+        "robots": desk.robots,
+        "wall": desk.wall_width,
+        "recent": tuple(desk.recent),
+        "width": min(max(width, 900), 7680),
+        "height": min(max(height, 600), 4320),
+    }
+    if scale is not None:
+        changes["scale"] = scale
+    return before.model_copy(update=changes)

@@ -1,0 +1,161 @@
+"""The editor's mouse: what is pressed, dragged and let go where, and what that means."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.editor.tools.tool import Aim
+from robocov_app.viewer.layout import inside
+from robocov_app.viewer.mouse import DOUBLE, Mouse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.editor.canvas.arena import Arena
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.panel import Panel
+    from robocov_app.viewer.layout import Box
+
+SLIP = 4.0
+"""Pixels at scale 1 that a click may move."""
+
+_SHAPES = {
+    "arrow": pygame.SYSTEM_CURSOR_ARROW,
+    "cross": pygame.SYSTEM_CURSOR_CROSSHAIR,
+    "hand": pygame.SYSTEM_CURSOR_HAND,
+    "move": pygame.SYSTEM_CURSOR_SIZEALL,
+    "sideways": pygame.SYSTEM_CURSOR_SIZEWE,
+    "updown": pygame.SYSTEM_CURSOR_SIZENS,
+    "rising": pygame.SYSTEM_CURSOR_SIZENESW,
+    "falling": pygame.SYSTEM_CURSOR_SIZENWSE,
+}
+
+
+class Pointer(Mouse):
+    """Turns events of the mouse into what panel, sheet and tools do.
+
+    Parameters
+    ----------
+    desk, arena, panel
+    menu : callable
+        Opens the menu at a pixel.
+    """
+
+    def __init__(
+        self, desk: Desk, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
+    ) -> None:
+        super().__init__(panel)
+        self._desk, self._arena, self._menu = desk, arena, menu
+        self.held = False
+        """Whether the sheet is panned by the left button, for as long as a key is held."""
+        self._moved_off = False
+
+    def aim(self, pixel: tuple[int, int]) -> Aim:
+        """Return where a pixel means, with what is held down on the keyboard."""
+        raw, reach = self._arena.to_world(pixel), self._arena.reach
+        held = pygame.key.get_mods()
+        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        tool = self._desk.tool
+        point, tool_guides = raw, tool.guides
+        if tool.snaps:
+            snap = None if ctrl else self._desk.snap(raw, reach)
+            point, tool_guides = (raw, ()) if snap is None else (snap.point, snap.guides)
+            tool.guides = tool_guides
+        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
+        return Aim(point, raw, reach, shift, alt, ctrl)
+
+    def _panel_box(self) -> Box:
+        return self._arena.layout.panel
+
+    def _over_panel(self) -> None:
+        self._desk.cursor = None
+
+    def _turned(self, factor: float) -> None:
+        if self._arena.over(self.at):
+            self._arena.zoom(factor, self.at)
+
+    def leave(self) -> None:
+        """The mouse is not in the window any more."""
+        self._desk.cursor = None
+        self._arena.at = None
+        self._arena.hovered = None
+
+    def _pressed(self, event: pygame.event.Event, now: float) -> None:
+        desk = self._desk
+        if self._drag or not self._arena.over(event.pos) or event.button not in (1, 2, 3):
+            return
+        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
+        if event.button != 1 or desk.tool.name == "pan" or self.held:
+            self._drag = "pan"
+            return
+        problem = self._arena.problem_at(event.pos)
+        if problem is not None and not desk.tool.busy:
+            desk.problem = None if desk.problem is problem else problem
+            desk.say(problem.words, trouble=problem.grave)
+            desk.version += 1
+            return
+        then, where = self._last_click
+        double = now - then < DOUBLE and _far(where, event.pos) < SLIP * self._arena.layout.scale
+        self._last_click = (-1.0 if double else now), event.pos
+        self._drag = "tool"
+        aim = self.aim(event.pos)
+        act = desk.tool.twice if double else desk.tool.press
+        desk.attempt(lambda: act(desk, aim))
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        desk, arena = self._desk, self._arena
+        over = arena.over(event.pos) and not inside(arena.layout.panel, event.pos)
+        aimed = over or self._drag == "tool"
+        desk.cursor = arena.to_world(event.pos) if aimed else None
+        arena.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
+        arena.hovered = arena.problem_at(event.pos) if over and not self._drag else None
+        far = _far(event.pos, self._pressed_at) >= SLIP * arena.layout.scale
+        self._moved_off = self._moved_off or (bool(self._drag) and far)
+        if self._drag == "pan":
+            if self._moved_off:
+                arena.pan(*event.rel)
+        elif aimed:
+            aim = self.aim(event.pos)
+            self._quietly(lambda: desk.tool.move(desk, aim))
+        else:
+            desk.tool.guides = ()
+
+    def _quietly(self, action: Callable[[], object]) -> None:
+        """Do something for every move of the mouse: the panel need not look again each time."""
+        version = self._desk.version
+        self._desk.attempt(action)
+        self._desk.version = version
+
+    def _released(self, event: pygame.event.Event) -> None:
+        desk, drag = self._desk, self._drag
+        if event.button != self._button or not drag:
+            return
+        self._drag, self._button = "", 0
+        if drag == "tool":
+            aim = self.aim(event.pos)
+            desk.attempt(lambda: desk.tool.release(desk, aim, clicked=not self._moved_off))
+            desk.paper.history.break_drag()
+        elif event.button == 3 and not self._moved_off:
+            if desk.tool.busy:
+                desk.attempt(lambda: desk.tool.finish(desk))
+            else:
+                self._menu(event.pos)
+
+    def show(self) -> None:
+        """Let the cursor tell what a press would do."""
+        arena, desk = self._arena, self._desk
+        if inside(arena.layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = "arrow"
+        if arena.over(self.at):
+            panned = self._drag == "pan" or self.held
+            shape = "move" if panned else "hand" if arena.hovered else desk.tool.shape_of_cursor(desk)
+        self._show_cursor(_SHAPES[shape])
+
+
+def _far(a: tuple[int, int], b: tuple[int, int]) -> float:
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -1,0 +1,146 @@
+"""The demo on the map that is being drawn, in the same window; and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pygame
+
+from robocov.controllers import controller_kinds
+from robocov.environment import Environment
+from robocov_app.editor.model.document import Item, Sketch
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.render.picture import standard_layers
+from robocov_app.viewer.costs import LATTICE, DirectCosts, WorkerCosts
+from robocov_app.viewer.keyboard import key_of
+from robocov_app.viewer.presenter import Desk as DemoDesk
+from robocov_app.viewer.session.scenario import Limits, Scenario
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.window import Window
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.viewer.costs import Costs
+
+BACK = ("f5",)
+
+
+class TrialDesk(DemoDesk):
+    """The demo's desk, which knows whether the map is still the one that is tried.
+
+    Attributes
+    ----------
+    elsewhere : bool
+        Another map was opened meanwhile.
+    """
+
+    elsewhere = False
+
+    def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
+        self._tried, self._title = session.environment, title
+        super().__init__(session, costs, shown, folder, title, controller_kinds())
+
+    def open_map(self, name: str) -> None:
+        """Begin anew on another map, or on the one that is tried."""
+        if name == self._title:
+            self.session.restart(environment=self._tried)
+            self.map_name = name
+        else:
+            super().open_map(name)
+        self.elsewhere = name != self._title
+
+    def maps(self) -> list[str]:
+        """Return the maps to choose from, the one that is tried among them."""
+        return list(dict.fromkeys([self._title, *super().maps()]))
+
+
+class Trial(Window):
+    """The demo's window, out of which F5 and Escape lead back.
+
+    Attributes
+    ----------
+    ended : bool
+        Back to the editor.
+    """
+
+    desk: TrialDesk
+    hint = "F5 back to the editor · F1 keys"
+
+    def __init__(self, desk: TrialDesk, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
+        self.ended = False
+        super().__init__(desk, screen.get_size(), scale, patient=patient, screen=screen)
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take one event."""
+        if event.type == pygame.KEYDOWN and key_of(event) in BACK:
+            self.ended = True
+            return
+        super().take(event)
+
+    def do(self, name: str) -> None:
+        """Do the action of this name; Escape leads back where it would do nothing."""
+        idle = not (self.help or self.palette.open or self.tour is not None)
+        if name == "cancel" and idle and self.desk.tool is self.desk.hand and self.desk.selected is None:
+            self.ended = not self.desk.hand.cancel(self.desk.session)
+            return
+        super().do(name)
+
+
+def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) -> Trial:
+    """Return the demo on the map of a desk, with its team at its start.
+
+    Raises
+    ------
+    MapError
+        When the map is only a draft; the message says why.
+    StartError
+        When the team has no room at the start.
+    """
+    environment = desk.sketch.environment()
+    name = desk.start_name if desk.start_name in environment.starts else None
+    scenario = Scenario(
+        environment, robots=desk.robots, start=name, seed=desk.seed, limits=Limits(radius=desk.radius)
+    )
+    session = Session(scenario)
+    if patient:
+        session.clock.budget = float("inf")
+    costs: Costs = DirectCosts(LATTICE) if patient else WorkerCosts(LATTICE)
+    try:
+        shown = {layer.name for layer in standard_layers() if layer.default}
+        demo = TrialDesk(session, costs, shown, desk.folder, desk.paper.title)
+        demo.theme = desk.theme
+        trial = Trial(demo, screen, scale, patient=patient)
+    except BaseException:
+        costs.close()
+        raise
+    trial.panel.update(0.01)  # or its first frame would be without it
+    demo.say(f"trying “{desk.sketch.name}”: F5 or Esc leads back to the editor")
+    return trial
+
+
+def brought_back(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
+    """Return what was drawn, moved and deleted while the map was tried, as one change; None if nothing was.
+
+    Obstacles that are as they were keep who they are and their notes.
+    """
+    if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
+        return None
+    left = list(sketch.obstacles)
+    items: list[Item] = []
+    key = sketch.fresh_key
+    for shape in after.obstacles:
+        same = next((item for item in left if item.shape == shape), None)
+        if same is not None:
+            left.remove(same)
+        else:
+            same, key = Item(key, shape), key + 1
+        items.append(same)
+    new = frozenset(item.key for item in items if item.key not in sketch.places)
+    return Change(
+        replace(sketch, obstacles=tuple(items)),
+        Selection(items=new),
+        "what was changed while trying it, taken over",
+    )

@@ -1,0 +1,322 @@
+"""What a plot shows of the world: the map, and a whole run in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov_app.figures.page import tone
+from robocov_app.render.aims import CENTROID, GOAL, are_centroids
+from robocov_app.render.phi import density_words, shading
+from robocov_app.render.spacing import fitted_radii, line_crowding, mark_size
+from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+    from robocov.environment import Environment
+    from robocov.record import Record
+
+_DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
+"""Radius of a robot where it has room and in the densest crowd, and least size of its number, in points."""
+
+_START, _AIM = 6.2, 8.0
+"""Sizes of marks where they have room, in points."""
+
+
+_DOTS = 400
+"""Dots of the shading of a density along the longer side of a map."""
+
+
+def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
+    """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
+    from matplotlib.ticker import MaxNLocator
+
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    axes.set_aspect("equal")
+    axes.set_xlim(low_x, high_x)
+    axes.set_ylim(low_y, high_y)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.set_facecolor(tone(theme.background))
+
+
+def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: bool = True) -> None:
+    """Draw the obstacles, what of the region lies outside the boundary, and the region's outline.
+
+    Where places do not count all the same, how much they count is a shading below; without `density` not.
+    """
+    from matplotlib.patches import PathPatch, Polygon
+    from matplotlib.path import Path as Outline
+
+    if density:
+        _draw_density(axes, environment, theme)
+    for part in environment.blocked.geoms:
+        rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+        outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
+        axes.add_patch(
+            PathPatch(
+                outline,
+                facecolor=tone(theme.obstacle),
+                edgecolor=tone(theme.obstacle_edge),
+                linewidth=0.8,
+                zorder=2,
+            )
+        )
+    axes.add_patch(
+        Polygon(
+            environment.region.vertices,
+            closed=True,
+            fill=False,
+            edgecolor=tone(theme.boundary),
+            linewidth=1.6,
+            joinstyle="miter",
+            clip_on=False,
+            zorder=3,
+        )
+    )
+
+
+def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
+    from matplotlib.image import AxesImage
+    from matplotlib.patches import Polygon
+
+    if environment.density is None or environment.density.uniform:
+        return
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    step = max(high_x - low_x, high_y - low_y) / _DOTS
+    columns, rows = (max(round(side / step), 1) for side in (high_x - low_x, high_y - low_y))
+    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
+    y = low_y + (np.arange(rows) + 0.5) * (high_y - low_y) / rows
+    # limits stay as they are, which imshow would change
+    image = AxesImage(
+        axes, extent=(low_x, high_x, low_y, high_y), origin="lower", interpolation="bilinear", zorder=1.5
+    )
+    image.set_data(shading(environment.density, environment.region.bounds, x, y, theme))
+    axes.add_image(image)
+    image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
+
+
+def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
+    """Draw map, final cells, trajectories, starts, final positions and where robots head."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    draw_map(axes, record.environment.at(float(record.time[-1])), theme)
+    last, n = record.positions[-1], record.positions.shape[1]
+    working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
+    cells = record.cells()
+    outlines, owners = cells.outlines
+    hues = robot_hues(n, working[cells.adjacency])
+    paper = colours == "paper"
+    tint = theme.paper_tint if paper else theme.tint
+    each = zip(outlines, hues[working[owners]].tolist(), strict=True)
+    polygons = [(cell, hue) for cell, hue in each if len(cell) > 2]
+    axes.add_collection(
+        PolyCollection(
+            [cell for cell, _ in polygons],
+            facecolors=[tone(mix(theme.background, theme.robots[hue], tint)) for _, hue in polygons],
+            edgecolors=tone(theme.cell_edge),
+            linewidths=0.8,
+            zorder=1,
+        ),
+        autolim=False,
+    )
+    crowd = line_crowding(n)
+    lines = LineCollection(
+        [record.positions[record.present[:, robot], robot] for robot in range(n)],
+        colors=[tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)],
+        linewidths=1.6 * crowd,
+        capstyle="round",
+        joinstyle="round",
+        zorder=4,
+    )
+    axes.add_collection(lines, autolim=False)
+    # of one that joins, where it does
+    begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
+    starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
+    axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
+    fills = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
+    failed = _failed(record)
+    fills = [wreck_colour(theme) if failed[robot] else fills[robot] for robot in there.tolist()]
+    drawn = draw_robots(axes, last[there], record.team.radius[there], fills, theme, (there + 1).tolist())
+    if has_goals(record):
+        radius = np.array(drawn)[np.searchsorted(there, working)]
+        aims = record.goals[-1][working]
+        plus = are_centroids(aims, cells.centroid)
+        aims = cells.centroid if plus else aims
+        places = _in_points(axes, aims)
+        away = np.hypot(*(places - _in_points(axes, last[working])).T)
+        apart = mark_size(places[np.isfinite(away)], 3.2, _AIM)
+        # where a robot has arrived, only the ends of the cross would stick out from under its disc
+        axes.plot(*aims[away > radius].T, zorder=6, **_aim_style(plus, theme, apart))
+
+
+def draw_robots(
+    axes: Axes,
+    places: Array,
+    radius: Array,
+    fills: Sequence[Colour],
+    theme: Theme,
+    numbers: Sequence[int] | None = None,
+) -> list[float]:
+    """Draw robots at (n, 2) m with radii (n,) m as discs with numbers; return the drawn radii in points.
+
+    The numbers are 1, 2, 3, ... where others are not given.
+    """
+    drawn = _disc_points(axes, places, radius)
+    axes.scatter(
+        places[:, 0],
+        places[:, 1],
+        s=[(2 * r) ** 2 for r in drawn],
+        c=[tone(fill) for fill in fills],
+        edgecolors=tone(theme.robot_ring),
+        linewidths=[min(1.1, 0.25 * r) for r in drawn],
+        zorder=7,
+        clip_on=False,
+    )
+    numbers = range(1, len(places) + 1) if numbers is None else numbers
+    for robot, point, r, fill in zip(numbers, places, drawn, fills, strict=True):
+        digits = len(str(robot))
+        size = r * (1.25, 1.1, 0.85, 0.65)[min(digits, 4) - 1]
+        if size >= _SMALLEST_NUMBER:
+            axes.text(
+                float(point[0]),
+                float(point[1]),
+                str(robot),
+                fontsize=size,
+                fontweight="bold",
+                color=tone(readable_on(fill)),
+                ha="center",
+                va="center_baseline",
+                zorder=8,
+            )
+    return drawn
+
+
+def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
+    if paper:
+        return [theme.trajectory] * n
+    if n > ONE_HUE_EACH:
+        return [mix(theme.trajectory, theme.background, 0.25)] * n
+    return [theme.trail(hue) for hue in hues]
+
+
+def _disc_points(axes: Axes, places: Array, radius: Array) -> list[float]:
+    """Return each robot's radius in points: readable where there is room, in a crowd down to true size."""
+    unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    true = radius * float(unit[1, 0] - unit[0, 0])
+    radii = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC)
+    return [float(radius) for radius in radii]
+
+
+def _in_points(axes: Axes, places: Array) -> Array:
+    """Return where (n, 2) m places are drawn, in points."""
+    axes.apply_aspect()
+    return np.asarray(axes.transData.transform(places)) * (72 / axes.figure.dpi)
+
+
+def has_goals(record: Record) -> bool:
+    """Whether the controller draws robots to goals: centroids of cells, or of another kind."""
+    return bool(np.isfinite(record.goals[-1]).any())
+
+
+def _start_style(theme: Theme, size: float) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": size,
+        "markerfacecolor": "none",
+        "markeredgecolor": tone(theme.start),
+        "markeredgewidth": min(1.5, 0.25 * size),
+    }
+
+
+def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
+    """Return a plus for centroids, or a times sign for goals of another kind."""
+    return {
+        "linestyle": "none",
+        "label": CENTROID if plus else GOAL,
+        "marker": "+" if plus else "x",
+        "markersize": size if plus else 0.8 * size,
+        "markeredgecolor": tone(theme.ink if plus else theme.final),
+        "markeredgewidth": min(1.2 if plus else 1.6, 0.2 * size),
+    }
+
+
+def label_of(handle: Artist) -> str:
+    """Return what a legend's entry says."""
+    return str(handle.get_label())
+
+
+def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
+    """Return the legend's entries for what `draw_map` draws."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Artist] = [Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label="known region")]
+    if not environment.blocked.is_empty:
+        handles.append(
+            Patch(
+                facecolor=tone(theme.obstacle),
+                edgecolor=tone(theme.obstacle_edge),
+                linewidth=0.8,
+                label="obstacle (unknown to robots)",
+            )
+        )
+    words = density_words(environment) if density else ""
+    if words:
+        colour = mix(theme.background, theme.density, 0.7 * theme.density_strength)
+        handles.append(Patch(facecolor=tone(colour), linewidth=0.0, label=words))
+    return handles
+
+
+def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
+    """Return the legend's entry for a robot."""
+    from matplotlib.lines import Line2D
+
+    style: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": 8.0,
+        "markerfacecolor": tone(fill),
+        "markeredgecolor": tone(theme.robot_ring),
+    }
+    return Line2D([], [], label=label, **style)
+
+
+def wreck_colour(theme: Theme) -> Colour:
+    """Return the colour of robots that have failed."""
+    return mix(theme.background, theme.ink, 0.3)
+
+
+def _failed(record: Record) -> BoolArray:
+    """Return which robots had failed at the end, (n,) bool."""
+    return np.asarray(record.present[-1] & ~record.working[-1])
+
+
+def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
+    """Return the legend's entries for what `draw_run` draws."""
+    from matplotlib.lines import Line2D
+
+    paper, n = colours == "paper", record.positions.shape[1]
+    line = _line_colours(n, list(range(n)), theme, paper)[0]
+    aims: list[Artist] = []
+    if has_goals(record):
+        plus = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
+        aims = [Line2D([], [], **_aim_style(plus, theme, _AIM))]
+    return [
+        Line2D([], [], label="start", **_start_style(theme, _START)),
+        Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
+        robot_handle("final position", theme.final if paper else theme.robots[0], theme),
+        *([robot_handle("failed robot", wreck_colour(theme), theme)] if _failed(record).any() else []),
+        *aims,
+        Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
+        *map_handles(record.environment, theme)[1:],
+    ]

@@ -1,0 +1,357 @@
+"""The coverage cost as one page: its curves, and maps of the distances that it is the mean of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from robocov.errors import ParameterError
+from robocov_app.figures.arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
+from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, draw_curves, end_label
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
+from robocov_app.figures.runs import plot_cost
+from robocov_app.render.phi import cost_words, density_words, mean_words
+from robocov_app.render.shading import levels, palette, round_limit, strength, ticks
+from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from robocov.arrays import IntArray
+    from robocov.environment import Environment
+    from robocov.record import Record
+    from robocov.robots import Team
+    from robocov_app.figures.curves import Curve
+    from robocov_app.render.field import Field
+
+_FINE = 2
+"""Dots of a map's picture for each pixel of the page."""
+
+_LEAST = 720, 400
+"""Smallest page for curves and maps."""
+
+_BAR_LABEL = "distance to the nearest robot"
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A team at one moment, with the distances around it.
+
+    Attributes
+    ----------
+    environment : Environment
+    team : Team
+    field : Field
+    title, facts : str
+        What stands above the map.
+    numbers : tuple of int or None
+        What people call the robots; by default 1, 2, 3, ...
+    """
+
+    environment: Environment
+    team: Team
+    field: Field
+    title: str = ""
+    facts: str = ""
+    numbers: tuple[int, ...] | None = None
+
+    @classmethod
+    def last_of(
+        cls,
+        record: Record,
+        field: Field,
+        mean_distance: float,
+        counted: IntArray | None = None,
+        mean_time: float | None = None,
+    ) -> Moment:
+        """Return the last moment of a run, with the mean distance, m, and time, s, that its curves end with.
+
+        `counted` are the rows of the robots that count, all by default.
+        """
+        cost = cost_words(mean_words(record.environment), mean_distance, mean_time)
+        cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
+        facts = f"{cost} after {record.time[-1]:.1f} s".lstrip()
+        environment = record.environment.at(float(record.time[-1]))
+        if counted is None:
+            return cls(environment, record.team, field, record.label, facts)
+        team, numbers = record.team[counted], tuple((counted + 1).tolist())
+        return cls(environment, team, field, record.label, facts, numbers)
+
+
+class _Rooms(NamedTuple):
+    """Where things stand on a page, in pixels."""
+
+    curves: Box | None
+    maps: Box
+    bar: float
+    """Height at which the scale of colours is."""
+
+
+def plot_coverage(
+    curves: Sequence[Curve],
+    moments: Sequence[Moment],
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "Coverage cost",
+    times: Sequence[Curve] = (),
+) -> Figure:
+    """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colours.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        May be empty: there are only maps then.
+    moments : sequence of Moment
+        At least one.
+    theme : Theme or {"light", "dark"}
+    size : (width, height) or None, px
+        Of the page; by default what suits the shapes of the maps. One that is too small for both,
+        below 720 x 400, has the curves alone.
+    title : str
+    times : sequence of Curve
+        Mean times, s, where robots are not equally fast; they stand below the curves.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ParameterError
+        When there are no moments.
+    """
+    if not moments:
+        raise ParameterError("moments: none were given, but at least one was wanted")
+    if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
+        return plot_cost(curves, theme=theme, size=size, title=title)
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    bounds = np.array([moment.environment.region.bounds for moment in moments])
+    low_x, low_y = bounds[:, :2].min(axis=0).tolist()
+    high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
+    aspect = (high_x - low_x) / (high_y - low_y)
+    largest = [moment.field.largest for moment in moments]
+    limit = round_limit(max([distance for distance in largest if np.isfinite(distance)], default=1.0))
+    beside = len(moments) == 1 and aspect < 1.9
+    with plain_style():
+        handles = _handles(moments, theme)
+        page, rooms = _laid_out(theme, size, aspect, len(moments), bool(curves), beside, handles)
+        s = page.scale
+        bar_left = _draw_bar(page, limit, rooms)
+        free = page.size[0] if rooms.bar > 40 * s else bar_left
+        page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=free - 2 * page.margin)
+        if rooms.curves is not None:
+            weighed = any(density_words(moment.environment) for moment in moments)
+            _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
+        panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
+        for moment, (box, slot) in zip(moments, panels, strict=True):
+            axes = page.axes(box)
+            axes.set_xlim(low_x, high_x)
+            axes.set_ylim(low_y, high_y)
+            axes.set_axis_off()
+            _draw_moment(axes, moment, limit, theme, box, s)
+            page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
+            page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
+        (left, _, width, _), _ = panels[0]
+        right = max(box[0] + box[2] for box, _ in panels)
+        bottom = max(box[1] + box[3] for box, _ in panels)
+        page.footer(handles, left, right, bottom, width / (high_x - low_x), rooms.maps[0])
+        return page.figure
+
+
+def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
+    """Plot the distance to the nearest robot on axes that somebody else laid out.
+
+    They get ticks in metres, and the scale of colours to the right of them.
+
+    Parameters
+    ----------
+    moment : Moment
+        Its title and facts are not written.
+    axes : matplotlib Axes
+    theme : Theme or {"light", "dark"}
+    """
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    largest = moment.field.largest
+    limit = round_limit(largest if np.isfinite(largest) else 1.0)
+    with plain_style():
+        ticks_in_metres(axes, moment.environment, theme)
+        axes.apply_aspect()
+        extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
+        # small axes may be saved large
+        fine = max(_LEAST[0] / extent.width, 1.0)
+        box = (0.0, 0.0, fine * extent.width, fine * extent.height)
+        _draw_moment(axes, moment, limit, theme, box, fine * scale)
+        axes.set_aspect("equal")
+        bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar.imshow(
+            theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit)
+        )
+        bar.set_xticks([])
+        bar.set_yticks(ticks(limit))
+        bar.yaxis.tick_right()
+        bar.yaxis.set_label_position("right")
+        bar.set_ylabel(f"{_BAR_LABEL} (m)")
+
+
+def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    line = Line2D([], [], color=tone(_border_colour(theme)), linewidth=1.6, label="geodesic cell border")
+    handles: list[Artist] = [robot_handle("robot", theme.final, theme), line]
+    obstacles = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
+    for handle in max(obstacles, key=len):
+        handle.set_label("obstacle")
+        handles.append(handle)
+    if any((moment.field.result.owner < 0).any() for moment in moments):
+        edge = tone(theme.obstacle_edge)
+        colour = tone(theme.unreached)
+        hatched = Patch(
+            facecolor=colour, edgecolor=edge, hatch="////", linewidth=0.0, label="no robot can come"
+        )
+        handles.append(hatched)
+    return handles
+
+
+def _laid_out(
+    theme: Theme,
+    size: tuple[int, int] | None,
+    aspect: float,
+    maps: int,
+    with_curves: bool,
+    beside: bool,
+    handles: Sequence[Artist],
+) -> tuple[Page, _Rooms]:
+    """Return the page, and its rooms for curves and maps: beside or below each other."""
+    page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
+    s, margin = page.scale, page.margin
+    part = 0.5 if with_curves and beside else 1.0
+    begin = (1.0 - part) * page.size[0] + margin
+    caption, footer = 50 * s, page.footer_height(handles, begin)
+    room = part * page.size[0] - 2 * margin
+    highest = 290 * s
+    if size is None:
+        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / aspect)))) if maps > 3 else maps
+        slot = (room - (columns - 1) * 16 * s) / columns
+        tall = -(-maps // columns) * (min(slot / aspect, 760) + caption + 16 * s) - 16 * s
+        above = 46 * s if beside or not with_curves else 92 * s + highest
+        least = 480 * s if beside else 320
+        page = Page((page.size[0], int(np.clip(above + tall + footer, least, 2600))), theme, 1.3)
+    width, height = page.size
+    if not with_curves:
+        return page, _Rooms(None, (margin, 46 * s, room, height - 46 * s - footer), 26 * s)
+    if beside:
+        curves = (margin, 46 * s, 0.5 * width - margin, height - 46 * s)
+        maps_room = (0.5 * width + margin, 46 * s, room, height - 46 * s - footer)
+        return page, _Rooms(curves, maps_room, 26 * s)
+    cut = 46 * s + (highest if size is None else min(highest, 0.4 * (height - 46 * s - footer)))
+    curves = (margin, 46 * s, width - 2 * margin, cut - 46 * s)
+    maps_room = (margin, cut + 46 * s, room, height - footer - cut - 46 * s)
+    return page, _Rooms(curves, maps_room, cut + 24 * s)
+
+
+def _draw_all_curves(
+    page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str
+) -> None:
+    """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
+    left, top, width, height = room
+    across = times and width > 2.4 * height
+    part = (0.5 if across else 1.0, 0.5 if times and not across else 1.0)
+    drawn = [(curves, label, "m"), (times, TIME, "s")]
+    for k, (some, said, unit) in enumerate(drawn[: 2 if times else 1]):
+        place = left + k * width / 2 if across else left, top if across else top + k * height / 2
+        box = _curves_box(page, some, (*place, part[0] * width, part[1] * height), unit)
+        draw_curves(page.axes(box), some, page.theme, label=said, unit=unit)
+
+
+def _curves_box(page: Page, curves: Sequence[Curve], room: Box, unit: str = "m") -> Box:
+    """Return the box of the axes in the room for curves with all of their labels."""
+    s = page.scale
+    left, top, width, height = room
+    longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    right = min(26 * s + longest, 0.45 * width)
+    return left + 34 * s, top + 34 * s, width - 34 * s - right, height - 34 * s - 50 * s
+
+
+def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> list[tuple[Box, float]]:
+    """Return the largest equal boxes in a room, with captions above them, and how wide these may be."""
+    left, top, width, height = room
+    best: tuple[float, int] = (0.0, 1)
+    for columns in range(1, count + 1):
+        rows = -(-count // columns)
+        wide = (width - (columns - 1) * gap) / columns
+        high = (height - (rows - 1) * gap) / rows - above
+        best = max(best, (min(wide, max(high, 1.0) * aspect), columns))
+    wide, columns = best
+    slot = (width - (columns - 1) * gap) / columns
+    return [
+        (
+            (
+                left + column * (slot + gap) + (0.0 if count > 1 else (slot - wide) / 2),
+                top + row * (wide / aspect + above + gap) + above,
+                wide,
+                wide / aspect,
+            ),
+            slot if count > 1 else (slot + wide) / 2,
+        )
+        for row, column in (divmod(number, columns) for number in range(count))
+    ]
+
+
+def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
+    """Draw the distances cut at the walls, the borders of the geodesic cells, the map and the robots."""
+    from matplotlib.patches import Polygon
+
+    (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
+    zoom = _FINE * box[2] / (high_x - low_x)
+    columns, rows = max(round(_FINE * box[2]), 2), max(round(_FINE * box[3]), 2)
+    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
+    y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
+    picture = palette(theme)[levels(moment.field, x, y, limit, _FINE * 9)]
+    width = _FINE * 1.4 * scale
+    borders = moment.field.borders(x, y, width / zoom)
+    part = strength(borders, zoom, width)[:, None]
+    place = borders.row, borders.column
+    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(_border_colour(theme)))
+    image = axes.imshow(
+        picture,
+        extent=(low_x, high_x, low_y, high_y),
+        aspect="auto",
+        interpolation="antialiased",
+        zorder=0,
+    )
+    region = Polygon(moment.environment.region.vertices, transform=axes.transData)
+    image.set_clip_path(region)
+    draw_map(axes, moment.environment, theme, density=False)
+    places = moment.field.result.positions
+    draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
+
+
+def _border_colour(theme: Theme) -> tuple[int, int, int]:
+    return mix(theme.ink, theme.background, 0.1)
+
+
+def _draw_bar(page: Page, limit: float, rooms: _Rooms) -> float:
+    """Draw the scale of colours above the right edge of the maps; return where it begins."""
+    theme, s = page.theme, page.scale
+    right, width, middle = rooms.maps[0] + rooms.maps[2] - 14 * s, 190 * s, rooms.bar
+    axes = page.axes((right - width, middle - 9 * s, width, 10 * s))
+    axes.imshow(theme.heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
+    for side in axes.spines.values():
+        side.set(edgecolor=tone(theme.faint), linewidth=0.6)
+    marks = ticks(limit)
+    axes.set_xticks(marks, [*(f"{mark:g}" for mark in marks[:-1]), f"{marks[-1]:g} m"], fontsize=SMALL)
+    axes.set_yticks([])
+    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), length=2.5, pad=1.5)
+    left = right - width - 12 * s
+    wide = page.text_width(_BAR_LABEL)
+    if left - wide > (rooms.maps[0] if rooms.bar > 40 * s or rooms.curves is None else page.size[0] * 0.5):
+        page.text(_BAR_LABEL, left, middle - 4 * s, align="right")
+        left -= wide
+    return left

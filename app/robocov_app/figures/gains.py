@@ -1,0 +1,326 @@
+"""Plots of what a result depends on: gains, team sizes, limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.controllers.gains import value_text
+from robocov.errors import ParameterError, shown
+from robocov_app.figures.curves import DISTANCE, CurveStyle, curve_styles
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.figures.rows import cut_to
+from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from robocov.controllers.gains import Value
+
+HEAT_LEVELS = 12
+"""Steps of the scale of colours of a grid."""
+
+MOST_LEVELS = 15
+"""Different values of a gain up to which medians are drawn; more are a sample of a range."""
+
+MOST_LETTERS = 28
+"""Of a name on an axis or in a legend."""
+
+MOST_POINTS = 600
+"""Points that are drawn of a controller; of more, every so many-th."""
+
+_HEAT_PART = 0.55
+"""Of the theme's scale, so much is used: on all of it the ink can be read."""
+
+_WIDE = 8.0
+"""An axis is logarithmic when its highest value is so many times its lowest."""
+
+
+class Dependence(NamedTuple):
+    """What came of different values of a gain.
+
+    Attributes
+    ----------
+    label, controller : str
+    gains : (m,)
+        nan where the gain is null: no limit. Of a gain that is a word, the word's number.
+    values : (m,)
+    """
+
+    label: str
+    controller: str
+    gains: Array
+    values: Array
+
+
+def plot_gains(
+    dependences: Sequence[Dependence],
+    gain: str,
+    axes: Axes | None = None,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "",
+    *,
+    scale: float | None = None,
+    styles: Sequence[CurveStyle] | None = None,
+    label: str = DISTANCE,
+    words: Sequence[str] = (),
+) -> Figure:
+    """Plot values against a gain, one colour and mark a controller, with a line through medians.
+
+    The axis of the gain is logarithmic where it spans much; null has a place of its own at the right.
+    A gain that is a word has even places, and no line, for between words there is nothing.
+
+    Parameters
+    ----------
+    dependences : sequence of Dependence
+    gain : str
+        Name and unit of the gain.
+    axes : matplotlib Axes or None
+        Where to draw. None makes a page.
+    theme : Theme or {"light", "dark"}
+    size : (width, height) or None, px
+        Of the page; by default 700 x 480.
+    title : str
+        Of the page.
+    scale : float or None
+        Of the page's texts and lines; None for what suits its size.
+    styles : sequence of CurveStyle or None
+    label : str
+        What the values are.
+    words : sequence of str
+        Of a gain that is a word: the words, of which `dependences` hold the numbers.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ParameterError
+        When there are none, or one has no finite value.
+    """
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    kept = []
+    gain = cut_to(gain, len, MOST_LETTERS)
+    for each in dependences:
+        fine: BoolArray = np.isfinite(each.values)
+        if not fine.any():
+            raise ParameterError(f"dependence {shown(each.label)}: no finite value, but one was wanted")
+        short = cut_to(each.label, len, MOST_LETTERS)
+        kept.append(Dependence(short, each.controller, each.gains[fine], each.values[fine]))
+    if not kept:
+        raise ParameterError("dependences: none were given, but at least one was wanted")
+    known = curve_styles(each.controller for each in kept)
+    looks = [known[each.controller] for each in kept] if styles is None else list(styles)
+    with plain_style():
+        if axes is None:
+            axes = _page_axes(theme, size or (700, 480), title, scale)
+        gains = np.concatenate([each.gains for each in kept])
+        null = _gain_axis(axes, gains, words)
+        for each, look in zip(kept, looks, strict=True):
+            _draw_dependence(axes, each, look, null, theme, joined=not words)
+        _frame(axes, np.concatenate([each.values for each in kept]), gain, label, theme)
+        if len(kept) > 1:
+            axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(theme.ink), borderaxespad=0.2)
+        return cast("Figure", axes.get_figure(root=True))
+
+
+def plot_gain_grid(
+    first: Sequence[Value],
+    second: Sequence[Value],
+    values: Array,
+    gains: tuple[str, str],
+    axes: Axes | None = None,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "",
+    *,
+    scale: float | None = None,
+) -> Figure:
+    """Plot values over a grid of two gains as a heat map with the numbers in it; darkest is highest.
+
+    Parameters
+    ----------
+    first, second : sequence of float, str or None
+        Values of the gains: columns and rows, ascending; None for no limit.
+    values : (rows, columns)
+        nan where there is none.
+    gains : (str, str)
+        Names and units of the first and second gain.
+    axes, theme, size, title, scale
+        As for `plot_gains`.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ParameterError
+        When the values have another shape, or none is finite.
+    """
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    if values.shape != (len(second), len(first)) or not np.isfinite(values).any():
+        raise ParameterError(
+            f"values: shape {values.shape}, {int(np.isfinite(values).sum())} of them finite, "
+            f"but ({len(second)}, {len(first)}) with at least one finite was wanted"
+        )
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    colours = quiet_heat(theme)
+    decimals = _decimals(low, high)
+    with plain_style():
+        if axes is None:
+            axes = _page_axes(theme, size or (700, 480), title, scale)
+        from matplotlib.patches import Rectangle
+
+        for row, column in np.argwhere(np.isfinite(values)).tolist():
+            part = (values[row, column] - low) / (high - low) if high > low else 0.0
+            colour = tone(colours[round(part * (HEAT_LEVELS - 1))])
+            # a hair's breadth of the page between cells
+            axes.add_patch(
+                Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0)
+            )
+            axes.text(
+                column,
+                row,
+                f"{values[row, column]:.{decimals}f}",
+                ha="center",
+                va="center",
+                fontsize=SMALL,
+                fontweight="bold" if values[row, column] == low else "normal",
+                color=tone(theme.ink),
+            )
+        axes.set_xlim(-0.5, len(first) - 0.5)
+        axes.set_ylim(-0.5, len(second) - 0.5)
+        axes.set_xticks(range(len(first)), [_gain_text(value) for value in first])
+        axes.set_yticks(range(len(second)), [_gain_text(value) for value in second])
+        _plain_axes(axes, theme)
+        axes.tick_params(length=0.0)
+        for side in axes.spines.values():
+            side.set_visible(False)
+        axes.set_xlabel(cut_to(gains[0], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
+        axes.set_ylabel(cut_to(gains[1], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
+        _level_words(axes)
+        return cast("Figure", axes.get_figure(root=True))
+
+
+def quiet_heat(theme: Theme) -> list[Colour]:
+    """Return the `HEAT_LEVELS` colours of a grid from low to high, all quiet enough for text in ink."""
+    table = theme.heat_table(200)
+    rows = [round(_HEAT_PART * 199 * k / (HEAT_LEVELS - 1)) for k in range(HEAT_LEVELS)]
+    return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
+
+
+def _decimals(low: float, high: float) -> int:
+    """Return with how many decimals numbers tell three digits, and a tenth of the way between them apart."""
+    digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
+    return min(max(digits, default=2), 4) if max(digits, default=2) > 0 else 0
+
+
+def _page_axes(theme: Theme, size: tuple[int, int], title: str, scale: float | None) -> Axes:
+    page = Page(size, theme, scale)
+    s = page.scale
+    if title:
+        page.text(title, page.margin, 20 * s, points=TITLE, bold=True, room=size[0] - 2 * page.margin)
+    above = (66 if title else 34) * s
+    return page.axes((52 * s, above, size[0] - 70 * s, size[1] - above - 50 * s))
+
+
+def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
+    """Set the scale of the axis; return where null stands on it, None where there is no null."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    if words:
+        axes.set_xlim(-0.5, len(words) - 0.5)
+        axes.set_xticks(range(len(words)), list(words))
+        return None
+    finite = gains[np.isfinite(gains)]
+    levels = np.unique(finite)
+    logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
+    low, high = (float(levels[0]), float(levels[-1])) if len(levels) else (0.0, 0.0)
+    null = None
+    if logarithmic:
+        axes.set_xscale("log")
+        room = (high / low) ** 0.07
+        if np.isnan(gains).any():
+            null, high = high * room**3, high * room**3
+        axes.set_xlim(low / room, high * room)
+    else:
+        room = 0.07 * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
+        if np.isnan(gains).any():
+            null, high = high + 3 * room, high + 3 * room
+        axes.set_xlim(low - room, high + room)
+    ticks = levels.tolist() if len(levels) <= 8 else _even_ticks(axes, low, float(levels[-1]))
+    marks = [*ticks, *([null] if null is not None else [])]
+    axes.xaxis.set_major_locator(FixedLocator(marks))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticklabels([*(_gain_text(value) for value in ticks), *(["none"] if null is not None else [])])
+    return null
+
+
+def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    logarithmic = axes.get_xscale() == "log"
+    locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
+    return [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
+
+
+def _gain_text(value: Value) -> str:
+    return value_text(value, digits=4)
+
+
+def _draw_dependence(
+    axes: Axes, each: Dependence, style: CurveStyle, null: float | None, theme: Theme, *, joined: bool
+) -> None:
+    colour = tone(style.colour(theme))
+    where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
+    step = -(-len(where) // MOST_POINTS)
+    dots: Any = {"color": colour, "markeredgewidth": 0.0, "linestyle": "none"}
+    axes.plot(where[::step], each.values[::step], style.mark, markersize=3.6, alpha=0.5, **dots)
+    levels = np.unique(where)
+    if len(levels) > MOST_LEVELS:
+        axes.plot([], [], style.mark, markersize=5.0, label=each.label, **dots)
+        return
+    medians = np.array([np.median(each.values[where == level]) for level in levels])
+    dashes = style.dashes if joined else "none"
+    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": each.label}
+    axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)
+
+
+def _frame(axes: Axes, values: Array, gain: str, label: str, theme: Theme) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    ink = tone(theme.ink)
+    low, high = float(values.min()), float(values.max())
+    room = 0.08 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
+    axes.set_ylim(0.0 if 0.0 <= low < 0.4 * high else low - room, high + room)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_formatter("{x:g}")
+    _plain_axes(axes, theme)
+    axes.set_xlabel(gain, fontsize=TEXT, color=ink)
+    axes.set_ylabel(label, fontsize=TEXT, color=ink)
+    _level_words(axes)
+    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    axes.spines["bottom"].set_color(tone(theme.faint))
+
+
+def _plain_axes(axes: Axes, theme: Theme) -> None:
+    axes.set_facecolor(tone(theme.background))
+    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), labelsize=SMALL)
+    axes.tick_params(axis="y", left=False)
+
+
+def _level_words(axes: Axes) -> None:
+    """Level words are read more easily than words on their side."""
+    axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
+    axes.yaxis.set_label_coords(0.0, 1.03)

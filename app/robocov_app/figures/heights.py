@@ -1,0 +1,317 @@
+"""Where a sensor over a cell is best placed, by its height: equation (14), and what is said after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.locational import Distance, Sensing, value
+from robocov.locational.best_points import best_points
+from robocov.observation.region import Region
+from robocov.voronoi import VoronoiPartition, partition
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
+"""A cell without any symmetry, m."""
+
+HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
+"""Heights of the table, m."""
+
+_APART = 0.13
+"""Heights are written beside the path, rounded, where their places are so far apart, as a part of it."""
+
+_LOW, _HIGH = 0.01, 100.0
+"""The range of the plot for such a cell, m."""
+
+_LIMIT = 1e-7
+"""So high, relative to the cell's size, a sensor is as good as on the ground."""
+
+
+class AtHeight(NamedTuple):
+    """The best place at one height.
+
+    Attributes
+    ----------
+    height : float, m
+        0 and inf stand for the limits.
+    x, y : float, m
+    from_centroid : float, m
+    missed : float
+        What part of the best place's value a sensor over the centroid misses; nan in the limits.
+    """
+
+    height: float
+    x: float
+    y: float
+    from_centroid: float
+    missed: float
+
+
+def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[float]) -> list[AtHeight]:
+    """Return the best places over a convex cell, the limits h → 0 and h → ∞ first and last.
+
+    Parameters
+    ----------
+    vertices : ring of (x, y), m
+    heights : sequence of float, m
+        Ascending.
+    """
+    cell = _cell_of(vertices)
+    size = float(np.sqrt(cell.mass[0]))
+    rows = []
+    for height in (0.0, *heights, np.inf):
+        place = cell.centroid[0]
+        if height < np.inf:
+            place = best_points(cell, Sensing(height or _LIMIT * size))[0]
+        missed = float("nan")
+        if 0.0 < height < np.inf:
+            offsets = np.array([place, cell.centroid[0]])[:, None] - cell.generators
+            best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
+            missed = float(1.0 - plain / best)
+        away = float(np.hypot(*(place - cell.centroid[0])))
+        rows.append(AtHeight(height, float(place[0]), float(place[1]), away, missed))
+    return rows
+
+
+def height_table(rows: Sequence[AtHeight]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return head and rows of the table as texts."""
+    head = ("h (m)", "x (m)", "y (m)", "from the centroid (mm)", "missed over the centroid (%)")
+    names = {0.0: "→ 0", np.inf: "→ ∞"}
+    return head, [
+        (
+            names.get(row.height, f"{row.height:g}"),
+            f"{row.x:.4f}",
+            f"{row.y:.4f}",
+            f"{1e3 * row.from_centroid:.2f}",
+            "" if np.isnan(row.missed) else f"{100.0 * row.missed:.4f}",
+        )
+        for row in rows
+    ]
+
+
+def plot_heights(
+    vertices: Sequence[tuple[float, float]] = PENTAGON,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "The best place for a sensor depends on its height",
+    *,
+    scale: float | None = None,
+) -> Figure:
+    """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
+
+    At the left the whole cell, in the middle what happens in it, enlarged, and at the right how far the
+    optimum is from the centroid.
+
+    Parameters
+    ----------
+    vertices : ring of (x, y), m
+        Of a convex cell.
+    theme : Theme or {"light", "dark"}
+    size : (width, height) or None, px
+        By default 1080 x 440.
+    title : str
+    scale : float or None
+        Of texts and lines; None for what suits the size.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    cell = _cell_of(vertices)
+    unit = 10.0 ** round(float(np.log10(cell.mass[0] / 12.0)) / 2.0)
+    path = best_at_heights(vertices, np.geomspace(_LOW * unit, _HIGH * unit, 240).tolist())
+    marked = _apart(best_at_heights(vertices, [unit * n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
+    median = best_points(cell, Distance())[0]
+    with plain_style():
+        page = Page(size or (1080, 440), theme, scale)
+        s, (wide, high) = page.scale, page.size
+        top, bottom = (84 if title else 44) * s, 46 * s
+        if title:
+            page.text(title, page.margin, 22 * s, points=TITLE, bold=True, room=wide - 2 * page.margin)
+        tall, begin = high - top - bottom, page.margin + 26 * s
+        room = wide - page.margin - begin
+        left, middle, right = (
+            page.axes((begin + part * room, top, share * room, tall))
+            for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
+        )
+        for part, words in ((0.0, "the cell (m)"), (0.37, "the frame in it (m)")):
+            page.text(words, begin + part * room, top - 16 * s)
+        page.text("from the optimum to the centroid (mm)", begin + 0.68 * room, top - 16 * s)
+        window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
+        _draw_cell(left, cell, window, theme)
+        _draw_path(middle, path, marked, median, window, theme)
+        _draw_rays(left, middle, window, theme)
+        _draw_distance(right, path, marked, theme)
+        return page.figure
+
+
+def _apart(rows: Sequence[AtHeight]) -> list[AtHeight]:
+    """Return the limits, and what is far enough from them and from each other to have words beside it."""
+    first, *inner, last = rows
+    least = _APART * first.from_centroid
+    kept = [first]
+    for row in inner:
+        if row.from_centroid >= least and kept[-1].from_centroid - row.from_centroid >= least:
+            kept.append(row)
+    return [*kept, last]
+
+
+def _cell_of(vertices: Sequence[tuple[float, float]]) -> VoronoiPartition:
+    region = Region(np.array(vertices, dtype=float))
+    return partition(region.centroid[None], region)
+
+
+def _window(points: Array, aspect: float) -> tuple[float, float, float, float]:
+    """Return x, y, width and height of what is enlarged: all points, with room for words at the right."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    width, height = (high - low) * (1.9, 1.3)
+    width, height = max(width, height * aspect), max(height, width / aspect)
+    return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
+
+
+def _draw_cell(
+    axes: Axes, cell: VoronoiPartition, window: tuple[float, float, float, float], theme: Theme
+) -> None:
+    from matplotlib.patches import Polygon, Rectangle
+    from matplotlib.ticker import MaxNLocator
+
+    ring = cell.polygons[0]
+    fill = tone(mix(theme.background, theme.robots[1], theme.tint))
+    axes.add_patch(Polygon(ring, facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))
+    x, y, width, height = window
+    axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
+    axes.set_aspect("equal")
+    axes.margins(0.02)
+    axes.autoscale_view()
+    _plain(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, integer=True))
+
+
+def _draw_rays(left: Axes, middle: Axes, window: tuple[float, float, float, float], theme: Theme) -> None:
+    """Draw from the corners of the frame to those of what it holds."""
+    from matplotlib.patches import ConnectionPatch
+
+    x, y, width, height = window
+    for part in (0.0, 1.0):
+        ray = ConnectionPatch(
+            xyA=(x + width, y + part * height),
+            coordsA=left.transData,
+            xyB=(0.0, part),
+            coordsB=middle.transAxes,
+            color=tone(theme.faint),
+            linewidth=0.8,
+        )
+        left.figure.add_artist(ray)
+
+
+def _draw_path(
+    axes: Axes,
+    path: Sequence[AtHeight],
+    marked: Sequence[AtHeight],
+    median: Array,
+    window: tuple[float, float, float, float],
+    theme: Theme,
+) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    ink, line = tone(theme.ink), tone(theme.final)
+    axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
+    for row in marked[1:-1]:
+        axes.plot(row.x, row.y, "o", color=line, markersize=5.5, markeredgewidth=0.0, zorder=3)
+    ends: list[tuple[AtHeight, str, Any]] = [
+        (marked[0], "h → 0", {"marker": "o", "markerfacecolor": tone(theme.background)}),
+        (marked[-1], "h → ∞: the centroid", {"marker": "P", "markerfacecolor": line}),
+    ]
+    for row, _, look in ends:
+        axes.plot(row.x, row.y, markersize=9.5, markeredgecolor=line, markeredgewidth=1.8, zorder=4, **look)
+    words = [(row, f"h = {row.height:g} m") for row in marked[1:-1]] + [(row, text) for row, text, _ in ends]
+    for row, text in words:
+        axes.annotate(
+            text,
+            (row.x, row.y),
+            (11, -1),
+            textcoords="offset points",
+            va="center",
+            fontsize=SMALL,
+            color=ink,
+            zorder=5,
+        )
+    axes.plot(*median, "D", color=tone(theme.faint), markersize=6.0, zorder=3)
+    axes.annotate(
+        "median\n(f = r)",
+        (float(median[0]), float(median[1])),
+        (-9, 0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=SMALL,
+        color=tone(theme.faint),
+    )
+    x, y, width, height = window
+    axes.set_xlim(x, x + width)
+    axes.set_ylim(y, y + height)
+    axes.set_aspect("equal")
+    _plain(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(4, prune="both"))
+    for side in axes.spines.values():
+        side.set_visible(True)
+        side.set_color(ink)
+        side.set_linewidth(1.2)
+
+
+def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], theme: Theme) -> None:
+    line = tone(theme.final)
+    inner = path[1:-1]
+    axes.axhline(1e3 * path[0].from_centroid, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.plot(
+        [row.height for row in inner], [1e3 * row.from_centroid for row in inner], color=line, linewidth=2.4
+    )
+    axes.plot(
+        [row.height for row in marked[1:-1]],
+        [1e3 * row.from_centroid for row in marked[1:-1]],
+        "o",
+        color=line,
+        markersize=5.5,
+        markeredgewidth=0.0,
+    )
+    axes.set_xscale("log")
+    axes.set_xlim(inner[0].height, inner[-1].height)
+    axes.set_ylim(0.0, 1.12e3 * path[0].from_centroid)
+    _plain(axes, theme)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
+    axes.set_axisbelow(True)
+    axes.spines["bottom"].set_visible(True)
+    axes.spines["bottom"].set_color(tone(theme.faint))
+    axes.set_xlabel("height h (m)", fontsize=TEXT, color=tone(theme.ink))
+    worst = max(inner, key=lambda row: row.missed)
+    axes.annotate(
+        f"A sensor over the centroid misses\nat most {100.0 * worst.missed:.2g} % of what it could\n"
+        f"tell, at h = {worst.height:.2g} m.",
+        (0.04, 0.07),
+        xycoords="axes fraction",
+        ha="left",
+        va="bottom",
+        bbox={"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0},
+        fontsize=SMALL,
+        color=tone(theme.ink),
+    )
+
+
+def _plain(axes: Axes, theme: Theme) -> None:
+    axes.set_facecolor(tone(theme.background))
+    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), labelsize=SMALL, length=3.0)
+    axes.minorticks_off()
+    for side in axes.spines.values():
+        side.set_visible(False)

@@ -1,0 +1,86 @@
+"""Metrics of runs against time, in small panels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from robocov.errors import ParameterError
+from robocov_app.figures.curves import draw_curves, end_label
+from robocov_app.figures.page import TITLE, Page, plain_style
+from robocov_app.render.theme import LIGHT, Theme, theme_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure
+
+    from robocov.arrays import Array
+    from robocov.metrics.run_metrics import RunMetrics
+
+
+class Measured(NamedTuple):
+    """A run and what was measured of it.
+
+    Attributes
+    ----------
+    label, controller : str
+    metrics : RunMetrics
+    """
+
+    label: str
+    controller: str
+    metrics: RunMetrics
+
+
+def _share(of: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
+    return lambda metrics: np.asarray(100.0 * of(metrics) / metrics.free_area)
+
+
+PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
+    ("sensed, in line of sight (% of the free area)", "%", _share(lambda each: each.sensed_area)),
+    ("in line of sight (% of the free area)", "%", _share(lambda each: each.visible_area)),
+    ("work |F v| (J)", "J", lambda each: each.work),
+    ("way of a robot (m)", "m", lambda each: each.path_length),
+)
+"""Label, unit and values of each panel."""
+
+
+def plot_metrics(
+    runs: Sequence[Measured],
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] = (1200, 800),
+    title: str = "Metrics",
+) -> Figure:
+    """Plot the metrics of runs against time, each curve named with its value at the end.
+
+    Parameters
+    ----------
+    runs : sequence of Measured
+    theme : Theme or {"light", "dark"}
+    size : (width, height), px
+    title : str
+
+    Raises
+    ------
+    ParameterError
+        When there is no run.
+    """
+    if not runs:
+        raise ParameterError("runs: none were given, but at least one was wanted")
+    theme = theme_named(theme) if isinstance(theme, str) else theme
+    with plain_style():
+        page = Page(size, theme)
+        s = page.scale
+        page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=size[0] - 2 * page.margin)
+        width, height = size[0] / 2, (size[1] - 40 * s) / 2
+        for k, (label, unit, of) in enumerate(PANELS):
+            curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
+            longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+            row, column = divmod(k, 2)
+            left, top = column * width + 44 * s, 40 * s + row * height + 36 * s
+            right = min(24 * s + longest, 0.5 * width)
+            axes = page.axes((left, top, width - 44 * s - right, height - 84 * s))
+            draw_curves(axes, curves, theme, label=label, unit=unit, weight=0.8)
+        return page.figure

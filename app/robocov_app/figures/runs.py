@@ -1,0 +1,368 @@
+"""Publication plots: trajectories, cost curves and comparisons, as matplotlib figures.
+
+matplotlib is imported when a plot is made, never before; pyplot, which would want a display, never.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from robocov.errors import ParameterError, shown
+from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
+from robocov_app.figures.curves import Curve, draw_curves, end_label
+from robocov_app.figures.figure_files import check_figure_path as check_figure_path
+from robocov_app.figures.figure_files import figure_kind as figure_kind
+from robocov_app.figures.figure_files import save_figure as save_figure
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, plain_style
+from robocov_app.render.legends import united
+from robocov_app.render.phi import cost_words, mean_words
+from robocov_app.render.spacing import columns_for
+from robocov_app.render.theme import LIGHT, Theme, theme_named
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from robocov.environment import Environment
+    from robocov.record import Record
+
+_SCALE = 1.3
+"""Of texts and lines on a page of the usual width: its legend stands beside the scale bar."""
+
+
+def plot_environment(
+    environment: Environment,
+    axes: Axes | None = None,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+) -> Figure:
+    """Plot a map: its free space, its obstacles and the convex region that the robots know.
+
+    Parameters
+    ----------
+    environment : Environment
+    axes : matplotlib Axes or None
+        Where to draw; they get ticks in metres. None makes a page with title, scale bar and legend.
+    theme : Theme or {"light", "dark"}
+    size : (width, height) or None, px
+        Of the page; by default what suits the shape of the map.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    theme = _theme(theme)
+    with plain_style():
+        if axes is not None:
+            ticks_in_metres(axes, environment, theme)
+            draw_map(axes, environment, theme)
+            return _figure_of(axes)
+        facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
+        page, axes = _map_page(
+            environment, theme, size, environment.name, facts, map_handles(environment, theme)
+        )
+        draw_map(axes, environment, theme)
+        return page.figure
+
+
+def plot_trajectories(
+    record: Record,
+    axes: Axes | None = None,
+    theme: Theme | str = LIGHT,
+    colours: str = "paper",
+    size: tuple[int, int] | None = None,
+    mean_distance: float | None = None,
+    mean_time: float | None = None,
+) -> Figure:
+    """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
+
+    Parameters
+    ----------
+    record : Record
+    axes : matplotlib Axes or None
+        Where to draw; they get ticks in metres. None makes a page with title, scale bar and legend.
+    theme : Theme or {"light", "dark"}
+    colours : {"paper", "robots"}
+        The paper's green starts, red trajectories and blue final positions, or a hue for each robot.
+    size : (width, height) or None, px
+        Of the page; by default what suits the shape of the map.
+    mean_distance : float or None, m
+        Of the final positions, for the title, as
+    mean_time : float or None, s
+        where robots are not equally fast.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    _check_colours(colours)
+    theme = _theme(theme)
+    with plain_style():
+        if axes is not None:
+            ticks_in_metres(axes, record.environment, theme)
+            draw_run(axes, record, theme, colours)
+            return _figure_of(axes)
+        facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
+        page, axes = _map_page(
+            record.environment,
+            theme,
+            size,
+            _line(record.label, record.environment.name),
+            _line(*facts),
+            run_handles(record, theme, colours),
+        )
+        draw_run(axes, record, theme, colours)
+        return page.figure
+
+
+def plot_comparison(
+    records: Sequence[Record],
+    theme: Theme | str = LIGHT,
+    colours: str = "paper",
+    size: tuple[int, int] | None = None,
+    mean_distances: Sequence[float | None] | None = None,
+    mean_times: Sequence[float | None] | None = None,
+) -> Figure:
+    """Plot several runs side by side at one scale.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        At least one.
+    theme : Theme or {"light", "dark"}
+    colours : {"paper", "robots"}
+    size : (width, height) or None, px
+        Of the page; by default what suits the shapes of the maps.
+    mean_distances : sequence of float or None, m
+        Of the final positions, for the titles, as
+    mean_times : sequence of float or None, s
+        where robots are not equally fast.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ParameterError
+        When there are no records, or not one mean distance, and mean time, for each.
+    """
+    _check_colours(colours)
+    costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
+    if not records or len(costs) != len(records):
+        raise ParameterError(
+            f"comparison: {len(records)} runs and {len(costs)} mean distances, "
+            f"but at least one run and one distance for each was wanted"
+        )
+    times = list(mean_times) if mean_times is not None else [None] * len(records)
+    if len(times) != len(records):
+        raise ParameterError(
+            f"comparison: {len(records)} runs and {len(times)} mean times, but one time for each was wanted"
+        )
+    theme = _theme(theme)
+    with plain_style():
+        bounds = np.array([record.environment.region.bounds for record in records])
+        limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
+        aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
+        shared, captions = _captions(records, costs, times)
+        entries = united((run_handles(record, theme, colours) for record in records), label_of)
+
+        scale = 1.5 if size is None else None
+        page = Page(size or (1600, 1000), theme, scale)
+        above, top = 54 * page.scale, 50 * page.scale if shared else 8 * page.scale
+        words = [
+            (page.text_width(record.label, points=TITLE, bold=True), page.text_width(text))
+            for record, text in zip(records, captions, strict=True)
+        ]
+        columns = columns_for(len(records), aspect, (page.size[0], page.size[1] - 2 * top), above)
+        fitting = (page.size[0] - page.margin) / (max(max(both) for both in words) + page.margin)
+        columns = max(min(columns, int(fitting)), 1)
+        slot = (page.size[0] - page.margin) / columns - page.margin
+        one_line = all(name + text + 16 * page.scale <= slot for name, text in words)
+        above = (30 if one_line else 54) * page.scale
+        if size is None:
+            rows = -(-len(records) // columns)
+            tall = top + rows * (above + slot / aspect + 14 * page.scale) + page.footer_height(entries)
+            page = Page((page.size[0], int(np.clip(tall, 320, 1800))), theme, scale)
+        wide = max((name + text + 16 * page.scale if one_line else max(name, text)) for name, text in words)
+        below = page.footer_height(entries)
+        panels = page.panels(len(records), columns, aspect, wide, above, top, below)
+        first, room = panels[0]
+        for record, text, (box, _) in zip(records, captions, panels, strict=True):
+            axes = page.axes(box)
+            axes.set_xlim(limits[0], limits[2])
+            axes.set_ylim(limits[1], limits[3])
+            axes.set_axis_off()
+            draw_run(axes, record, theme, colours)
+            left, edge, up = box[0], box[1], 16 * page.scale
+            if one_line:
+                page.text(record.label, left, edge - up, points=TITLE, bold=True)
+                right = left + max(box[2], min(room, wide))
+                page.text(text, right, edge - up, colour=theme.faint, align="right")
+            else:
+                page.text(record.label, left, edge - 38 * page.scale, points=TITLE, bold=True, room=room)
+                page.text(text, left, edge - up, colour=theme.faint, room=room)
+        if shared:
+            y = first[1] - above - 20 * page.scale
+            page.text(shared, first[0], y, points=HEADING, bold=True, room=page.size[0] - 2 * page.margin)
+        right = max(box[0] + max(box[2], room if one_line else 0.0) for box, _ in panels)
+        bottom = max(box[1] + box[3] for box, _ in panels)
+        page.footer(entries, first[0], right, bottom, first[2] / (limits[2] - limits[0]))
+        return page.figure
+
+
+def plot_cost(
+    curves: Sequence[Curve],
+    axes: Axes | None = None,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "Coverage cost over time",
+) -> Figure:
+    """Plot mean distance against time, each curve named with its final value at its end.
+
+    Parameters
+    ----------
+    curves : sequence of (label, controller, (T,) s, (T,) m)
+        RAPF is blue and RPF red, as in the paper; curves differ in their dashes as well.
+    axes : matplotlib Axes or None
+        Where to draw; the labels stand to the right of them. None makes a page.
+    theme : Theme or {"light", "dark"}
+    size : (width, height) or None, px
+        Of the page; by default 1000 x 560.
+    title : str
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ParameterError
+        When there are no curves, or one has no finite value.
+    """
+    if not curves:
+        raise ParameterError("curves: none were given, but at least one was wanted")
+    for label, _, time, values in curves:
+        if len(time) != len(values) or not np.isfinite(values).any():
+            raise ParameterError(
+                f"curve {shown(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
+                f"but a value for each time and a finite one was wanted"
+            )
+    theme = _theme(theme)
+    with plain_style():
+        size = size or (1000, 560)
+        # few things are on it: they may be large
+        scale = float(np.clip(min(size[0] / 800, size[1] / 450), 0.8, 6.0))
+        page = Page(size, theme, scale) if axes is None else None
+        if axes is None:
+            assert page is not None
+            s = page.scale
+            longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+            right = min(40 * s + longest, 0.45 * size[0])
+            box = (52 * s, 86 * s, size[0] - 52 * s - right, size[1] - 86 * s - 56 * s)
+            page.text(title, 52 * s, 30 * s, points=TITLE, bold=True, room=size[0] - 52 * s - page.margin)
+            axes = page.axes(box)
+        draw_curves(axes, curves, theme)
+        return _figure_of(axes)
+
+
+def _figure_of(axes: Axes) -> Figure:
+    return cast("Figure", axes.get_figure(root=True))
+
+
+def _theme(theme: Theme | str) -> Theme:
+    return theme_named(theme) if isinstance(theme, str) else theme
+
+
+def _check_colours(colours: str) -> None:
+    if colours not in ("paper", "robots"):
+        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
+
+
+def _map_page(
+    environment: Environment,
+    theme: Theme,
+    size: tuple[int, int] | None,
+    title: str,
+    facts: str,
+    handles: Sequence[Artist],
+) -> tuple[Page, Axes]:
+    """Return a page with titles, scale bar and legend, and the axes for one map in the room between."""
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    aspect = (high_x - low_x) / (high_y - low_y)
+    if size is None:
+        page = Page((1400, 1000), theme, _SCALE)
+        around = 58 * page.scale + page.footer_height(handles)
+        width = float(np.clip((1300 - around) * aspect + 2 * page.margin, 840, 1400))
+        height = float(np.clip((width - 2 * page.margin) / aspect + around, 300, 1300))
+        page = Page((int(width), int(height)), theme, _SCALE)
+    else:
+        page = Page(size, theme)
+    above, below = 58 * page.scale, page.footer_height(handles)
+    room_x, room_y = page.size[0] - 2 * page.margin, page.size[1] - above - below
+    width = min(room_x, room_y * aspect)
+    height = width / aspect
+    left, top = (page.size[0] - width) / 2, above + (room_y - height) / 2
+    axes = page.axes((left, top, width, height))
+    axes.set_xlim(low_x, high_x)
+    axes.set_ylim(low_y, high_y)
+    axes.set_axis_off()
+    _titles(page, (left, top, width, height), title, facts)
+    page.footer(handles, left, left + width, top + height, width / (high_x - low_x))
+    return page, axes
+
+
+def _titles(page: Page, box: Box, title: str, facts: str) -> None:
+    """Write two lines above `box`; above a narrow map they may be wider than it."""
+    left, top, width, _ = box
+    room = page.size[0] - 2 * page.margin
+    for text, up, points, bold, colour in (
+        (title, 38, TITLE, True, page.theme.ink),
+        (facts, 16, TEXT, False, page.theme.faint),
+    ):
+        wide = min(page.text_width(text, points=points, bold=bold), room)
+        start = left if wide <= width else max(left + (width - wide) / 2, page.margin)
+        page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
+
+
+def _captions(
+    records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
+) -> tuple[str, list[str]]:
+    """Return what is true of all runs, for the page's title, and of each, what is not."""
+    same: list[str] = []
+    own = [[_cost(each.environment, *known)] for each, *known in zip(records, costs, times, strict=True)]
+    for fact in (_map, _robots, _time):
+        found = [fact(record) for record in records]
+        if len(set(found)) == 1:
+            same.append(found[0])
+        else:
+            for facts, text in zip(own, found, strict=True):
+                facts.append(text)
+    return _line(*same), [_line(*facts) for facts in own]
+
+
+def _line(*facts: str) -> str:
+    return "  ·  ".join(fact for fact in facts if fact)
+
+
+def _map(record: Record) -> str:
+    return record.environment.name
+
+
+def _robots(record: Record) -> str:
+    n = len(record.team)
+    return f"{n} robot{'s' if n > 1 else ''}"
+
+
+def _time(record: Record) -> str:
+    return f"t = {record.time[-1]:.1f} s"
+
+
+def _cost(environment: Environment, mean_distance: float | None, mean_time: float | None) -> str:
+    if mean_distance is None:
+        return ""
+    return cost_words(mean_words(environment), mean_distance, mean_time)

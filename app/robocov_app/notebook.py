@@ -1,0 +1,239 @@
+"""The application as the library's drawing backend: matplotlib for plots, and what notebooks show.
+
+The entry point ``matplotlib`` of the group ``robocov.drawing`` names this module; its functions are those
+of `robocov.drawing.DrawingBackend`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from robocov.errors import ParameterError, counted, shown
+from robocov_app.render.theme import LIGHT, Theme
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from robocov.cost import CoverageResult
+    from robocov.environment import Environment
+    from robocov.metrics import CostHistory
+    from robocov.record import Record
+
+COST_LATTICE = 64
+"""Lattice of the cost that is shown with a run in a notebook."""
+
+COST_SAMPLES = 120
+"""At so many moments of the run it is evaluated, at the most."""
+
+COST_VERTICES = 2500
+"""Vertices of the free space up to which the cost is shown: beyond, notebooks would wait for seconds."""
+
+_MAP_SIZE = 640.0, 420.0
+"""Largest width and height of a map in a notebook, in pixels."""
+
+_REPLAY_SIZE = 760.0, 520.0
+"""The same of the map of a replay; the whole is not narrower than its controls."""
+
+_CONTROLS = 520.0
+"""Width at which the controls of a replay are beside each other, in pixels."""
+
+_MAP_CSS = """
+.robocov-map { margin: 0; padding: 12px; box-sizing: border-box; border-radius: 6px;
+  background: var(--rc-background); color: var(--rc-ink); font: 13px/1.4 system-ui, sans-serif; }
+.robocov-map figcaption { margin: 0 0 8px; color: var(--rc-faint); }
+.robocov-map figcaption b { color: var(--rc-ink); margin-right: .6em; }
+.robocov-scale { display: flex; align-items: center; gap: 8px; margin-top: 6px; font-weight: 600; }
+.robocov-scale i { box-sizing: border-box; height: 7px; border: solid; border-width: 0 1.4px 1.4px; }
+"""
+
+_RUN_CSS = """
+.robocov-run .robocov-replay { padding: 12px; box-sizing: border-box; border-radius: 6px; }
+"""
+
+
+def plot_environment(
+    environment: Environment,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+) -> Axes:
+    """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
+    from robocov_app.figures.runs import plot_environment as plot
+
+    return _map_axes(plot(environment, _checked(axes), theme, size), axes)
+
+
+def plot_record(
+    record: Record,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    colours: str = "paper",
+    size: tuple[int, int] | None = None,
+    mean_distance: float | None = None,
+    mean_time: float | None = None,
+) -> Axes:
+    """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
+    from robocov_app.figures.runs import plot_trajectories
+
+    figure = plot_trajectories(record, _checked(axes), theme, colours, size, mean_distance, mean_time)
+    return _map_axes(figure, axes)
+
+
+def plot_history(
+    history: CostHistory,
+    axes: Axes | None = None,
+    *,
+    label: str = "at the end",
+    controller: str = "",
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "Coverage cost over time",
+) -> Axes:
+    """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
+    from robocov_app.figures.runs import plot_cost
+
+    curve = (label, controller, history.time, history.mean_distance)
+    return _map_axes(plot_cost([curve], _checked(axes), theme, size, title), axes)
+
+
+def plot_result(
+    result: CoverageResult,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    radius: ArrayLike | None = None,
+) -> Axes:
+    """Plot the distance of every place to its nearest robot; see `robocov_app.figures.coverage`.
+
+    A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one.
+
+    Raises
+    ------
+    ParameterError
+        When the result does not know its map.
+    """
+    from robocov.robots import Team
+    from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
+    from robocov_app.render.field import Field, FieldLattice
+    from robocov_app.render.phi import mean_words
+    from robocov_app.runs.building import PICTURE_LATTICE, built_cost
+
+    _checked(axes)
+    environment, sites, n = result.environment, result.sites, len(result.positions)
+    if environment is None or sites is None:
+        raise ParameterError("result: it does not know its map; one that a CoverageCost returned was wanted")
+    team = Team.homogeneous(n)
+    if radius is not None:
+        team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
+    facts = f"{counted(n, 'robot')}, {mean_words(environment)} {result.mean_distance:.3f} m"
+    if sites.lattice < PICTURE_LATTICE:
+        finer = built_cost(environment, PICTURE_LATTICE, quiet=True)
+        sites, result = finer.sites, finer(result.positions)
+    moment = Moment(environment, team, Field(FieldLattice(sites), result), environment.name, facts)
+    if axes is None:
+        return _map_axes(plot_coverage([], [moment], theme, size, "Coverage cost"), None)
+    plot_distances(moment, axes, theme)
+    return axes
+
+
+def environment_html(environment: Environment) -> str:
+    """Return a map with its facts and a scale bar, in light or dark as the notebook is."""
+    from robocov_app.render.camera import length_label, round_length
+    from robocov_app.report.pictures import Frame, map_picture
+    from robocov_app.report.replay import asset
+    from robocov_app.report.theme_css import theme_rules
+
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    width, height = high_x - low_x, high_y - low_y
+    frame, bar = Frame(environment, *_MAP_SIZE), round_length(width / 5)
+    left, right = frame.at(np.array([[low_x, low_y], [low_x + bar, low_y]]))[:, 0] / (frame.width / 100)
+    starts = ", ".join(environment.starts) or "uniform"
+    facts = (
+        f"{width:.4g} × {height:.4g} m, {environment.free_area:.4g} m² free, "
+        f"{counted(len(environment.obstacles), 'obstacle')}; "
+        f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
+    )
+    return (
+        f"<style>{theme_rules('.robocov-map')}{asset('picture.css')}{_MAP_CSS}</style>"
+        f'<figure class="robocov-map" style="max-width:{frame.width + 24:.0f}px">'
+        f"<figcaption><b>{escape(environment.name)}</b> {escape(facts)}</figcaption>"
+        f"{map_picture(environment, *_MAP_SIZE)}"
+        f'<div class="robocov-scale"><i style="margin-left:{left:.2f}%;width:{right - left:.2f}%"></i>'
+        f"{length_label(bar)}</div>"
+        f"</figure>"
+    )
+
+
+def environment_png(environment: Environment) -> bytes:
+    """Return a map's page."""
+    from robocov_app.figures.figure_files import figure_png
+    from robocov_app.figures.runs import plot_environment as plot
+
+    return figure_png(plot(environment))
+
+
+def record_html(record: Record) -> str:
+    """Return a replay of a run, with its cost where that does not take long."""
+    from robocov_app.report.pictures import Frame
+    from robocov_app.report.replay import ReplayRun, replay_html
+
+    run = ReplayRun(record, _history_to_show(record), f"{record.label} on {record.environment.name}")
+    width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
+    replay = replay_html([run], standalone=False)
+    style = f"<style>{_RUN_CSS}</style>"
+    return f'{style}<div class="robocov-run" style="max-width:{width:.0f}px">{replay}</div>'
+
+
+def _history_to_show(record: Record) -> CostHistory | None:
+    """Return the cost along a run, None where nobody would wait for it or it cannot be had."""
+    from robocov.errors import RobocovError
+    from robocov.metrics import cost_history
+    from robocov_app.runs.building import built_cost
+
+    if shapely.get_num_coordinates(record.environment.free) > COST_VERTICES:
+        return None
+    span = float(record.time[-1] - record.time[0])
+    rate = min(COST_SAMPLES / span, 10.0) if span > 0.0 else 0.0
+    try:
+        return cost_history(record, built_cost(record.environment, COST_LATTICE, quiet=True), rate)
+    except RobocovError:  # a map without a free site, a robot in an obstacle
+        return None
+
+
+def record_png(record: Record) -> bytes:
+    """Return a run's page."""
+    from robocov_app.figures.figure_files import figure_png
+    from robocov_app.figures.runs import plot_trajectories
+
+    return figure_png(plot_trajectories(record))
+
+
+def _checked(axes: Any) -> Any:
+    """Return axes on which a plot can be drawn, or None.
+
+    Raises
+    ------
+    ParameterError
+        When they are none, or several, or have other than two straight axes.
+    """
+    from matplotlib.axes import Axes
+
+    flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
+    if axes is not None and not flat:
+        raise ParameterError(f"axes: {shown(axes)}, but one matplotlib Axes with straight x and y was wanted")
+    return axes
+
+
+def _map_axes(figure: Figure, given: Axes | None) -> Axes:
+    """Return the axes that were given, else those of the page that were drawn last: the map's."""
+    return figure.axes[-1] if given is None else given

@@ -1,0 +1,244 @@
+"""The canvas: a surface with a camera and a theme, and the few strokes that layers are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array
+from robocov_app.render import sprites
+from robocov_app.render.clipping import FAR, clipped_polygon, clipped_segment
+from robocov_app.render.fonts import label, text_width
+from robocov_app.render.theme import Colour
+
+if TYPE_CHECKING:
+    from robocov.arrays import IntArray
+    from robocov_app.render.camera import Camera
+    from robocov_app.render.theme import Theme
+
+Pixel: TypeAlias = Sequence[float]
+"""x to the right and y down from the surface's corner."""
+
+Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
+"""Gives the sprite for a shift in quarters of a pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """Where layers draw.
+
+    Attributes
+    ----------
+    surface : pygame.Surface
+    camera : Camera
+    theme : Theme
+    scale : float
+        Widths and text sizes of the theme are multiplied by it: 2 on a screen of twice the density.
+    hues : (n,) int
+        Index of each robot's colour in the theme.
+    shown : names of layers
+        All that are drawn.
+    """
+
+    surface: pygame.Surface
+    camera: Camera
+    theme: Theme
+    scale: float
+    hues: IntArray
+    shown: frozenset[str] = frozenset()
+
+    def width(self, pixels: float) -> int:
+        """Return a stroke's width of `pixels` at scale 1: whole pixels, at least one."""
+        return max(1, round(pixels * self.scale))
+
+    def text_size(self, pixels: float) -> int:
+        """Return a text size in whole pixels."""
+        return max(7, round(pixels * self.scale))
+
+    def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
+        """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
+        for ring in clipped_polygon(corners):
+            pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
+
+    def polygons(
+        self, corners: Array, ends: Sequence[int], fills: Sequence[Colour | None], edge: Colour | None = None
+    ) -> None:
+        """Fill many polygons, one after the other in (k, 2) px corners, each up to one of the `ends`.
+
+        With an `edge`, they get thin outlines that are not smooth either.
+        """
+        begin = 0
+        if len(corners) and np.abs(corners).max() > FAR:
+            for end, fill in zip(ends, fills, strict=True):
+                if fill is not None:
+                    self.polygon(corners[begin:end], fill)
+                if edge is not None:
+                    self.outline(corners[begin:end], edge, self.width(1.0))
+                begin = end
+            return
+        surface, points, draw, width = (
+            self.surface,
+            np.rint(corners).tolist(),
+            pygame.draw.polygon,
+            self.width(1.0),
+        )
+        for end, fill in zip(ends, fills, strict=True):
+            if end - begin > 2:
+                ring = points[begin:end]
+                if fill is not None:
+                    draw(surface, fill, ring)
+                if edge is not None:
+                    draw(surface, edge, ring, width)
+            begin = end
+
+    def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
+        """Draw the smooth line through the (k, 2) px points."""
+        points = corners.tolist()
+        if closed and points:
+            points.append(points[0])
+        for start, end in pairwise(points):
+            self.line(start, end, colour, width)
+        if width > 2:  # lines have straight ends: fill the corners' notches
+            for point in points:
+                self.stamp(partial(sprites.dot, width / 2 - 0.5, colour), point)
+
+    def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
+        """Draw a smooth line between two pixels."""
+        ends = clipped_segment(start[0], start[1], end[0], end[1])
+        if ends is not None:
+            pygame.draw.aaline(self.surface, colour, *ends, width)
+
+    def segments(self, ends: Array, colour: Colour, width: int = 1) -> None:
+        """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
+        if len(ends) and np.abs(ends).max() > FAR:
+            for x1, y1, x2, y2 in ends.tolist():
+                self.line((x1, y1), (x2, y2), colour, width)
+            return
+        surface, draw = self.surface, pygame.draw.aaline
+        for x1, y1, x2, y2 in ends.tolist():
+            draw(surface, colour, (x1, y1), (x2, y2), width)
+
+    def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
+        """Draw a dashed smooth line."""
+        ends = clipped_segment(start[0], start[1], end[0], end[1])
+        if ends is None:
+            return
+        a, b = np.array(ends[0]), np.array(ends[1])
+        length = float(np.hypot(*(b - a)))
+        count = max(1, round(length / (2 * dash * self.scale)))
+        for k in range(count):
+            first, last = a + (b - a) * (k / count), a + (b - a) * ((k + 0.55) / count)
+            pygame.draw.aaline(self.surface, colour, first.tolist(), last.tolist(), width)
+
+    def circle(self, center: Pixel, radius: float, colour: Colour, dashed: bool = False) -> None:
+        """Draw a large circle's line, a pixel or so wide."""
+        sides = int(min(max(radius, 24), 720)) // 2 * 2
+        angle = np.arange(sides + 1) * (2 * np.pi / sides)
+        points = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        corners = points.tolist()
+        width = self.width(1.0)
+        for k in range(0, sides, 2 if dashed else 1):
+            self.line(corners[k], corners[k + 1], colour, width)
+
+    def swatch(self, x: float, y: float, fill: Colour | None, edge: Colour) -> None:
+        """Draw a small square with an edge for the legend, around a pixel."""
+        size = 11 * self.scale
+        box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
+        if fill is not None:
+            pygame.draw.rect(self.surface, fill, box)
+        pygame.draw.rect(self.surface, edge, box, self.width(1.0))
+
+    def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
+        """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        length = float(np.hypot(*(b - a)))
+        if length < 1.0 or self._far_off(start):
+            return
+        along = (b - a) / length
+        across = np.array([-along[1], along[0]])
+        size = min(2.6 * width + 4 * self.scale, length)
+        left, right = b - size * along + 0.48 * size * across, b - size * along - 0.48 * size * across
+        shaft = [a, b - 0.7 * size * along] if head == "full" else [a, b]
+        barbs = np.array([left, b, right]).tolist()
+        sketch = sprites.Sketch.around([a.tolist(), *barbs], 2 * width)
+        if sketch is None:
+            return
+        sketch.path(np.array(shaft).tolist(), colour, width)
+        if head == "full":
+            sketch.polygon(barbs, colour)
+        elif head == "open":
+            sketch.path(barbs, colour, width)
+        else:
+            sketch.dot(barbs[1], 1.5 * width, colour)
+        sketch.onto(self.surface)
+
+    def stamp(self, sprite: Sprite, center: Pixel) -> None:
+        """Put a sprite where it belongs to a quarter of a pixel."""
+        self.stamps([sprite], np.array([center], dtype=float))
+
+    def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:
+        """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other.
+
+        `which` of them belongs where, (n,); the first everywhere where it is None.
+        """
+        self.surface.fblits(self.placed(some, centers, which), pygame.BLEND_PREMULTIPLIED)
+
+    def placed(
+        self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None
+    ) -> list[tuple[pygame.Surface, tuple[int, int]]]:
+        """Return the pictures of sprites that are to be put at (n, 2) px, and their corners."""
+        near = np.flatnonzero(
+            ((centers > -500) & (centers < np.add(self.surface.get_size(), 500))).all(axis=1)
+        )
+        # as for lines, whole numbers are the middles of pixels
+        quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
+        places, shifts = np.divmod(quarters, sprites.FINE)
+        rows = shifts[:, 0] + sprites.FINE * shifts[:, 1]
+        if which is not None:
+            rows = rows + sprites.FINE**2 * which[near]
+        known: dict[int, tuple[pygame.Surface, int]] = {}
+        pictures = []
+        for row, (x, y) in zip(rows.tolist(), places.tolist(), strict=True):
+            if row not in known:
+                sprite, shift = divmod(row, sprites.FINE**2)
+                picture = some[sprite]((shift % sprites.FINE, shift // sprites.FINE))
+                known[row] = picture, picture.get_width() // 2
+            picture, half = known[row]
+            pictures.append((picture, (x - half, y - half)))
+        return pictures
+
+    def _far_off(self, pixel: Pixel) -> bool:
+        """Whether what is small and drawn at `pixel` cannot be seen."""
+        width, height = self.surface.get_size()
+        return not (-500 < pixel[0] < width + 500 and -500 < pixel[1] < height + 500)
+
+    def text(
+        self,
+        text: str,
+        at: Pixel,
+        *,
+        size: float | None = None,
+        colour: Colour | None = None,
+        bold: bool = False,
+        anchor: str = "left",
+    ) -> int:
+        """Write one line, its middle at the height of `at`; return its width in pixels.
+
+        `anchor` is ``left``, ``right`` or ``middle``: which part of the text is at `at`.
+        """
+        pixels = self.text_size(self.theme.text if size is None else size)
+        picture = label(text, pixels, colour or self.theme.ink, bold)
+        width, height = picture.get_size()
+        left = at[0] - {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
+        self.surface.blit(picture, (round(left), round(at[1] - height / 2)))
+        return width
+
+    def text_width(self, text: str, size: float | None = None, bold: bool = False) -> int:
+        """Return how wide `text` will be, in pixels."""
+        return text_width(text, self.text_size(self.theme.text if size is None else size), bold)

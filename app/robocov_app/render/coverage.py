@@ -1,0 +1,230 @@
+"""What the coverage cost is made of: distances as colours with their scale, and the geodesic cells."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.render.camera import length_label
+from robocov_app.render.furniture import STRIP
+from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.shading import levels, palette, strength, ticks
+from robocov_app.render.theme import mix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from robocov.arrays import Array
+    from robocov_app.render.canvas import Canvas
+    from robocov_app.render.field import Field
+    from robocov_app.render.scene import Scene
+    from robocov_app.render.theme import Colour, Theme
+
+_BAR = 12.0
+"""Width of the scale of colours in pixels at scale 1."""
+
+_BESIDE = 8.0
+"""Pixels between it and what is beside it."""
+
+_BORDER = 1.6
+"""Width of the borders of geodesic cells."""
+
+_HATCH = 5
+"""Pixels of the coarse picture from one slanted line to the next."""
+
+
+class _Picture(Layer):
+    """A layer that is a picture of a field, kept until the field or the view changes."""
+
+    default = False
+
+    def __init__(self) -> None:
+        self._kept: tuple[object, pygame.Surface] | None = None
+        self._field: Field | None = None
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        field = scene.field
+        left, top, width, height = _seen(canvas, scene)
+        if field is None or width <= 0 or height <= 0:
+            return
+        view = canvas.camera, canvas.theme.name, canvas.scale, (left, top, width, height)
+        key = (scene.field_limit, *view, canvas.hues.tolist(), "distances" in canvas.shown)
+        if self._kept is None or self._field is not field or self._kept[0] != key:
+            across = np.column_stack([left + np.arange(width), np.full(width, top)])
+            down = np.column_stack([np.full(height, left), top + np.arange(height)])
+            x, y = canvas.camera.to_world(across)[:, 0], canvas.camera.to_world(down)[:, 1]
+            self._field, self._kept = field, (key, self.picture(canvas, scene, field, x, y))
+        canvas.surface.blit(self._kept[1], (left, top))
+        _cut_to_region(canvas, scene)
+
+    @abstractmethod
+    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
+        """Return the picture of the pixels at (w,) x and (h,) y, m."""
+
+
+class Distances(_Picture):
+    """How far every place is from the nearest robot, around obstacles, as colours."""
+
+    name = "distances"
+    title = "Distance to the nearest robot"
+
+    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
+        # smooth as it is, every second pixel will do
+        coarse = levels(field, _thinned(x), _thinned(y), scene.field_limit, _HATCH)
+        small = _paletted(coarse, palette(canvas.theme)).convert(canvas.surface)
+        large = pygame.transform.smoothscale(small, (2 * small.get_width(), 2 * small.get_height()))
+        return large.subsurface((0, 0, len(x), len(y)))
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
+            strip = np.broadcast_to(canvas.theme.heat_table(wide), (high, wide, 3))
+            canvas.surface.blit(_coloured(strip), (round(x - wide / 2), round(y - high / 2)))
+
+        def closed(canvas: Canvas, x: float, y: float) -> None:
+            canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
+
+        if scene.field is None:
+            return []
+        entries = [LegendEntry("distance to the nearest robot", glyph)]
+        if (scene.field.result.owner < 0).any():
+            entries.append(LegendEntry("no robot can come", closed))
+        return entries
+
+
+class GeodesicCells(_Picture):
+    """Which robot is nearest, around obstacles: the cells that the coverage cost really sums over."""
+
+    name = "geodesic_cells"
+    title = "Geodesic cells"
+
+    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
+        theme, zoom, width = canvas.theme, canvas.camera.zoom, _BORDER * canvas.scale
+        within = (0.5 * width + 1.0) / zoom
+        if "distances" in canvas.shown:
+            borders = field.borders(x, y, within)
+            lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
+            lines.fill((*_border_colour(theme), 0))
+            alpha = np.rint(255.0 * strength(borders, zoom, width))
+            pygame.surfarray.pixels_alpha(lines)[borders.column, borders.row] = alpha
+            # what is empty is passed over
+            lines.set_alpha(255, pygame.RLEACCEL)
+            return lines
+        # nobody, number -1, is the last
+        fills = np.array(
+            [*(theme.cell(hue) for hue in range(len(theme.robots))), theme.unreached], dtype=np.uint8
+        )
+        numbers = np.append(canvas.hues, len(fills) - 1).astype(np.uint8)
+        owners, borders = field.cells(x, y, within)
+        cells = _paletted(numbers.take(owners, mode="wrap"), fills).convert(canvas.surface)
+        pixels = pygame.surfarray.pixels3d(cells)
+        at, part = (borders.column, borders.row), strength(borders, zoom, width)[:, None]
+        pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(_border_colour(theme)))
+        del pixels  # which keeps the surface locked
+        return cells
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            half = 8 * canvas.scale
+            canvas.line((x - half, y), (x + half, y), _border_colour(canvas.theme), canvas.width(_BORDER))
+
+        return [LegendEntry("geodesic cell border", glyph)] if scene.field is not None else []
+
+
+class ColourBar(Layer):
+    """The scale of the colours of `Distances`, at the right."""
+
+    name = "colour_bar"
+    title = "Scale of colours"
+    in_world = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        if scene.field is None or "distances" not in canvas.shown:
+            return
+        scale, theme = canvas.scale, canvas.theme
+        _, top, _, height = canvas.camera.view
+        room = canvas.surface.get_height() - STRIP * scale - top
+        high = max(round(min(0.72 * min(height, room), 300 * scale)), 2)
+        wide = round(_BAR * scale)
+        left = round(canvas.surface.get_width() - bar_room(canvas, scene) + _BESIDE * scale)
+        upper = round(top + (min(height, room) - high) / 2)
+        colours = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
+        canvas.surface.blit(_coloured(colours), (left, upper))
+        pygame.draw.rect(canvas.surface, theme.faint, (left, upper, wide, high), canvas.width(1.0))
+        for mark, text in _marks(scene):
+            y = upper + high * (1.0 - mark / scene.field_limit)
+            tick = pygame.Rect(
+                left + wide, round(y - 0.5 * canvas.width(1.0)), round(4 * scale), canvas.width(1.0)
+            )
+            canvas.surface.fill(theme.faint, tick)
+            canvas.text(text, (left + wide + _BESIDE * scale, y), size=theme.small_text)
+
+
+def bar_room(canvas: Canvas, scene: Scene) -> float:
+    """Return how many pixels the scale of colours takes at the right, 0 where it is not shown."""
+    if scene.field is None or not {"distances", "colour_bar"} <= canvas.shown:
+        return 0.0
+    words = max(canvas.text_width(text, canvas.theme.small_text) for _, text in _marks(scene))
+    return (_BAR + 3.0 * _BESIDE) * canvas.scale + words
+
+
+def _marks(scene: Scene) -> list[tuple[float, str]]:
+    """Return the marks of the scale of colours, m, with their words."""
+    assert scene.field is not None
+    marks = ticks(scene.field_limit)
+    words = ["0", *(length_label(mark) for mark in marks[1:])]
+    if scene.field.largest > scene.field_limit * (1.0 + 1e-9):
+        words[-1] = f"≥ {words[-1]}"
+    return list(zip(marks, words, strict=True))
+
+
+def _seen(canvas: Canvas, scene: Scene) -> tuple[int, int, int, int]:
+    """Return left, top, width and height of the pixels of the view that show the region."""
+    low_x, low_y, high_x, high_y = scene.environment.region.bounds
+    corners = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+    (left, top), (right, bottom) = np.floor(corners[0]), np.ceil(corners[1])
+    view_left, view_top, wide, high = canvas.camera.view
+    left, top = max(left, np.floor(view_left)), max(top, np.floor(view_top))
+    right, bottom = min(right, np.ceil(view_left + wide)), min(bottom, np.ceil(view_top + high))
+    return int(left), int(top), int(right - left) + 1, int(bottom - top) + 1
+
+
+def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
+    """Paint the background over what is outside the convex region."""
+    corners = canvas.camera.to_pixels(scene.environment.region.vertices)
+    far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+        # pixels run downwards, so that outside is on the other hand
+        outward = np.array([-along[1], along[0]])
+        start, end = start - far * along, end + far * along
+        canvas.polygon(
+            np.array([start, end, end + far * outward, start + far * outward]), canvas.theme.background
+        )
+
+
+def _thinned(places: Array) -> Array:
+    """Return the middles of pairs of pixels; the last pair may stick out."""
+    step = places[1] - places[0] if len(places) > 1 else 0.0
+    return np.asarray(places[::2] + 0.5 * step)
+
+
+def _border_colour(theme: Theme) -> Colour:
+    return mix(theme.ink, theme.background, 0.1)
+
+
+def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:
+    """Return (h, w) numbers of colours as a surface."""
+    height, width = numbers.shape
+    surface = pygame.image.frombytes(np.ascontiguousarray(numbers).tobytes(), (width, height), "P")
+    surface.set_palette([tuple(colour) for colour in colours.tolist()])
+    return surface
+
+
+def _coloured(picture: NDArray[np.uint8]) -> pygame.Surface:
+    """Return (h, w, 3) RGB as a surface."""
+    height, width, _ = picture.shape
+    return pygame.image.frombytes(np.ascontiguousarray(picture).tobytes(), (width, height), "RGB")

@@ -1,0 +1,77 @@
+"""Text: DejaVu Sans, which comes with matplotlib (a bare Linux has no fonts), and rendered labels."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import lru_cache
+from pathlib import Path
+
+import pygame
+
+from robocov_app.render.surface_cache import kept
+from robocov_app.render.theme import Colour
+
+
+@lru_cache(maxsize=2)
+def font_path(bold: bool = False) -> Path | None:
+    """Return the font's file, or None where matplotlib came without it: pygame's own font is used then.
+
+    matplotlib is located, not imported: importing it would take longer than everything else here.
+    """
+    spec = importlib.util.find_spec("matplotlib")
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        path = Path(folder) / "mpl-data" / "fonts" / "ttf" / name
+        if path.is_file():
+            return path
+    return None
+
+
+@lru_cache(maxsize=64)
+def _font(size: int, bold: bool) -> pygame.font.Font:
+    return pygame.font.Font(font_path(bold), size)
+
+
+@kept(8_000_000)
+def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
+    """Return `text` as a transparent picture; kept, since rendering costs far more than blitting.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+    size : int, px
+        Height of the letters' box.
+    """
+    return _living(size, bold).render(text, True, colour)
+
+
+def _living(size: int, bold: bool) -> pygame.font.Font:
+    """Return the font; a new one where the font module was shut down in between: its fonts are dead."""
+    if not pygame.font.get_init():
+        pygame.font.init()
+        _font.cache_clear()
+    try:
+        _font(size, bold).get_height()
+    except pygame.error:
+        _font.cache_clear()
+    return _font(size, bold)
+
+
+def text_width(text: str, size: int, bold: bool = False) -> int:
+    """Return the width of `text` in pixels, without drawing it."""
+    return _living(size, bold).size(text)[0]
+
+
+def shortened(text: str, size: int, width: float, bold: bool = False) -> str:
+    """Return `text`, cut and ended with an ellipsis where it is wider than `width` pixels."""
+    if text_width(text, size, bold) <= width:
+        return text
+    low, high = 0, len(text)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if text_width(text[:middle].rstrip() + "…", size, bold) <= width:
+            low = middle
+        else:
+            high = middle - 1
+    return text[:low].rstrip() + "…" if low else ""

@@ -1,0 +1,194 @@
+"""What stands around the arena: scale bar, status line and legend, each in a strip of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+from numpy.typing import NDArray
+
+from robocov_app.render.camera import Camera, length_label, round_length
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import shortened, text_width
+from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.scene import Scene
+from robocov_app.render.theme import Theme, robot_hues
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+MARGIN = 14.0
+EDGE = MARGIN + 2.0
+LEGEND_ROW = 22.0
+STRIP = 34.0
+_GLYPH = 28.0
+_GAP = 18.0
+"""Pixels at scale 1."""
+
+
+class ScaleBar(Layer):
+    """A bar of a round length in metres."""
+
+    name = "scale_bar"
+    title = "Scale bar"
+    in_world = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        draw_bar(canvas)
+
+
+def draw_bar(canvas: Canvas) -> None:
+    """Draw the bar at the foot of a canvas, with its length."""
+    length = bar_length(canvas)
+    pixels = length * canvas.camera.zoom
+    left = EDGE * canvas.scale
+    y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
+    tick, width = 4.0 * canvas.scale, canvas.width(1.5)
+    ink = canvas.theme.ink
+    for x in (left, left + pixels):
+        box = pygame.Rect(round(x - width / 2), round(y - tick), width, round(2 * tick))
+        canvas.surface.fill(ink, box)
+    canvas.surface.fill(ink, pygame.Rect(round(left), round(y - width / 2), round(pixels), width))
+    canvas.text(length_label(length), (left + pixels + 8 * canvas.scale, y), bold=True)
+
+
+def bar_length(canvas: Canvas) -> float:
+    """Return the length of the scale bar in metres: round, and at most an eighth of the surface wide."""
+    room = min(max(canvas.surface.get_width() / 8, 30.0), 160 * canvas.scale)
+    return round_length(room / canvas.camera.zoom)
+
+
+class Caption(Layer):
+    """The controller's name and the cost above the arena, where several pictures stand side by side."""
+
+    name = "caption"
+    title = "Caption"
+    in_world = False
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
+        y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
+        size = 1.15 * canvas.theme.text
+        name = shortened(scene.label, canvas.text_size(size), right - left, bold=True)
+        left += canvas.text(name, (left, y), size=size, bold=True) + 12 * canvas.scale
+        if canvas.text_width(scene.cost) <= right - left:
+            canvas.text(scene.cost, (right, y), anchor="right")
+
+
+class Status(Layer):
+    """Controller, time and cost in the strip below the arena.
+
+    Parameters
+    ----------
+    brief : bool
+        Leave out what a `Caption` says: the controller and the cost.
+    """
+
+    name = "status"
+    title = "Status line"
+    in_world = False
+
+    def __init__(self, brief: bool = False) -> None:
+        self.brief = brief
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        if self.brief:
+            scene = replace(scene, label="", cost="")
+        bar = bar_length(canvas)
+        taken = (
+            (EDGE + 8 + 16) * canvas.scale
+            + bar * canvas.camera.zoom
+            + canvas.text_width(length_label(bar), bold=True)
+        )
+        right = canvas.surface.get_width() - EDGE * canvas.scale
+        y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
+        size = canvas.text_size(canvas.theme.text)
+        name = shortened(scene.label, size, right - taken, bold=True)
+        room = right - taken - canvas.text_width(name, bold=True)
+        text = fitting_status(scene, size, room)
+        canvas.text(text, (right, y), anchor="right")
+        left = right - canvas.text_width(text) if text else right
+        canvas.text(name, (left, y), anchor="right", bold=True)
+
+
+def fitting_status(scene: Scene, size: int, room: float) -> str:
+    """Return what follows the controller's name, whole facts only: first the map's name is left out."""
+    time = f"t = {scene.snapshot.time:.1f} s" if scene.snapshot is not None else ""
+    facts = [text for text in (time, scene.cost, scene.environment.name) if text]
+    lead = "   ·   " if scene.label else ""
+    while len(facts) > 1 and text_width(lead + "   ·   ".join(facts), size) > room:
+        facts.pop()
+    return shortened(lead + "   ·   ".join(facts), size, room) if facts else ""
+
+
+class Legend(Layer):
+    """Glyphs, drawn as the layers draw them, with words; only of the layers that are shown."""
+
+    name = "legend"
+    title = "Legend"
+    in_world = False
+
+    def __init__(self) -> None:
+        self.entries: list[LegendEntry] = []
+        self._strip: pygame.Surface | None = None
+        self._key: object = None
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        width = canvas.surface.get_width()
+        words = tuple(entry.key() for entry in self.entries)
+        key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
+        if self._strip is None or key != self._key:
+            self._strip, self._key = legend_strip(self.entries, canvas), key
+        canvas.surface.blit(self._strip, (0, 0))
+
+
+def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:
+    """Return a strip as wide as the canvas's surface with these entries, for several pictures at once."""
+    rows = legend_rows(canvas, entries)
+    height = round((6.0 + LEGEND_ROW * max(len(rows), 1)) * canvas.scale)
+    strip = pygame.Surface((canvas.surface.get_width(), height), 0, 32)
+    strip.fill(canvas.theme.background)
+    own = replace(canvas, surface=strip)
+    for number, row in enumerate(rows):
+        x = MARGIN * canvas.scale
+        y = (6.0 + LEGEND_ROW * (number + 0.5)) * canvas.scale
+        for entry in row:
+            entry.draw(own, x + 0.5 * (_GLYPH - 6) * canvas.scale, y)
+            x += _GLYPH * canvas.scale
+            x += own.text(entry.text, (x, y), size=canvas.theme.small_text) + _GAP * canvas.scale
+    return strip
+
+
+def legend_picture(
+    entries: Sequence[LegendEntry],
+    width: int,
+    theme: Theme,
+    scale: float,
+    shown: frozenset[str] = frozenset(),
+) -> NDArray[np.uint8]:
+    """Return these entries as an RGB picture of a width, (height, width, 3), 0 to 255.
+
+    Names of layers in `shown` are those that the pictures below show.
+    """
+    camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
+    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), shown)
+    strip = legend_strip(entries, canvas)
+    pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
+    return pixels.reshape(strip.get_height(), width, 3)
+
+
+def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:
+    """Break the entries into rows that fit the surface's width."""
+    room = canvas.surface.get_width() - 2 * MARGIN * canvas.scale
+    rows: list[list[LegendEntry]] = []
+    used = 0.0
+    for entry in entries:
+        wide = _GLYPH * canvas.scale + canvas.text_width(entry.text, canvas.theme.small_text)
+        if not rows or used + wide > room:
+            rows.append([])
+            used = 0.0
+        rows[-1].append(entry)
+        used += wide + _GAP * canvas.scale
+    return rows

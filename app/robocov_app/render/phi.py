@@ -1,0 +1,115 @@
+"""The density φ as colours: the more a place counts, the stronger; and in words."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from robocov.density import Gaussians
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from robocov.arrays import Array
+    from robocov.density import Density
+    from robocov.environment import Environment
+    from robocov_app.render.theme import Theme
+
+_SAMPLES = 96
+"""Places along the longer side of a map at which the density is looked at for its range."""
+
+
+Bounds: TypeAlias = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y in metres."""
+
+
+def shading(density: Density, bounds: Bounds, x: Array, y: Array, theme: Theme) -> NDArray[np.uint8]:
+    """Return the shading of the places at (w,) x and (h,) y in metres as RGBA, (h, w, 4).
+
+    No colour is the least that there is within the bounds, the full one the most.
+    """
+    return colours(parts(density, bounds, x, y), theme)
+
+
+def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
+    """Return how far the density at (w,) x and (h,) y, m, is from the least to the most, (h, w), 0 to 1."""
+    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+    low, high = value_range(density, bounds)
+    value = density.value(points).reshape(len(y), len(x))
+    return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
+
+
+def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
+    """Return the colours, RGBA (..., 4), of parts of the way from the least density to the most."""
+    picture = np.empty((*way.shape, 4), dtype=np.uint8)
+    picture[..., :3] = theme.density
+    picture[..., 3] = np.rint(255.0 * theme.density_strength * way)
+    return picture
+
+
+def density_range(environment: Environment) -> tuple[float, float]:
+    """Return the least and the largest value that the density has in the region."""
+    if environment.density is None:
+        return 1.0, 1.0
+    return value_range(environment.density, environment.region.bounds)
+
+
+@lru_cache(maxsize=16)
+def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
+    """Return the least and the largest value of a density within bounds."""
+    low_x, low_y, high_x, high_y = bounds
+    step = max(high_x - low_x, high_y - low_y) / _SAMPLES
+    x, y = (np.arange(low + 0.5 * step, high, step) for low, high in ((low_x, high_x), (low_y, high_y)))
+    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+    points = np.concatenate([points, _inside(density, bounds)])
+    value = density.value(points)
+    return float(value.min()), float(value.max())
+
+
+def _inside(density: Density, bounds: Bounds) -> Array:
+    """Return the centres of Gaussians that are within the bounds: between samples a narrow one is missed."""
+    if not isinstance(density, Gaussians) or not density.peaks:
+        return np.empty((0, 2))
+    centers = np.array([peak.center for peak in density.peaks])
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    return np.asarray(centers[((low <= centers) & (centers <= high)).all(axis=1)])
+
+
+def density_words(environment: Environment) -> str:
+    """Return the words of the legend, empty where every place counts the same."""
+    if environment.density is None or environment.density.uniform:
+        return ""
+    return range_words(density_range(environment))
+
+
+def range_words(span: tuple[float, float]) -> str:
+    """Return the words of the legend for a range of values.
+
+    >>> range_words((0.25, 10.0))
+    'density φ, 0.25 to 10'
+    """
+    low, high = span
+    return f"density φ, {low:.3g} to {high:.3g}"
+
+
+def mean_words(environment: Environment) -> str:
+    """Return what the mean distance to the nearest robot is called, whether weighed or not."""
+    return "mean distance by φ" if density_words(environment) else "mean distance"
+
+
+def cost_words(what: str, mean_distance: float, mean_time: float | None = None) -> str:
+    """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
+
+    What is not finite is left out: a team of which no robot works covers nothing.
+
+    >>> cost_words("mean distance", 1.25), cost_words("mean distance by φ", 1.25, 3.0)
+    ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
+    """
+    known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
+    return ", ".join(
+        f"{words} {value:.3f} {unit}"
+        for words, value, unit in known
+        if value is not None and np.isfinite(value)
+    )

@@ -1,0 +1,320 @@
+"""The painter: puts the layers together on any pygame surface, and gives frames without a display."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+from numpy.typing import NDArray
+
+from robocov.errors import ParameterError, unknown_name
+from robocov_app.render.aim_marks import Centroids, Goals
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.coverage import ColourBar, Distances, GeodesicCells, bar_room
+from robocov_app.render.density import DensityShading
+from robocov_app.render.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
+from robocov_app.render.furniture import (
+    LEGEND_ROW,
+    MARGIN,
+    STRIP,
+    Caption,
+    Legend,
+    ScaleBar,
+    Status,
+    legend_rows,
+)
+from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
+from robocov_app.render.layers import (
+    Boundary,
+    Cells,
+    Grid,
+    Layer,
+    LegendEntry,
+    Obstacles,
+    Robots,
+    Starts,
+)
+from robocov_app.render.marks import Failed, Selection
+from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
+from robocov_app.render.trajectories import Trajectories
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from robocov.arrays import IntArray
+    from robocov.environment import Environment
+    from robocov_app.render.scene import Scene
+
+
+def standard_layers(trails: str = "robots") -> list[Layer]:
+    """Return one of each layer, from the lowest to the topmost.
+
+    Parameters
+    ----------
+    trails : {"robots", "paper"}
+        Colours of the trajectories, see `Trajectories`.
+    """
+    return [
+        Distances(),
+        GeodesicCells(),
+        Cells(),
+        Grid(),
+        DensityShading(),
+        Obstacles(),
+        Boundary(),
+        SensedObstacles(),
+        RayScan(),
+        Ranges("sensing"),
+        Ranges("communication"),
+        Links(),
+        Trajectories(trails),
+        Starts(),
+        ObstaclePoints(),
+        Goals(),
+        Centroids(),
+        Velocities(),
+        ForceTerm("attraction"),
+        ForceTerm("repulsion_robots"),
+        ForceTerm("repulsion_obstacle"),
+        ForceTerm("viscosity"),
+        ForceTerm("resultant"),
+        CursorPath(),
+        Failed(),
+        Selection(),
+        Robots(),
+        ColourBar(),
+        Legend(),
+        ScaleBar(),
+        Status(),
+    ]
+
+
+def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
+    """Return names of layers, a dash as good as an underscore.
+
+    Raises
+    ------
+    ParameterError
+        When there is no layer of that name; the message names the option.
+    """
+    known = [layer.name for layer in standard_layers()]
+    wanted = [name.replace("-", "_") for name in names]
+    for name in wanted:
+        if name not in known:
+            raise ParameterError(f"{option}: {unknown_name('layer', name, known)}")
+    return frozenset(wanted)
+
+
+def pane_layers(trails: str = "robots") -> list[Layer]:
+    """Return the layers of one picture among several: a caption in place of the legend, which they share."""
+    layers = [layer for layer in standard_layers(trails) if not isinstance(layer, Legend | Status)]
+    return [*layers, Caption(), Status(brief=True)]
+
+
+def scale_for(size: tuple[int, int]) -> float:
+    """Return the scale at which text and lines suit a picture of `size` pixels: 1.25 for 1280 x 720.
+
+    Films are watched from the last row of a lecture hall: their text is a little larger than a window's.
+    """
+    fitting = min(size[0] / 1024, size[1] / 576)
+    return min(max(round(fitting * 8) / 8, 0.875), 6.0)
+
+
+def _hues(scene: Scene, previous: IntArray) -> IntArray:
+    """Return the index of each robot's colour: in a small team it stays with the robot's number."""
+    numbers = scene.numbers
+    if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:
+        return np.array(numbers, dtype=np.intp) - 1
+    return robot_hues(len(scene.team), scene.adjacency, previous)
+
+
+class Painter:
+    """Draws scenes of one environment.
+
+    It keeps what does not change from one frame to the next. It works on any surface: that of a
+    window, a part of one (`pygame.Surface.subsurface`), or one in memory.
+
+    Parameters
+    ----------
+    environment : Environment
+    size : (width, height), px
+    theme : Theme
+    layers : list of Layer or None
+        By default `standard_layers`.
+    scale : float or None
+        Of text and lines; by default what suits the size.
+
+    Attributes
+    ----------
+    visible : set of str
+        Names of the layers that are shown; may be changed at any time.
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        size: tuple[int, int],
+        theme: Theme = LIGHT,
+        layers: Sequence[Layer] | None = None,
+        scale: float | None = None,
+    ) -> None:
+        self.environment = environment
+        self.size = size
+        self.theme = theme
+        self.layers = list(layers) if layers is not None else standard_layers()
+        self.scale = scale_for(size) if scale is None else scale
+        self.visible = {layer.name for layer in self.layers if layer.default}
+        self._camera: Camera | None = None
+        self._follows = True
+        self._hues = robot_hues(0)
+        self._pages: dict[tuple[str, ...], tuple[object, pygame.Surface, Environment]] = {}
+        self._own: pygame.Surface | None = None
+        self._room: tuple[object, int, float] = (None, 0, 0.0)
+
+    def show(self, names: Iterable[str]) -> None:
+        """Show these layers and no others.
+
+        Raises
+        ------
+        ParameterError
+            When there is no layer of that name.
+        """
+        known = {layer.name for layer in self.layers}
+        wanted = set(names)
+        for name in sorted(wanted - known):
+            raise ParameterError(unknown_name("layer", name, known))
+        self.visible = wanted
+
+    def change(self, also: Iterable[str], without: Iterable[str]) -> None:
+        """Show some layers too, and others not; names that this painter has no layers of are passed over."""
+        known = {layer.name for layer in self.layers}
+        self.visible = (self.visible | set(also) & known) - set(without)
+
+    @property
+    def needs_field(self) -> bool:
+        """Whether what is shown depends on the distances to the nearest robot."""
+        return bool({"distances", "geodesic_cells"} & self.visible)
+
+    def resize(self, size: tuple[int, int], scale: float | None = None) -> None:
+        """Draw in another size from now on; what was zoomed or panned stays so."""
+        self.size = size
+        self.scale = scale_for(size) if scale is None else scale
+
+    @property
+    def camera(self) -> Camera:
+        """What is shown where; set it to zoom and pan, see `fit` for the way back."""
+        if self._camera is None:
+            self._place_view(0)
+        assert self._camera is not None
+        return self._camera
+
+    @camera.setter
+    def camera(self, camera: Camera) -> None:
+        self._camera, self._follows = camera, False
+
+    def fit(self) -> None:
+        """Show the whole region again, also after changes of the size."""
+        self._camera, self._follows = None, True
+
+    def legend(self, scene: Scene) -> list[str]:
+        """Return the words of the legend: exactly those of the layers that draw something of `scene`."""
+        return [entry.text for entry in self.legend_entries(scene)]
+
+    def legend_entries(self, scene: Scene) -> list[LegendEntry]:
+        """Return the legend's entries for what is drawn of `scene`."""
+        return [entry for layer in self._shown() for entry in layer.legend(scene)]
+
+    def draw(self, surface: pygame.Surface, scene: Scene) -> None:
+        """Draw `scene` on the whole of `surface`, which has this painter's size."""
+        if surface.get_size() != self.size:
+            self.resize(surface.get_size(), self.scale)
+        self._hues = _hues(scene, self._hues)
+        entries = self.legend_entries(scene)
+        shown = frozenset(self.visible)
+        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
+        rows = 0
+        for layer in self._shown():
+            if isinstance(layer, Legend):
+                layer.entries = entries
+                rows = len(legend_rows(canvas, entries))
+            elif isinstance(layer, Caption):
+                rows = 1
+        self._place_view(*self._steady(rows, bar_room(canvas, scene)))
+        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
+        surface.fill(self.theme.background)
+        for static, group in groupby(self._shown(), key=lambda layer: layer.static):
+            layers = list(group)
+            if static:
+                page = self._page(canvas, scene, layers)
+                surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+                continue
+            for layer in layers:
+                surface.set_clip(self._clip() if layer.in_world else None)
+                layer.draw(canvas, scene)
+        surface.set_clip(None)
+
+    def frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """Return `scene` as an RGB picture, (height, width, 3), 0 to 255; it needs no display."""
+        if self._own is None or self._own.get_size() != self.size:
+            self._own = pygame.Surface(self.size, 0, 32)
+        self.draw(self._own, scene)
+        width, height = self.size
+        pixels = np.frombuffer(pygame.image.tobytes(self._own, "RGB"), dtype=np.uint8)
+        return pixels.reshape(height, width, 3)
+
+    def _shown(self) -> list[Layer]:
+        return [layer for layer in self.layers if layer.name in self.visible]
+
+    def _place_view(self, legend_rows_count: int, beside: float = 0.0) -> None:
+        """Give the world what the strips above and below, and `beside` pixels at the right, leave."""
+        width, height = self.size
+        top = MARGIN * self.scale
+        if legend_rows_count:
+            top = (6 + LEGEND_ROW * legend_rows_count + 6) * self.scale
+        below = bool({"scale_bar", "status"} & self.visible)
+        bottom = (STRIP if below else MARGIN) * self.scale
+        view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
+        if self._camera is None or self._follows:
+            bounds = self.environment.region.bounds
+            side = MARGIN * self.scale
+            inner = (side, top, max(view[2] - (1 if beside else 2) * side, 1.0), view[3])
+            self._camera = Camera.fit(bounds, inner, margin=2 * self.scale).within(view)
+        elif self._camera.view != view:
+            self._camera = self._camera.within(view)
+
+    def _steady(self, rows: int, beside: float) -> tuple[int, float]:
+        """Return the most room that legend and scale of colours have needed as long as the same is shown.
+
+        What they tell of comes and goes, a path with the cursor, distances with every new wall; the map is
+        not to jump each time.
+        """
+        key = self.size, self.scale, frozenset(self.visible)
+        if self._room[0] == key:
+            rows, beside = max(rows, self._room[1]), max(beside, self._room[2])
+        self._room = key, rows, beside
+        return rows, beside
+
+    def _clip(self) -> pygame.Rect:
+        left, top, width, height = self.camera.view
+        return pygame.Rect(round(left), round(top), round(width), round(height))
+
+    def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer]) -> pygame.Surface:
+        """Return the page of neighbouring static layers, drawn anew only when something changed."""
+        names = tuple(layer.name for layer in layers)
+        # distances, in colours too, hide the density
+        coloured = scene.field is not None and "distances" in canvas.shown
+        key = (canvas.camera, self.theme.name, self.scale, self.size, id(scene.environment), coloured)
+        kept = self._pages.get(names)
+        # the map is kept as well: another one may be given its place in the memory
+        if kept is None or kept[0] != key or kept[2] is not scene.environment:
+            page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
+            page.set_clip(self._clip())
+            own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues, canvas.shown)
+            for layer in layers:
+                layer.draw(own, scene)
+            self._pages = {names: (key, page, scene.environment)}
+            return page
+        return kept[1]

@@ -1,0 +1,198 @@
+"""Anti-aliased strokes and small pictures: drawn large, and shrunk.
+
+Discs with numbers, rings and crosses are kept, for each quarter of a pixel's shift, so that slow
+robots glide in films instead of hopping. All is premultiplied: blit with ``BLEND_PREMULTIPLIED``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import pygame
+
+from robocov_app.render.fonts import label
+from robocov_app.render.surface_cache import kept
+from robocov_app.render.theme import Colour, readable_on
+
+FINE = 4
+"""Each sprite is drawn so many times larger; also the number of shifts within a pixel."""
+
+LARGE = 60.0
+"""Radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes."""
+
+STROKE_FINE = 3
+"""The same for strokes, which may span the whole picture."""
+
+Pixel: TypeAlias = Sequence[float]
+"""x to the right and y down from the surface's corner."""
+
+
+class Sketch:
+    """A part of a surface, drawn `STROKE_FINE` times larger and shrunk onto it.
+
+    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do.
+
+    Parameters
+    ----------
+    box : pygame.Rect
+        The part of the surface, in its pixels.
+    """
+
+    def __init__(self, box: pygame.Rect) -> None:
+        self._box = box
+        self._large = pygame.Surface((box.width * STROKE_FINE, box.height * STROKE_FINE), pygame.SRCALPHA, 32)
+
+    @classmethod
+    def around(cls, points: Sequence[Pixel], margin: float) -> Sketch | None:
+        """Return a sketch that holds `points` and `margin` pixels around; None where it would be huge."""
+        xs, ys = [point[0] for point in points], [point[1] for point in points]
+        left, top = int(min(xs) - margin) - 1, int(min(ys) - margin) - 1
+        width, height = int(max(xs) + margin) + 2 - left, int(max(ys) + margin) + 2 - top
+        return cls(pygame.Rect(left, top, width, height)) if max(width, height) <= 4000 else None
+
+    def _large_points(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
+        # pixels are squares around their whole numbers: their middle is not at a corner of the large ones
+        x, y = self._box.x - 0.5, self._box.y - 0.5
+        return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
+
+    def path(self, points: Sequence[Pixel], colour: Colour, width: float) -> None:
+        """Draw a line of `width` pixels with round joints and ends."""
+        wide = max(width * STROKE_FINE, 1.0)
+        large = self._large_points(points)
+        pygame.draw.lines(self._large, colour, False, large, round(wide))
+        for point in large:
+            pygame.draw.circle(self._large, colour, point, wide / 2)
+
+    def polygon(self, corners: Sequence[Pixel], colour: Colour) -> None:
+        """Fill a polygon."""
+        pygame.draw.polygon(self._large, colour, self._large_points(corners))
+
+    def dot(self, center: Pixel, radius: float, colour: Colour) -> None:
+        """Fill a circle."""
+        pygame.draw.circle(self._large, colour, self._large_points([center])[0], radius * STROKE_FINE)
+
+    def onto(self, surface: pygame.Surface) -> None:
+        """Blend the shrunk sketch onto `surface`."""
+        picture = pygame.transform.smoothscale(self._large, self._box.size)
+        surface.blit(picture, self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def _blank(radius: float, fine: int = FINE) -> tuple[pygame.Surface, int]:
+    """Return a large transparent square for a sprite of `radius` pixels and its half side in pixels."""
+    half = int(radius) + 2
+    return pygame.Surface((2 * half * fine, 2 * half * fine), pygame.SRCALPHA, 32), half
+
+
+def _shrunk(large: pygame.Surface, fine: int = FINE) -> pygame.Surface:
+    width, height = large.get_size()
+    return pygame.transform.smoothscale(large, (width // fine, height // fine))
+
+
+def number_size(inside: Any, digits: Any) -> Any:
+    """Return the text sizes at which 1 to 4 digits fill discs of radius `inside`, in their unit."""
+    return inside * np.array([1.5, 1.22, 0.92, 0.72])[digits - 1]
+
+
+def disc(
+    radius: float,
+    fill: Colour,
+    ring: Colour,
+    ring_width: float,
+    edge: Colour,
+    text: str,
+    shift: tuple[int, int],
+) -> pygame.Surface:
+    """Return a disc with a ring around it, a hair line around that, and a number in it.
+
+    Parameters
+    ----------
+    radius : float, px
+        Of the disc with its ring.
+    edge : Colour
+        Colour of the hair line, which parts the ring from what is behind.
+    text : str
+        Drawn in the middle when it is not empty.
+    shift : pair of int
+        Quarters of a pixel to the right and down; what is `LARGE` keeps to whole pixels.
+    """
+    return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
+
+
+@kept(24_000_000)
+def _disc(
+    radius: float,
+    fill: Colour,
+    ring: Colour,
+    ring_width: float,
+    edge: Colour,
+    text: str,
+    shift: tuple[int, int],
+) -> pygame.Surface:
+    fine = _fineness(radius)
+    large, half = _blank(radius + 1, fine)
+    center = (half * fine + shift[0], half * fine + shift[1])
+    pygame.draw.circle(large, edge, center, (radius + 0.6) * fine)
+    pygame.draw.circle(large, ring, center, radius * fine)
+    pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
+    if text:
+        size = number_size(radius - ring_width, min(len(text), 4))
+        number = label(text, round(size * fine), readable_on(fill), True)
+        # the ink of digits, without the room for ascenders and descenders, goes to the middle
+        ink = number.get_bounding_rect()
+        large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
+    return _shrunk(large, fine)
+
+
+def ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
+    """Return a circle's line, its middle at `radius` pixels."""
+    return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
+
+
+@kept(6_000_000)
+def _ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
+    fine = _fineness(radius)
+    large, half = _blank(radius + width / 2, fine)
+    center = (half * fine + shift[0], half * fine + shift[1])
+    pygame.draw.circle(large, colour, center, (radius + width / 2) * fine)
+    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fine)
+    return _shrunk(large, fine)
+
+
+def _fineness(radius: float) -> int:
+    return FINE if radius <= LARGE else FINE // 2
+
+
+@kept(4_000_000)
+def dot(radius: float, colour: Colour, shift: tuple[int, int]) -> pygame.Surface:
+    """Return a filled circle."""
+    large, half = _blank(radius)
+    center = (half * FINE + shift[0], half * FINE + shift[1])
+    pygame.draw.circle(large, colour, center, radius * FINE)
+    return _shrunk(large)
+
+
+@kept(4_000_000)
+def cross(
+    arm: float, colour: Colour, halo: Colour, width: float, diagonal: bool, shift: tuple[int, int]
+) -> pygame.Surface:
+    """Return a plus, or a times sign, with a thin halo that keeps it readable on any fill."""
+    large, half = _blank(arm + width)
+    x, y = half * FINE + shift[0], half * FINE + shift[1]
+    reach = arm * FINE * (0.75 if diagonal else 1.0)
+    turned = ((-1, -1), (1, -1)) if diagonal else ((1, 0), (0, 1))
+    for shade, thick in ((halo, width * FINE + FINE * 1.6), (colour, width * FINE)):
+        more = reach + (FINE * 0.8 if shade is halo else 0.0)
+        for dx, dy in turned:
+            half_thick = thick / 2 / (2**0.5 if diagonal else 1.0)
+            nx, ny = -dy * half_thick, dx * half_thick
+            a, b = (x - dx * more, y - dy * more), (x + dx * more, y + dy * more)
+            corners = [
+                (a[0] + nx, a[1] + ny),
+                (b[0] + nx, b[1] + ny),
+                (b[0] - nx, b[1] - ny),
+                (a[0] - nx, a[1] - ny),
+            ]
+            pygame.draw.polygon(large, shade, corners)
+    return _shrunk(large)

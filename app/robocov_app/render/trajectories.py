@@ -1,0 +1,309 @@
+"""The trajectories layer: what is old is kept on a page of its own, only new pieces are drawn."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pygame
+
+from robocov.arrays import Array, IntArray
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.clipping import bounded
+from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.scene import Scene
+from robocov_app.render.spacing import line_crowding
+from robocov_app.render.sprites import Sketch
+from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
+
+PIECE = 2.0
+"""Pixels between the corners of a drawn trajectory."""
+
+SECTION = 16.0
+"""Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
+
+CROWD = 400
+"""From so many robots on what is drawn anew is not smooth."""
+
+FADE_STEPS = 24
+"""Shades of a trajectory that fades; its page is drawn anew as often while it fades."""
+
+FADE_PIECE = 4.0
+"""Pixels at scale 1 that the fastest robot goes between the corners of trajectories that fade."""
+
+_FADE_FINE = 2
+"""They are drawn so many times larger, and shrunk."""
+
+
+class Trajectories(Layer):
+    """Where the robots went; nothing where a row has nan.
+
+    Parameters
+    ----------
+    colours : {"robots", "paper"}
+        Each in its robot's colour (large teams: all in a quiet red), or all red.
+    fade : float or None, s
+        Show the last so many seconds only, fading into the past; needs `Scene.trail_time`.
+    """
+
+    name = "trajectories"
+    title = "Trajectories"
+
+    def __init__(self, colours: str = "robots", fade: float | None = None) -> None:
+        self.colours = colours
+        self.fade = fade
+        self._page: pygame.Surface | None = None
+        self._key: object = None
+        self._drawn = 0
+        self._last_row = np.empty((0, 2))
+        self._open: list[list[list[float]]] = []
+        self._ended: list[tuple[int, list[list[float]]]] = []
+        self._colours: tuple[object, list[Colour]] | None = None
+
+    def draw(self, canvas: Canvas, scene: Scene) -> None:
+        trail = scene.trail
+        if trail is None or len(trail) == 0:
+            return
+        colours = self._of_robots(canvas)
+        width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
+        page, continues = self._page_for(canvas, trail, scene.trail_time, colours, width)
+        self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
+        self._drawn, self._last_row = len(trail), trail[-1].copy()
+        self._finish_sections(page, colours, width, together=not continues)
+        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
+        whole = canvas.width(width / canvas.scale)
+        # mostly below the robot's disc, where seams do not show, nor steps in a crowd
+        lines = pygame.draw.aalines if len(ends) < CROWD else pygame.draw.lines
+        for path, end, colour in zip(self._open, ends, colours, strict=True):
+            # nan: not there yet
+            if path[-1][0] != path[-1][0] or (len(path) == 1 and _near(path[0], end)):
+                continue
+            if whole == 1:
+                lines(canvas.surface, colour, False, [*path, end])
+            else:
+                canvas.outline(np.array([*path, end]), colour, whole, closed=False)
+
+    def _lengthen(self, rows: Array) -> None:
+        """Add the corners that lie far enough from the last of each path."""
+        last = np.array([path[-1] for path in self._open])
+        gaps = bool(np.isnan(last).any() or np.isnan(rows).any())
+        for row in rows:
+            if gaps:
+                self._come_and_go(row, last)
+            delta = row - last
+            far = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= PIECE * PIECE
+            if far.any():
+                for robot in np.nonzero(far)[0].tolist():
+                    self._open[robot].append(row[robot].tolist())
+                last[far] = row[far]
+
+    def _come_and_go(self, row: Array, last: Array) -> None:
+        """Begin the paths of robots that were not there before, and end those of robots that go."""
+        changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
+        for robot in np.nonzero(changed)[0].tolist():
+            self._ended.append((robot, self._open[robot]))
+            self._open[robot] = [row[robot].tolist()]
+        last[changed] = row[changed]
+
+    def _finish_sections(
+        self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
+    ) -> None:
+        """Draw what is long enough on the page, and begin anew at its end."""
+        whole = self._sketch_of_all(page) if together else None
+        corners = 2 if together else 1 + SECTION / PIECE
+        long = [(robot, path) for robot, path in enumerate(self._open) if len(path) >= corners]
+        for robot, path in [*self._ended, *long]:
+            if len(path) < 2:
+                continue
+            sketch = whole if whole is not None else Sketch.around(path, width)
+            if sketch is not None:
+                sketch.path(path, colours[robot], width)
+                if sketch is not whole:
+                    sketch.onto(page)
+            if path is self._open[robot]:
+                self._open[robot] = path[-1:]
+        self._ended.clear()
+        if whole is not None:
+            whole.onto(page)
+
+    def _sketch_of_all(self, page: pygame.Surface) -> Sketch | None:
+        """Return a sketch that holds all of the paths that can be seen, None when nothing moved."""
+        paths = [*self._open, *(path for _, path in self._ended)]
+        moved = [np.array(path) for path in paths if len(path) > 1]
+        box = _box_of(np.concatenate(moved), 5.0, page) if moved else None
+        return Sketch(box) if box is not None else None
+
+    def _page_for(
+        self, canvas: Canvas, trail: Array, time: Array | None, colours: list[Colour], width: float
+    ) -> tuple[pygame.Surface, bool]:
+        """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
+        size = canvas.surface.get_size()
+        fading = time if self.fade else None
+        step = None
+        if self.fade and time is not None:
+            step = self.fade, int(np.floor(time[-1] / self.fade * FADE_STEPS))
+        key = (
+            canvas.camera,
+            canvas.theme.name,
+            canvas.scale,
+            size,
+            tuple(canvas.surface.get_clip()),
+            tuple(colours),
+            trail.shape[1],
+            step,
+        )
+        continues = key == self._key and self._drawn > 0 and self._found(trail)
+        if self._page is None or not continues:
+            self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
+            self._page.set_clip(canvas.surface.get_clip())
+            self._key, self._drawn = key, 0
+            self._ended.clear()
+            if fading is not None:
+                self._fade_onto(self._page, canvas, trail, fading, colours, width)
+                self._drawn, continues = len(trail), True
+            row = trail[self._drawn - 1 if self._drawn else 0]
+            self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
+        return self._page, continues
+
+    def _found(self, trail: Array) -> bool:
+        """Look for the row that was drawn last; where old rows were thinned it has come forward."""
+        if self._drawn <= len(trail) and _same(trail[self._drawn - 1], self._last_row):
+            return True
+        rows = np.flatnonzero(_same_rows(trail[: self._drawn], self._last_row))
+        if len(rows):
+            self._drawn = int(rows[-1]) + 1
+        return len(rows) > 0
+
+    def _fade_onto(
+        self,
+        page: pygame.Surface,
+        canvas: Canvas,
+        trail: Array,
+        time: Array,
+        colours: list[Colour],
+        width: float,
+    ) -> None:
+        """Draw the last seconds, ever more transparent into the past."""
+        fade = self.fade or np.inf
+        begin = int(np.searchsorted(time, time[-1] - fade))
+        points = bounded(canvas.camera.to_pixels(trail[begin:]))
+        box = _box_of(points, 5.0 + width, page)
+        if box is None:
+            return
+        shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
+        shade = np.minimum(shade, FADE_STEPS).astype(int)  # rounding may say one more
+        rows = _corners(points, shade, FADE_PIECE * canvas.scale)
+        points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
+        shade = shade[rows]
+        large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
+        wide = max(1, round(width * _FADE_FINE))
+        pens = np.full((len(colours), 2), np.nan)
+        edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
+        # the older ones first: where paths cross, the newer ones are on top
+        for first, last in pairwise(edges):
+            # slowly at first: what is half forgotten can still be followed
+            part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
+            shades = {colour: _see_through(colour, part) for colour in set(colours)}
+            paths = points[first : last + 1]
+            moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
+            gone = np.isnan(paths).any(axis=(0, 2)).tolist()
+            pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
+            for robot in np.flatnonzero(moves).tolist():
+                colour = shades[colours[robot]]
+                if pen[robot][0] == pen[robot][0]:  # not nan
+                    lines[robot][0] = pen[robot]
+                for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
+                    _stroke(large, run, colour, wide)
+            pens[moves] = paths[-1, moves]
+        picture = pygame.transform.smoothscale(large, box.size)
+        page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _of_robots(self, canvas: Canvas) -> list[Colour]:
+        theme, n = canvas.theme, len(canvas.hues)
+        if self.colours == "paper":
+            return [theme.trajectory] * n
+        if n > ONE_HUE_EACH:
+            return [mix(theme.trajectory, theme.background, 0.25)] * n
+        key = theme.name, tuple(canvas.hues.tolist())
+        if self._colours is None or self._colours[0] != key:
+            self._colours = key, [theme.trail(hue) for hue in canvas.hues.tolist()]
+        return self._colours[1]
+
+    def legend(self, scene: Scene) -> list[LegendEntry]:
+        def glyph(canvas: Canvas, x: float, y: float) -> None:
+            angle = np.linspace(-np.pi, np.pi, 24)
+            wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
+            sketch = Sketch.around(wave.tolist(), 3.0)
+            if sketch is not None:
+                width = canvas.theme.trajectory_line * canvas.scale
+                sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
+                sketch.onto(canvas.surface)
+
+        return [LegendEntry("trajectory", glyph, self.colours)] if scene.trail is not None else []
+
+
+def _box_of(points: Array, margin: float, page: pygame.Surface) -> pygame.Rect | None:
+    """Return what of the surroundings of (..., 2) px points can be seen on a page; None for nothing."""
+    flat = points.reshape(-1, 2)
+    flat = flat[np.isfinite(flat[:, 0])]
+    if not len(flat):
+        return None
+    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
+    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(page.get_clip())
+    return box if box.width and box.height else None
+
+
+def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
+    """Return the rows of (k, n, 2) px that are needed to draw all paths: few where all robots are slow."""
+    gone = np.isnan(points[..., 0])
+    steps = np.hypot(*np.moveaxis(np.diff(points, axis=0), -1, 0))
+    way = np.floor(np.cumsum(np.where(np.isnan(steps), 0.0, steps).max(axis=1)) / piece)
+    needed = np.zeros(len(points), dtype=bool)
+    needed[0] = needed[-1] = True
+    needed[1:] |= np.diff(way, prepend=0.0) > 0
+    needed[1:] |= np.diff(shade) != 0
+    changes = (gone[1:] != gone[:-1]).any(axis=1)
+    needed[1:] |= changes
+    needed[:-1] |= changes
+    return np.flatnonzero(needed)
+
+
+def _runs(path: Array) -> list[list[list[float]]]:
+    """Return the parts of a (k, 2) path without nan."""
+    there = np.isfinite(path[:, 0])
+    if there.all():
+        return [path.tolist()]
+    pieces = np.split(path, np.flatnonzero(np.diff(there)) + 1)
+    return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]
+
+
+def _stroke(
+    surface: pygame.Surface, path: list[list[float]], colour: tuple[int, int, int, int], width: int
+) -> None:
+    if len(path) < 2:
+        return
+    pygame.draw.lines(surface, colour, False, path, width)
+    if width > 2.5 * _FADE_FINE:  # lines have straight ends: fill the corners' notches
+        for point in path:
+            pygame.draw.circle(surface, colour, point, width / 2)
+
+
+def _see_through(colour: Colour, part: float) -> tuple[int, int, int, int]:
+    """Return a premultiplied colour."""
+    red, green, blue = (round(c * part) for c in colour)
+    return red, green, blue, round(255 * part)
+
+
+def _near(point: list[float], other: list[float]) -> bool:
+    return abs(point[0] - other[0]) < 1.0 and abs(point[1] - other[1]) < 1.0
+
+
+def _same(row: Array, other: Array) -> bool:
+    return row.shape == other.shape and np.array_equal(row, other, equal_nan=True)
+
+
+def _same_rows(rows: Array, other: Array) -> Array:
+    if rows.shape[1:] != other.shape:
+        return np.zeros(len(rows), dtype=bool)
+    return np.asarray(((rows == other) | (np.isnan(rows) & np.isnan(other))).all(axis=(1, 2)))

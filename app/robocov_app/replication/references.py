@@ -1,0 +1,243 @@
+"""The centralised reference of every map, J_ref, each computed once and kept in a file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import queue
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robocov.errors import OutputError
+from robocov.files.atomic import written
+from robocov.mapfile import to_json
+from robocov_app.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from robocov_app.sweep.study import StudyMap
+    from robocov_app.terminal.interruption import Interruption
+
+_FORMAT = "robocov-reference 1"
+"""Another one whenever the search gives other results."""
+
+_PATIENCE = 0.2
+"""Seconds between two looks whether somebody has pressed Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a reference depends on.
+
+    Attributes
+    ----------
+    document : dict
+        The map as JSON.
+    robots, lattice, restarts, seed : int
+    radius : float, m
+    """
+
+    document: Mapping[str, Any]
+    robots: int
+    radius: float
+    lattice: int
+    restarts: int
+    seed: int = 0
+
+    @property
+    def digest(self) -> str:
+        """Questions of one digest have one answer; starts are no part of a map here."""
+        shape = {**asdict(self), "document": {**self.document, "starts": None}}
+        text = _FORMAT + json.dumps(shape, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The best placement that was found with the whole map known.
+
+    Attributes
+    ----------
+    mean_distance : float, m
+    positions : n pairs of x, y, m
+    agreement : float
+        Share of the restarts that end within 0.5 % of the best.
+    """
+
+    mean_distance: float
+    positions: tuple[tuple[float, float], ...]
+    agreement: float
+
+
+def answered(question: Question) -> Reference:
+    """Search for the reference; takes some seconds."""
+    from robocov.mapfile import from_json
+    from robocov.optimum import optimum
+
+    best = optimum(
+        from_json(dict(question.document)),
+        question.robots,
+        radius=question.radius,
+        lattice=question.lattice,
+        restarts=question.restarts,
+        seed=question.seed,
+    )
+    positions = tuple((float(x), float(y)) for x, y in best.positions.tolist())
+    return Reference(float(best.mean_distance), positions, float(best.agreement()))
+
+
+def references(
+    maps: Sequence[StudyMap],
+    folder: Path,
+    *,
+    robots: int,
+    radius: float,
+    lattice: int,
+    restarts: int,
+    workers: int,
+    quiet: bool,
+    stop: Interruption,
+) -> dict[str, Reference]:
+    """Return the reference of every map by its name: from `folder` where it is there, else searched for.
+
+    Parameters
+    ----------
+    maps : sequence of StudyMap
+    folder : Path
+        One file a map; made where it is missing.
+    robots, radius, lattice, restarts
+        As for `robocov.optimum.optimum`.
+    workers : int
+        Processes.
+    quiet : bool
+        Tell nothing.
+    stop : Interruption
+        Asked now and then; what is there by then is returned.
+
+    Raises
+    ------
+    OutputError
+        When a file cannot be written, or a process ends in the midst of a search.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
+    found: dict[str, Reference] = {}
+    open_questions: dict[str, Question] = {}
+    for each in maps:
+        question = Question(to_json(each.environment), robots, radius, lattice, restarts)
+        kept = _kept(folder / f"{each.name}.json", question)
+        if kept is None:
+            open_questions[each.name] = question
+        else:
+            found[each.name] = kept
+    if open_questions:
+        with progress("references", len(open_questions), quiet=quiet) as update:
+            for number, (name, answer) in enumerate(_searched(open_questions, workers, stop), start=1):
+                _keep(folder / f"{name}.json", open_questions[name], answer)
+                found[name] = answer
+                update(number)
+    return found
+
+
+def _kept(path: Path, question: Question) -> Reference | None:
+    """Return the answer in a file, None where there is none to this question."""
+    try:
+        content = json.loads(path.read_bytes())
+        if content["digest"] != question.digest:
+            return None
+        positions = tuple((float(x), float(y)) for x, y in content["positions_m"])
+        return Reference(float(content["mean_distance_m"]), positions, float(content["agreement"]))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _keep(path: Path, question: Question, answer: Reference) -> None:
+    content = {
+        "format": _FORMAT,
+        "digest": question.digest,
+        "map": question.document.get("name"),
+        "robots": question.robots,
+        "radius_m": question.radius,
+        "lattice": question.lattice,
+        "restarts": question.restarts,
+        "seed": question.seed,
+        "mean_distance_m": answer.mean_distance,
+        "agreement": answer.agreement,
+        "positions_m": [list(point) for point in answer.positions],
+    }
+    with written(path) as part:
+        part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _searched(
+    questions: Mapping[str, Question], workers: int, stop: Interruption
+) -> Iterator[tuple[str, Reference]]:
+    """Yield answers as they come; ends early when somebody wants to stop."""
+    waiting: queue.SimpleQueue[tuple[str, Question]] = queue.SimpleQueue()
+    for item in questions.items():
+        waiting.put(item)
+    answers: queue.SimpleQueue[tuple[str, Reference | OutputError]] = queue.SimpleQueue()
+    ended = threading.Event()
+    hands = [
+        threading.Thread(target=_work, args=(waiting, answers, ended), daemon=True)
+        for _ in range(min(workers, len(questions)))
+    ]
+    for hand in hands:
+        hand.start()
+    try:
+        left = len(questions)
+        while left and not stop.requested:
+            with suppress(queue.Empty):
+                name, answer = answers.get(timeout=_PATIENCE)
+                if isinstance(answer, OutputError):
+                    raise answer
+                left -= 1
+                yield name, answer
+    finally:
+        ended.set()
+        for hand in hands:
+            hand.join()
+
+
+def _work(
+    waiting: queue.SimpleQueue[tuple[str, Question]],
+    answers: queue.SimpleQueue[tuple[str, Reference | OutputError]],
+    ended: threading.Event,
+) -> None:
+    """Have a process answer one question after the other, until none is left or nobody wants to know."""
+    from robocov_app.live.messages import receive, send
+    from robocov_app.live.own_process import started
+
+    process = started("robocov_app.replication.reference_worker")
+    assert process.stdin and process.stdout
+
+    def watch() -> None:
+        ended.wait()
+        process.kill()
+
+    # a search takes seconds: whoever has stopped must not wait for it
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        while not ended.is_set():
+            name, question = waiting.get_nowait()
+            with suppress(OSError):
+                send(process.stdin, question)
+            answer = receive(process.stdout)
+            if answer is None:
+                answer = OutputError(f"references: the process that searched for that of {name} has ended")
+            answers.put((name, answer))
+            if not isinstance(answer, Reference):
+                break
+    except queue.Empty:
+        pass
+    finally:
+        for stream in (process.stdin, process.stdout):
+            with suppress(OSError):
+                stream.close()
+        process.kill()
+        process.wait()

@@ -1,0 +1,184 @@
+"""When a claim holds: thresholds that were set before anything was run, and plain words for the outcome.
+
+A claim has one or several *criteria*: an estimate, its 95 % interval, and the range in which it has to
+lie. A criterion is met where the whole interval lies in that range, refuted where all of it lies outside,
+and open where it reaches over an end of the range.
+
+    all criteria met                              the claim holds
+    some met                                      it holds partly
+    none met, at least one refuted                it does not hold
+    all open, or too few maps to tell             undecided
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from robocov_app.figures.statistics import Interval
+
+Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
+
+LEAST_MAPS = 5
+"""A bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """What has to be so for a claim to hold.
+
+    Attributes
+    ----------
+    text : str
+        What is measured: "median of J(RAPF) / J(LA)".
+    interval : Interval
+    low, high : float
+        The range in which it has to lie, both ends included.
+    unit : {"", "%", "m", "s"}
+        How it is written; with "%", 0.5 is 50 %.
+    """
+
+    text: str
+    interval: Interval
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it is met; None where that is open."""
+        low, high = self.interval.low, self.interval.high
+        if math.isnan(low) or math.isnan(high):
+            return None
+        if self.low <= low and high <= self.high:
+            return True
+        if high < self.low or low > self.high:
+            return False
+        return None
+
+    @property
+    def wanted(self) -> str:
+        """The range in words: "at most 5 %"."""
+        if math.isinf(self.high):
+            return f"at least {amount(self.low, self.unit)}"
+        if math.isinf(self.low):
+            return f"at most {amount(self.high, self.unit)}"
+        return f"between {amount(self.low, self.unit)} and {amount(self.high, self.unit)}"
+
+    @property
+    def found(self) -> str:
+        """The estimate and its interval in words."""
+        return described(self.interval, self.unit)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what stands in ``claims.json``."""
+        return {
+            "measure": self.text,
+            "unit": "1" if self.unit in ("", "%") else self.unit,
+            "estimate": self.interval.estimate,
+            "interval": [self.interval.low, self.interval.high],
+            "at_least": self.low,
+            "at_most": self.high,
+            "met": self.met,
+        }
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim, what the runs say of it, and why.
+
+    Attributes
+    ----------
+    key : str
+        Stays the same over versions: "nonconvex-final-shared".
+    part : int
+        Which of the study's six questions it belongs to.
+    claim : str
+        The paper's sentence in our words.
+    criteria : tuple of Criterion
+        The first one is the main one: its estimate stands for the claim.
+    runs : int
+        Simulated runs that went into it.
+    maps : int
+        Different maps among them.
+    explanation : str
+        What else there is to say, with numbers.
+    source : str
+        Where the paper says it; empty where the question is ours.
+    least_maps : int
+        On fewer maps it is undecided.
+    """
+
+    key: str
+    part: int
+    claim: str
+    criteria: tuple[Criterion, ...]
+    runs: int
+    maps: int
+    explanation: str = ""
+    source: str = ""
+    least_maps: int = LEAST_MAPS
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the criteria say together; see the head of this module."""
+        if self.maps < self.least_maps or not self.criteria:
+            return "undecided"
+        met = [criterion.met for criterion in self.criteria]
+        if all(met):
+            return "holds"
+        if any(met):
+            return "holds partly"
+        return "does not hold" if False in met else "undecided"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return one entry of ``claims.json``; numbers that are not finite are yet to be made null."""
+        main = self.criteria[0].to_json() if self.criteria else {}
+        return {
+            "claim": self.claim,
+            "verdict": self.verdict,
+            "estimate": main.get("estimate"),
+            "interval": main.get("interval"),
+            "runs": self.runs,
+            "key": self.key,
+            "question": self.part,
+            "measure": main.get("measure"),
+            "maps": self.maps,
+            "source": self.source,
+            "explanation": self.explanation,
+            "criteria": [criterion.to_json() for criterion in self.criteria],
+        }
+
+
+def amount(value: float, unit: str = "") -> str:
+    """Return a number with its unit, as short as it can be read.
+
+    >>> amount(0.0512, "%"), amount(0.643), amount(1.0042), amount(1.5, "m"), amount(float("nan"))
+    ('5.1 %', '0.643', '1.004', '1.5 m', '–')
+    """
+    if not math.isfinite(value):
+        return "–"
+    if value < 0.0:
+        return "−" + amount(-value, unit)
+    if unit == "%":
+        percent = 100.0 * value
+        return f"{percent:.1f} %" if abs(percent) < 99.95 and round(percent, 1) % 1 else f"{percent:.0f} %"
+    # ratios near 1 are told apart by their third digit after the point
+    text = f"{value:.3f}" if not unit and 1.0 < value < 1.1 else f"{value:.3g}"
+    return f"{text} {unit}".rstrip()
+
+
+def described(interval: Interval, unit: str = "") -> str:
+    """Return an estimate with its interval.
+
+    >>> from robocov_app.figures.statistics import Interval
+    >>> described(Interval(0.052, 0.031, 0.08), "%")
+    '5.2 % (3.1 % to 8 %)'
+    """
+    if math.isnan(interval.low):
+        return amount(interval.estimate, unit)
+    return (
+        f"{amount(interval.estimate, unit)} ({amount(interval.low, unit)} to {amount(interval.high, unit)})"
+    )

@@ -1,0 +1,1 @@
+"""Headless runs: done, saved, read back, filmed."""

@@ -1,0 +1,74 @@
+"""Building the coverage cost of a map, with progress."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from robocov.cost import CoverageCost
+from robocov.mapfile.check import MANY_VERTICES, vertex_count
+from robocov_app.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.environment import Environment
+    from robocov.geodesic import Geodesics
+
+PICTURE_LATTICE = 256
+"""Coarsest lattice for maps of distances: its cells are to be narrower than walls."""
+
+FILM_LATTICE = 128
+"""The same for films, of which every frame takes its time."""
+
+PATIENCE = 1.0
+"""Seconds without a word."""
+
+
+def built_cost(
+    environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
+) -> CoverageCost:
+    """Return the coverage cost of a map; how far it is gets told when that takes more than a second.
+
+    Parameters
+    ----------
+    environment : Environment
+    lattice : int
+    quiet : bool
+        Tell nothing.
+    geodesics : Geodesics or None
+        The shortest paths of this map, where they are known.
+
+    Raises
+    ------
+    ParameterError
+        As `CoverageCost`.
+    """
+    began = time.perf_counter()
+    with ExitStack() as stack:
+        update: Callable[[int], None] | None = None
+
+        def tell(done: float) -> None:
+            nonlocal update
+            if update is None and time.perf_counter() - began > PATIENCE:
+                update = stack.enter_context(progress("map of ways", 100, quiet=quiet))
+            if update is not None:
+                update(round(100 * done))
+
+        cost = CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
+        if update is not None:
+            update(100)
+    return cost
+
+
+def cost_for_pictures(
+    environment: Environment, cost: CoverageCost, least: int = PICTURE_LATTICE
+) -> CoverageCost:
+    """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one.
+
+    Maps of many vertices are drawn as they were measured: finer pictures would double what a run takes.
+    """
+    if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
+        return cost
+    return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)

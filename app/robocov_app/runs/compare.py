@@ -1,0 +1,188 @@
+"""Several controllers from the same starts: curves, pictures and a film side by side."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from robocov.controllers import controller_kind, gains_of
+from robocov.errors import ParameterError, unknown_name
+from robocov_app.runs.run import (
+    FILM_HOLD,
+    Run,
+    cost_title,
+    last_moments,
+    save_figures,
+    save_moving,
+    shown_in_films,
+    time_curves,
+)
+from robocov_app.terminal.output import finite, write_csv, write_json
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from robocov.cost import CoverageCost
+    from robocov_app.figures.coverage import Moment
+    from robocov_app.runs.panes import Shown
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.options import RunOptions
+
+_HEAD = {"format": "robocov-comparison", "version": 1}
+
+_FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
+
+_TIMED = ("mean_time_s",)
+"""Where robots are not equally fast."""
+
+
+def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the gains of each controller out of those given for the comparison.
+
+    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone.
+
+    Raises
+    ------
+    ParameterError
+        When a gain belongs to none of the controllers.
+    """
+    known = {name: gains_of(controller_kind(name)) for name in names}
+    chosen: list[dict[str, Any]] = [{} for _ in names]
+    # what is said of one controller alone counts for more than what is said of all
+    for key, value in sorted(given.items(), key=lambda item: "." in item[0]):
+        owner, dot, gain = key.rpartition(".")
+        if dot and owner not in known:
+            raise ParameterError(f"--set {key}: {unknown_name('controller', owner, known)}")
+        takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
+        if not takers:
+            every = known[owner] if dot else {gain for name in names for gain in known[name]}
+            raise ParameterError(f"--set {key}: {unknown_name('gain', gain, every)}")
+        for k in takers:
+            chosen[k][gain] = value
+    return chosen
+
+
+def folder_names(names: Sequence[str]) -> list[str]:
+    """Return a folder name for each controller: its own name, made fit for a folder and different for all.
+
+    >>> folder_names(["rapf", "mine.py:Mine", "other/mine.py:Mine"])
+    ['rapf', 'Mine', 'Mine-2']
+    """
+    taken: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-")[:64] or "controller"
+        number = 1 + sum(
+            other == stem or re.fullmatch(re.escape(stem) + r"-\d+", other) is not None for other in taken
+        )
+        taken.append(stem if number == 1 else f"{stem}-{number}")
+    return taken
+
+
+def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
+    """Return one row for each run: its figures, and the excess of its mean distance over the best."""
+    best = min(run.summary["mean_distance_m"] for run in runs.values())
+    return [
+        {
+            "controller": name,
+            "label": run.record.label,
+            "gains": dict(run.record.gains),
+            **{figure: run.summary[figure] for figure in _FIGURES},
+            **{figure: run.summary[figure] for figure in _TIMED if figure in run.summary},
+            "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
+            "above_best": run.summary["mean_distance_m"] / best - 1.0,
+        }
+        for name, run in runs.items()
+    ]
+
+
+def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
+    """Write which folders belong to the comparison, so that also one that is killed can be read."""
+    write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
+
+
+def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
+    """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
+    from robocov_app.figures.coverage import plot_coverage
+    from robocov_app.figures.runs import plot_comparison
+    from robocov_app.render.theme import theme_named
+
+    rows = rows_of(runs)
+    content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
+    write_json(folder / "comparison.json", finite(content))
+    columns = [name for name in rows[0] if name not in ("label", "gains")]
+    write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
+
+    theme, size = theme_named(options.theme), options.picture_size()
+    finals = [run.summary["mean_distance_m"] for run in runs.values()]
+    records = [run.record for run in runs.values()]
+    curves = [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance)
+        for run in runs.values()
+    ]
+
+    def moments() -> list[Moment]:
+        return last_moments(list(runs.values()), cost)
+
+    save_figures(
+        folder,
+        {
+            "trajectories": lambda: plot_comparison(
+                records,
+                theme=theme,
+                colours=options.colours,
+                size=size,
+                mean_distances=finals,
+                mean_times=[run.final_time for run in runs.values()],
+            ),
+            "cost": lambda: plot_coverage(
+                curves, moments(), theme, size, cost_title(records[0]), time_curves(list(runs.values()))
+            ),
+        },
+        quiet=options.json,
+    )
+
+
+def save_comparison_moving(
+    runs: Mapping[str, Run],
+    cost: CoverageCost | None,
+    folder: Path,
+    options: RunOptions,
+    stop: Interruption,
+) -> None:
+    """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
+    if not (options.frames or options.video):
+        return
+    shown = shown_in_films(list(runs.values()), cost, options)
+    save_panes_moving(list(runs.values()), shown, folder, options, stop)
+
+
+def save_panes_moving(
+    runs: Sequence[Run], shown: Shown, folder: Path, options: RunOptions, stop: Interruption
+) -> None:
+    """Write ``frames/`` and ``comparison.mp4`` of runs side by side, with what is to be shown."""
+    from robocov_app.runs.panes import comparison_frames, pane_layout
+    from robocov_app.runs.recording import frame_rows, told_costs
+
+    records = [run.record for run in runs]
+    layout = pane_layout(records, options.theme, options.colours, options.picture_size(), shown)
+    longest = max(records, key=len)
+    total = len(frame_rows(longest.time, options.fps, options.film_speed, FILM_HOLD))
+    save_moving(
+        folder,
+        "comparison.mp4",
+        lambda: comparison_frames(
+            records,
+            [told_costs(run.history) for run in runs],
+            layout,
+            theme=options.theme,
+            colours=options.colours,
+            fps=options.fps,
+            speed=options.film_speed,
+            hold=FILM_HOLD,
+            shown=shown,
+        ),
+        total,
+        options,
+        stop,
+    )

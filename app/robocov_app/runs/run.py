@@ -1,0 +1,367 @@
+"""One headless run: simulate, evaluate, save, draw."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.controllers import make_controller
+from robocov.cost import MomentaryCost
+from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
+from robocov.record import Record, Recorder
+from robocov.robots import Team
+from robocov.simulation import Simulation
+from robocov_app.runs.building import FILM_LATTICE, built_cost, cost_for_pictures
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.output import finite, write_csv
+from robocov_app.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+    from robocov.arrays import Array
+    from robocov.conditions import Conditions
+    from robocov.cost import CoverageCost
+    from robocov.environment import Environment
+    from robocov_app.figures.coverage import Moment
+    from robocov_app.figures.curves import Curve
+    from robocov_app.runs.panes import Shown
+    from robocov_app.runs.recording import Frame
+    from robocov_app.terminal.options import RunOptions
+
+FILM_SCALE = 1.3
+"""How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
+
+FILM_HOLD = 1.0
+"""Seconds for which a film stays on its last moment."""
+
+STOPPED_SAMPLES = 200
+"""Samples of the coverage cost of a run that was stopped."""
+
+COST_RATE = 10.0
+"""Samples of the coverage cost per simulated second."""
+
+COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
+"""The header of ``cost.csv``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished (or stopped) run with its evaluation."""
+
+    record: Record
+    history: CostHistory
+    summary: dict[str, Any]
+
+    @property
+    def final_time(self) -> float | None:
+        """The mean time until the first robot is there at the end, s; None where all are equally fast."""
+        return None if self.history.mean_time is None else float(self.history.mean_time[-1])
+
+
+def team_of(options: RunOptions) -> Team:
+    """Return the team that the options describe."""
+    return options.made_team()
+
+
+def conditions_of(options: RunOptions) -> Conditions | None:
+    """Return the conditions that the options describe; None where they are ideal."""
+    return options.conditions.conditions(options.seed, options.robots)
+
+
+def starts_of(environment: Environment, options: RunOptions) -> tuple[str, Array]:
+    """Return the name of the start and the positions drawn from it."""
+    start = environment.start(options.start)
+    radius = float(team_of(options).radius.max())  # room for the largest
+    return start.name, start.sample(options.robots, seed=options.seed, radius=radius)
+
+
+def simulated(
+    environment: Environment,
+    controller_name: str,
+    gains: Mapping[str, object],
+    options: RunOptions,
+    stop: Interruption,
+) -> Record:
+    """Simulate, and return the record up to the end or to Ctrl-C."""
+    controller = make_controller(controller_name, gains)
+    start, positions = starts_of(environment, options)
+    conditions = conditions_of(options)
+    simulation = Simulation(
+        environment, controller, positions, team_of(options), options.dt, conditions=conditions
+    )
+    recorder = Recorder(
+        environment,
+        simulation.team,
+        controller,
+        options.dt,
+        name=controller_name,
+        start=start,
+        seed=options.seed,
+        conditions=conditions,
+    )
+    total = round(options.duration / options.dt)
+    # what a user's controller prints must not get among the answer
+    chatter = redirect_stdout(sys.stderr) if options.json else nullcontext()
+    with chatter, progress(f"simulating {controller.label}", total, quiet=options.json) as update:
+        for step, snapshot in enumerate(simulation.snapshots(options.duration)):
+            last = step == total or stop.requested
+            if last or step % options.record_every == 0:
+                recorder.add(snapshot)
+            if last or step % 10 == 0:
+                update(step)
+            if last:
+                break
+    return recorder.record()
+
+
+def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
+    """Evaluate the coverage cost along a record and sum the run up.
+
+    Whoever has stopped a long run does not want to wait for all of its cost: after Ctrl-C it is
+    evaluated at `STOPPED_SAMPLES` moments at the most.
+    """
+    rate = COST_RATE
+    if stop.requested and record.time[-1] > 0:
+        rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
+    total = len(sample_moments(record, rate))
+    with progress("coverage cost", total, quiet=quiet) as update:
+        done = 0
+
+        def count() -> None:
+            nonlocal done
+            done += 1
+            update(done)
+
+        history = cost_history(record, cost, rate, count)
+    return Run(record, history, summarise(record, history))
+
+
+def save_numbers(run: Run, folder: Path, lattice: int) -> None:
+    """Write ``record.npz``, ``run.json`` and ``cost.csv``; the summary depends on the lattice."""
+    run.record.save(folder, finite(run.summary), lattice=lattice)
+    write_csv(folder / "cost.csv", cost_columns(run.history), cost_rows(run.history))
+
+
+def cost_columns(history: CostHistory) -> str:
+    """Return the header of ``cost.csv``; where robots are not equally fast, with one column more."""
+    return COST_COLUMNS if history.mean_time is None else f"{COST_COLUMNS},mean_time_s"
+
+
+def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
+    """Return the rows of ``cost.csv``, under `cost_columns`."""
+    columns = [history.time, history.mean_distance, history.cost, history.uncovered_area]
+    if history.mean_time is not None:
+        columns.append(history.mean_time)
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:
+    """Draw ``trajectories.png|svg`` and ``cost.png|svg``."""
+    from robocov_app.figures.coverage import plot_coverage
+    from robocov_app.figures.runs import plot_trajectories
+    from robocov_app.render.theme import theme_named
+
+    record, history = run.record, run.history
+    theme, size = theme_named(options.theme), options.picture_size()
+    final, final_time = float(history.mean_distance[-1]), run.final_time
+    curve = (record.label, record.controller, history.time, history.mean_distance)
+    save_figures(
+        folder,
+        {
+            "trajectories": lambda: plot_trajectories(
+                record,
+                theme=theme,
+                colours=options.colours,
+                size=size,
+                mean_distance=final,
+                mean_time=final_time,
+            ),
+            "cost": lambda: plot_coverage(
+                [curve],
+                last_moments([run], cost),
+                theme=theme,
+                size=size,
+                title=cost_title(record),
+                times=time_curves([run]),
+            ),
+        },
+        quiet=options.json,
+    )
+
+
+def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
+    """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
+
+    The others are on the same map, but for robots that failed at other places. Where all robots have
+    failed there is nothing to draw.
+    """
+    from robocov_app.figures.coverage import Moment
+    from robocov_app.render.field import Field, FieldLattice
+
+    drawn, moments = runs[0].record.environment, []
+    cost = cost_for_pictures(drawn, cost)
+    for run in runs:
+        record = run.record
+        if record.environment != drawn:
+            drawn = record.environment
+            cost = built_cost(drawn, cost.lattice, quiet=True)
+        momentary, time = MomentaryCost(cost), float(record.time[-1])
+        counted = momentary.counted(time, record.positions[-1], record.working[-1])
+        if not counted.any():
+            continue
+        now, rows = momentary.at(time), np.flatnonzero(counted)
+        field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
+        some = None if counted.all() else rows
+        moments.append(
+            Moment.last_of(record, field, float(run.history.mean_distance[-1]), some, run.final_time)
+        )
+    return moments
+
+
+def time_curves(runs: Sequence[Run]) -> list[Curve]:
+    """Return the curves of the mean time of runs; none where robots are equally fast, or none worked."""
+    return [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_time)
+        for run in runs
+        if run.history.mean_time is not None and np.isfinite(run.history.mean_time).any()
+    ]
+
+
+def cost_title(record: Record) -> str:
+    """Return the title of a picture of cost curves: of what map and how many robots."""
+    n = len(record.team)
+    return f"Coverage cost  ·  {record.environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
+
+
+def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
+    """Draw each figure and write it as PNG and SVG under its name."""
+    from robocov_app.figures.runs import save_figure
+
+    with progress("pictures", 2 * len(figures), quiet=quiet) as update:
+        done = 0
+        for stem, draw in figures.items():
+            figure = draw()
+            for suffix in (".png", ".svg"):
+                save_figure(figure, folder / (stem + suffix))
+                done += 1
+                update(done)
+
+
+def save_moving(
+    folder: Path,
+    film: str,
+    frames: Callable[[], Iterator[Frame]],
+    total: int,
+    options: RunOptions,
+    stop: Interruption,
+) -> None:
+    """Write the frames as PNGs, as a film, or both, as the options say; Ctrl-C ends both early."""
+    from robocov_app.runs.recording import kept_frames, save_film, save_frames
+
+    if not (options.frames or options.video):
+        return
+
+    def until_stopped() -> Iterator[Frame]:
+        for frame in frames():
+            yield frame
+            if stop.requested:
+                return
+
+    pictures = folder / "frames"
+    with progress("film" if options.video else "frames", total, quiet=options.json) as update:
+        if not options.video:
+            save_frames(pictures, until_stopped(), progress=lambda done, _: update(done))
+        else:
+            shown = kept_frames(pictures, until_stopped()) if options.frames else until_stopped()
+            save_film(folder / film, shown, fps=options.fps, progress=lambda done, _: update(done))
+
+
+def save_run_moving(
+    run: Run, cost: CoverageCost | None, folder: Path, options: RunOptions, stop: Interruption
+) -> None:
+    """Write ``frames/`` and ``run.mp4`` as the options say; for `cost` see `shown_in_films`."""
+    from robocov_app.runs.recording import frame_rows
+
+    if not (options.frames or options.video):
+        return
+    total = len(frame_rows(run.record.time, options.fps, options.film_speed, FILM_HOLD))
+    shown = shown_in_films([run], cost, options)
+
+    def frames() -> Iterator[Frame]:
+        return frames_of(run, options, options.film_size(), shown)
+
+    save_moving(folder, "run.mp4", frames, total, options, stop)
+
+
+def check_layers(options: RunOptions) -> None:
+    """Make sure, before anything is simulated, that films can show what is wanted.
+
+    Raises
+    ------
+    ParameterError
+        When there is no such layer.
+    """
+    if options.show or options.hide:
+        from robocov_app.render.picture import checked_layers
+
+        checked_layers("--show", options.show)
+        checked_layers("--hide", options.hide)
+
+
+def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> Shown:
+    """Return what films of runs on one map show, all on one scale of colours.
+
+    The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
+    Where no `cost` of the map is there, it is made if it is needed.
+    """
+    from robocov_app.render.field import Fields
+    from robocov_app.render.picture import checked_layers
+    from robocov_app.render.shading import round_limit
+    from robocov_app.runs.panes import Shown
+
+    also, without = checked_layers("--show", options.show), checked_layers("--hide", options.hide)
+    if not also & {"distances", "geodesic_cells"}:
+        return Shown(also, without)
+    environment = runs[0].record.environment
+    if cost is None:
+        cost = built_cost(environment, FILM_LATTICE, quiet=options.json)
+    cost = cost_for_pictures(environment, cost, FILM_LATTICE)
+    farthest = max((float(reached.max(initial=0.0)) for reached in _reached(runs, cost)), default=0.0)
+    return Shown(also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
+
+
+def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
+    """Yield the distances at the end of each run that are finite."""
+    momentary = MomentaryCost(cost)
+    for run in runs:
+        record = run.record
+        result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
+        if result is not None:
+            yield result.distances[np.isfinite(result.distances)]
+
+
+def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown) -> Iterator[Frame]:
+    """Draw the film frames of a run."""
+    from robocov_app.runs.recording import iter_frames, told_costs
+
+    return iter_frames(
+        run.record,
+        size=size,
+        also=shown.also,
+        without=shown.without,
+        fields=shown.fields,
+        theme=options.theme,
+        colours=options.colours,
+        fps=options.fps,
+        speed=options.film_speed,
+        hold=FILM_HOLD,
+        cost=told_costs(run.history),
+    )

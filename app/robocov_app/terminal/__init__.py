@@ -1,0 +1,1 @@
+"""What the commands share: values of options, tables, progress, Ctrl-C."""

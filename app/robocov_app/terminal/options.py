@@ -1,0 +1,234 @@
+"""The options that `run` and `compare` share, and how their texts become values."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from robocov.errors import ParameterError, shown
+from robocov_app.terminal.condition_options import ConditionOptions
+
+if TYPE_CHECKING:
+    from robocov.robots import Team
+
+MOST_ROWS = 2e7
+"""Largest record, in moments times robots: about 2 GB."""
+
+USUAL_ROWS = 4e6
+"""Largest record where its rate is left open: about 320 MB."""
+
+_WORD = r"[A-Za-z][A-Za-z0-9_-]*"
+_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
+"""What a gain's value may look like where it is a word, and what looks so and is none."""
+
+
+@dataclass
+class RunOptions:
+    """What a run is made of, and what is made of it."""
+
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
+    """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
+    gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
+    """Gains, as in --set k_rep=0.3 target=median attraction_limit=null (see `robocov controllers`)."""
+    robots: int = 6
+    """Number of robots."""
+    start: str | None = None
+    """Named start of the map; the map's first by default."""
+    seed: int = 0
+    """Seed of the starting positions; every controller gets the same."""
+    duration: float = 60.0
+    """Simulated seconds."""
+    dt: float = 1 / 60
+    """Control period in seconds."""
+    record_hz: float | None = None
+    """Moments a second that the record keeps, about; by default all, of large teams what makes 320 MB."""
+    radius: float = 0.1
+    """Radius of a robot in metres."""
+    max_speed: float = 1.0
+    """Largest speed in m/s."""
+    max_acceleration: float = 2.0
+    """Largest acceleration in m/s²."""
+    viscosity: float = 2.0
+    """Viscosity nu of (28) in N s/m; a robot has 1 kg."""
+    sensing_range: float = 3.0
+    """How far the range sensor reaches, in metres from the robot's centre."""
+    communication_range: float | None = None
+    """How far robots hear each other, in metres; without limit by default."""
+    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
+    """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
+    says how many there are, and what a group leaves open is as the options above say."""
+    lattice: int = 64
+    """The coverage cost is evaluated on a lattice of N x N sites over the map."""
+    out: Path | None = None
+    """Folder for the results."""
+    overwrite: bool = False
+    """Replace an earlier result in that folder."""
+    frames: bool = False
+    """Save every film frame as a PNG too."""
+    video: bool = False
+    """Save a film (H.264, MP4)."""
+    fps: int = 30
+    """Film frames per second."""
+    film_speed: float = 4.0
+    """Simulated seconds per second of film."""
+    theme: Literal["light", "dark"] = "light"
+    """Colours of pictures and films."""
+    colours: Literal["paper", "robots"] = "paper"
+    """Trajectories in the paper's red, or a colour for each robot; in films too."""
+    show: tuple[str, ...] = ()
+    """Layers that films and frames show besides the usual ones: distances, geodesic-cells, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers that they do not show, as in --hide cells centroids."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
+
+    def __post_init__(self) -> None:
+        if self.team is not None:
+            self.robots = robots_of(self.made_team(), self.robots, RunOptions.robots, self.team)
+        in_range("--robots", self.robots, 1, 10_000)
+        in_range("--seed", self.seed, 0, 2**63 - 1)
+        in_range("--duration", self.duration, 0.0, 1e6, "s")
+        in_range("--lattice", self.lattice, 2, 2048)
+        in_range("--fps", self.fps, 1, 240)
+        in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        from robocov.simulation import check_dt  # asking for help must not load the physics
+
+        check_dt(self.dt)
+        if self.record_hz is not None:
+            in_range("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
+        rows = self.duration / self.dt * self.robots / self.record_every
+        if rows > MOST_ROWS:
+            raise ParameterError(
+                f"--record-hz: {self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are "
+                f"{rows:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
+            )
+        self.picture_size()
+
+    @property
+    def record_every(self) -> int:
+        """Of so many steps the record keeps one."""
+        if self.record_hz is None:
+            return math.ceil(max(self.duration / self.dt * self.robots / USUAL_ROWS, 1.0))
+        return max(round(1.0 / (self.record_hz * self.dt)), 1)
+
+    @property
+    def record_words(self) -> str:
+        """Note on a thinned record, for the command's last line."""
+        every = self.record_every
+        return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
+
+    def made_team(self) -> Team:
+        """Return the team that the options describe.
+
+        Raises
+        ------
+        InputError
+            When a value is out of range, or the team file cannot be read.
+        """
+        from robocov.robots import Team
+
+        said = {
+            "radius": self.radius,
+            "max_speed": self.max_speed,
+            "max_acceleration": self.max_acceleration,
+            "viscosity": self.viscosity,
+            "sensing_range": self.sensing_range,
+            "communication_range": math.inf if self.communication_range is None else self.communication_range,
+        }
+        if self.team is None:
+            return Team.homogeneous(self.robots, **said)
+        from robocov.robots import read_team
+
+        return read_team(self.team, said)
+
+    def picture_size(self) -> tuple[int, int] | None:
+        """Return the size that was asked for (width, height), None when none was."""
+        return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
+
+    def film_size(self) -> tuple[int, int]:
+        """Return the size of film frames (width, height)."""
+        return self.picture_size() or (1280, 720)
+
+
+def robots_of(team: Team, robots: int, default: int, path: Path) -> int:
+    """Return how many robots a team file has; the option --robots may say the same.
+
+    Raises
+    ------
+    ParameterError
+        When it says something else.
+    """
+    if robots not in (default, len(team)):
+        raise ParameterError(f"--robots: {robots}, but the team of {path} has {len(team)}")
+    return len(team)
+
+
+def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height from a text like ``1280x720``.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, or beyond the limits.
+    """
+    match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
+    if not match:
+        raise ParameterError(
+            f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
+        )
+    width, height = int(match[1]), int(match[2])
+    in_range(option, width, least[0], most[0], "pixels wide")
+    in_range(option, height, least[1], most[1], "pixels high")
+    return width, height
+
+
+def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Check the value of an option.
+
+    Raises
+    ------
+    ParameterError
+        When it is out of range.
+    """
+    if not low <= value <= high:
+        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
+
+
+def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
+
+    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
+    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
+
+    Raises
+    ------
+    ParameterError
+        When a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is given twice.
+    """
+    gains: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
+            raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
+        if name in gains:
+            raise ParameterError(f"--set: {name} is given twice")
+        if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
+            gains[name] = value
+            continue
+        try:
+            gains[name] = json.loads(value)
+        except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
+            raise ParameterError(
+                f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
+            ) from error
+    return gains

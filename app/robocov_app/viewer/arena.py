@@ -1,0 +1,367 @@
+"""The arena: one painted pane for each controller, one camera for all, and what tools show on top."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.render import sprites
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.furniture import Status, legend_rows, legend_strip
+from robocov_app.render.layers import LegendEntry, drawn_radii
+from robocov_app.render.legends import united
+from robocov_app.render.phi import cost_words, mean_words
+from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.scene import Scene
+from robocov_app.render.shading import round_limit
+from robocov_app.render.theme import mix, robot_hues
+from robocov_app.render.trajectories import Trajectories
+from robocov_app.viewer.overlays import tag
+from robocov_app.viewer.presenter import FADE
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov.environment import Environment
+    from robocov.observation import Snapshot
+    from robocov_app.render.theme import Theme
+    from robocov_app.viewer.layout import Layout
+    from robocov_app.viewer.presenter import Desk
+    from robocov_app.viewer.session.pane import Lane
+    from robocov_app.viewer.tool import Point, Preview
+
+MOST_RAYS = 720
+"""Rays of all scans of a pane together."""
+
+RAYS = 120
+"""Rays of one scan."""
+
+FAR_SCAN = 12.0
+"""Metres that scans reach where the sensor has no limit."""
+
+_REACH = 12.0
+"""Pixels at scale 1 that a finger is wide."""
+
+
+class Arena:
+    """Draws the panes of a desk, and finds what is under the cursor."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        self.desk = desk
+        self.theme = theme
+        self._painters: list[Painter] = []
+        self._scenes: list[Scene] = []
+        self._limit = 1.0
+        self._environment: Environment | None = None
+        self._strip: pygame.Surface | None = None
+        self._strip_key: object = None
+        self._camera: Camera | None = None
+        self._rows: tuple[object, int] = (None, 1)
+        self.hovered = -1, -1
+        """Pane and number of the robot under the cursor."""
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Make the painters fit the layout and the theme."""
+        self.layout, self.theme = layout, theme
+        self._environment = self.desk.session.environment
+        several = len(layout.panes) > 1
+        self._painters = []
+        for _, _, width, height in layout.panes:
+            layers = standard_layers()
+            if several:  # they share the time, which stands in the window's own status line
+                layers = [layer for layer in pane_layers() if not isinstance(layer, Status)]
+            painter = Painter(self.desk.session.environment, (width, height), theme, layers, layout.scale)
+            if self._camera is not None:
+                painter.camera = self._camera.within(painter.camera.view)
+            self._painters.append(painter)
+        self._strip = None
+
+    # cameras
+
+    def fit(self) -> None:
+        """Show the whole map."""
+        self._camera = None
+        for painter in self._painters:
+            painter.fit()
+
+    def zoom(self, factor: float, at: tuple[float, float]) -> None:
+        """Magnify what is under a pixel of the window, in all panes."""
+        pane = self.pane_at(at) or 0
+        left, top, _, _ = self.layout.panes[pane]
+        camera = self._painters[pane].camera
+        low_x, low_y, high_x, high_y = self.desk.session.environment.region.bounds
+        whole = max(high_x - low_x, high_y - low_y)
+        # neither a dot nor a single wall's paint
+        factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
+        self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
+
+    def pan(self, dx: float, dy: float) -> None:
+        """Move all cameras by so many pixels."""
+        camera = self._painters[0].camera.panned(dx, dy)
+        low_x, low_y, high_x, high_y = self.desk.session.environment.region.bounds
+        x = float(np.clip(camera.center[0], low_x, high_x))
+        y = float(np.clip(camera.center[1], low_y, high_y))
+        self._look(replace(camera, center=(x, y)))
+
+    def _look(self, camera: Camera) -> None:
+        self._camera = camera
+        for painter in self._painters:
+            painter.camera = camera.within(painter.camera.view)
+
+    # what is where
+
+    def pane_at(self, pixel: tuple[float, float]) -> int | None:
+        """Return the pane under a pixel of the window."""
+        for pane, (left, top, width, height) in enumerate(self.layout.panes):
+            if left <= pixel[0] < left + width and top <= pixel[1] < top + height:
+                return pane
+        return None
+
+    def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
+        """Return the place under a pixel of the window, m."""
+        left, top, _, _ = self.layout.panes[pane]
+        place = np.array([pixel[0] - left, pixel[1] - top])
+        x, y = self._painters[pane].camera.to_world(place).tolist()
+        return x, y
+
+    def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
+        """Return the pixel of the window where a place is."""
+        left, top, _, _ = self.layout.panes[pane]
+        x, y = self._painters[pane].camera.to_pixels(np.array(point)).tolist()
+        return x + left, y + top
+
+    def reach(self, pane: int) -> float:
+        """Return how many metres a finger is wide."""
+        return _REACH * self.layout.scale / self._painters[pane].camera.zoom
+
+    def robot_at(self, pixel: tuple[float, float], pane: int) -> int | None:
+        """Return the number of the robot that is drawn under a pixel, also of one that failed."""
+        if pane >= len(self._scenes):
+            return None
+        scene = self._scenes[pane]
+        canvas = self._canvas(None, pane, scene)
+        point = np.array(self.to_world(pixel, pane))
+        best: tuple[float, int] | None = None
+        if scene.snapshot is not None:
+            far = np.hypot(*(scene.snapshot.positions - point).T) * canvas.camera.zoom
+            radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
+            for row in np.flatnonzero(far <= radii).tolist():
+                if best is None or far[row] < best[0]:
+                    best = float(far[row]), scene.number(row)
+        for number, place in scene.failed.items():
+            away = float(np.hypot(place[0] - point[0], place[1] - point[1])) * canvas.camera.zoom
+            if away <= 9.0 * self.layout.scale and (best is None or away < best[0]):
+                best = away, number
+        return best[1] if best else None
+
+    # drawing
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw all panes."""
+        session = self.desk.session
+        if session.environment is not self._environment:
+            before = self._environment
+            self._environment = session.environment
+            for painter in self._painters:
+                painter.environment = session.environment
+            if before is not None and before.region.bounds != session.environment.region.bounds:
+                self.fit()
+        self._scenes = []
+        for pane, (lane, box) in enumerate(zip(session.lanes, self.layout.panes, strict=False)):
+            painter = self._painters[pane]
+            painter.visible = set(self.desk.shown)
+            for layer in painter.layers:
+                if isinstance(layer, Trajectories):
+                    layer.fade = FADE if self.desk.fade else None
+                if layer.name == "caption":
+                    painter.visible.add("caption")
+            scene = self._scene(lane, painter)
+            self._scenes.append(scene)
+            surface = screen.subsurface(pygame.Rect(box))
+            painter.draw(surface, scene)
+            self._draw_tool(surface, pane, scene)
+        self._draw_frames(screen)
+
+    def _scene(self, lane: Lane, painter: Painter) -> Scene:
+        desk, session = self.desk, self.desk.session
+        circumstances = session.circumstances(lane)
+        snapshot = session.snapshot(lane)
+        trail, times = session.trail(lane)
+        team = lane.simulation.team
+        if not session.live:
+            team = circumstances.team
+        known = desk.costs.known.get(lane.number)
+        field = None
+        if known is not None and painter.needs_field:
+            field = known.field
+            self._scale_colours(known.field.largest)
+        number = desk.selected
+        selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
+        what = mean_words(circumstances.environment)
+        cost = "" if known is None else cost_words(what, known.result.mean_distance, known.travel_time)
+        starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
+        scene = Scene.of(
+            circumstances.environment.at(snapshot.time),
+            team,
+            snapshot,
+            starts=starts,
+            trail=trail if len(trail) else None,
+            trail_time=times,
+            label=circumstances.law.label,
+            cost=cost,
+            field=field,
+            field_limit=self._limit,
+        )
+        return replace(
+            scene,
+            numbers=circumstances.numbers,
+            failed=circumstances.failed,
+            failed_radii={number: circumstances.limits.radius_of(number) for number in circumstances.failed},
+            selected=selected,
+            scans=self._scans(lane, snapshot, team.sensing_range, selected) if "scan" in desk.shown else (),
+            sensed=lane.sensed,
+            path=known.path if known is not None and desk.cursor is not None else None,
+        )
+
+    def _scale_colours(self, largest: float) -> None:
+        """Let the scale of colours follow what is shown, without trembling."""
+        if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
+            self._limit = round_limit(1.1 * largest)
+
+    def _scans(
+        self, lane: Lane, snapshot: Snapshot, ranges: Array, selected: int | None
+    ) -> list[tuple[Array, Array]]:
+        """Return ray scans: of the robot that is asked about, else of all unless they are many."""
+        rows = [selected] if selected is not None else list(range(len(snapshot.positions)))
+        rays = min(RAYS, MOST_RAYS // len(rows))
+        if rays < 24:
+            return []
+        scans = []
+        for row in rows:
+            reach = float(ranges[row]) if np.isfinite(ranges[row]) else FAR_SCAN
+            place = snapshot.positions[row]
+            scans.append((place, lane.simulation.sensor.scan(place, rays, reach)[1]))
+        return scans
+
+    def _canvas(self, surface: pygame.Surface | None, pane: int, scene: Scene) -> Canvas:
+        painter = self._painters[pane]
+        return Canvas(
+            surface if surface is not None else pygame.Surface((1, 1)),
+            painter.camera,
+            self.theme,
+            self.layout.scale,
+            robot_hues(len(scene.team)),
+        )
+
+    def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
+        """Draw what the tool is about to do, and the hand's spring."""
+        canvas = self._canvas(surface, pane, scene)
+        clip = pygame.Rect([round(x) for x in canvas.camera.view])
+        surface.set_clip(clip)
+        hand = self.desk.session.hand
+        if hand is not None and scene.snapshot is not None and scene.numbers is not None:
+            number, target = hand
+            if number in scene.numbers:
+                row = list(scene.numbers).index(number)
+                ends = canvas.camera.to_pixels(np.array([scene.snapshot.positions[row], target]))
+                canvas.dashes(ends[0].tolist(), ends[1].tolist(), self.theme.ink, canvas.width(1.5), dash=3.0)
+        asked = self.desk.selected
+        if asked is not None and asked in scene.failed:
+            center = canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist()
+            radius = max(scene.failed_radius(asked) * canvas.camera.zoom, 9.0 * canvas.scale)
+            ring = partial(
+                sprites.ring, round(radius) + 4.0 * canvas.scale, self.theme.ink, 2.2 * canvas.scale
+            )
+            canvas.stamp(ring, center)
+        if pane == self.hovered[0] and scene.snapshot is not None and scene.numbers is not None:
+            self._draw_hovered(canvas, scene, self.hovered[1])
+        preview = self.desk.tool.preview(self.desk.session)
+        if preview is not None:
+            self._draw_preview(canvas, preview)
+        surface.set_clip(None)
+
+    def _draw_hovered(self, canvas: Canvas, scene: Scene, number: int) -> None:
+        """Draw a fine ring around the robot under the cursor: it can be taken hold of."""
+        if scene.snapshot is None or scene.numbers is None or number not in scene.numbers:
+            return
+        row = list(scene.numbers).index(number)
+        if row == scene.selected:
+            return
+        radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+        center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
+        canvas.stamp(partial(sprites.ring, radius, self.theme.ink, 1.2 * canvas.scale), center)
+
+    def _draw_preview(self, canvas: Canvas, preview: Preview) -> None:
+        accent = self.theme.final
+        if preview.obstacle is not None:
+            shape = preview.obstacle.polygon
+            for part in getattr(shape, "geoms", [shape]):
+                corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+                page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+                red, green, blue = (round(c * 0.35) for c in self.theme.obstacle)
+                pygame.draw.polygon(
+                    page, (red, green, blue, 89), np.rint(np.clip(corners, -1e4, 1e4)).tolist()
+                )
+                canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+                canvas.outline(corners, accent, canvas.width(1.5))
+        if len(preview.line) > 1:
+            points = canvas.camera.to_pixels(np.array(preview.line))
+            canvas.outline(points, accent, canvas.width(1.5), closed=False)
+            if preview.closed:
+                canvas.dashes(points[-1].tolist(), points[0].tolist(), accent, canvas.width(1.0))
+        for x, y in canvas.camera.to_pixels(np.array(preview.line)).tolist() if preview.marks else ():
+            size = 3 * canvas.scale
+            box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
+            pygame.draw.rect(canvas.surface, self.theme.background, box)
+            pygame.draw.rect(canvas.surface, accent, box, canvas.width(1.5))
+        if preview.words and preview.line:
+            x, y = canvas.camera.to_pixels(np.array(preview.line[-1])).tolist()
+            tag(canvas, preview.words, (x + 12 * canvas.scale, y - 14 * canvas.scale))
+
+    def _draw_frames(self, screen: pygame.Surface) -> None:
+        """Draw what parts the panes, which of them is chosen, and the legend that they share."""
+        if len(self._scenes) < 2:
+            return
+        scale = self.layout.scale
+        line = mix(self.theme.background, self.theme.ink, 0.18)
+        for pane, box in enumerate(self.layout.panes):
+            rect = pygame.Rect(box).inflate(2, 2)
+            pygame.draw.rect(screen, line, rect, 2)
+            if pane == self.desk.active:
+                x, y, wide, _ = box
+                bar = pygame.Rect(x, y, wide, max(2, round(3 * scale)))
+                lane = self.desk.session.lanes[pane]
+                screen.fill(self.theme.controller(lane.law.name), bar)
+        x, y, wide, high = self.layout.legend
+        entries = self._legend_entries()
+        key = (tuple(entry.key() for entry in entries), wide, self.theme.name, scale)
+        if self._strip is None or self._strip_key != key:
+            page = pygame.Surface((wide, max(high, 1)), 0, 32)
+            page.fill(self.theme.background)
+            canvas = Canvas(
+                page, self._painters[0].camera, self.theme, scale, robot_hues(1), frozenset(self.desk.shown)
+            )
+            page.blit(legend_strip(entries, canvas), (0, 0))
+            self._strip, self._strip_key = page, key
+        screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))
+
+    def shared_rows(self) -> int:
+        """Return how many rows the shared legend has needed as long as the same is shown."""
+        if len(self._scenes) < 2:
+            return 0
+        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.desk.shown)
+        entries = self._legend_entries()
+        page = pygame.Surface((self.layout.arena[2], 1))
+        canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))
+        rows = max(len(legend_rows(canvas, entries)), 1, self._rows[1] if self._rows[0] == kept else 1)
+        self._rows = kept, rows
+        return rows
+
+    def _legend_entries(self) -> list[LegendEntry]:
+        """Return the shared legend: what any of the panes shows."""
+        each = zip(self._painters, self._scenes, strict=False)  # a pane that was just added has no scene yet
+        return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

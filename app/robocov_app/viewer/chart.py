@@ -1,0 +1,417 @@
+"""The plot of the cost against time, and the time line below it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.render import sprites
+from robocov_app.render.camera import Camera, round_length
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.phi import density_words
+from robocov_app.render.theme import mix
+from robocov_app.viewer.layout import inside
+from robocov_app.viewer.overlays import tag
+from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, curve_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov.arrays import Array
+    from robocov_app.render.theme import Colour, Theme
+    from robocov_app.viewer.layout import Box, Layout
+    from robocov_app.viewer.presenter import Desk
+    from robocov_app.viewer.session.curves import Event, Plotted
+    from robocov_app.viewer.session.pane import Lane
+
+LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20
+"""Pixels at scale 1 round the plot."""
+
+SHORTEST = 10.0
+"""Seconds that the axis shows at least."""
+
+REFRESHED = 0.1
+"""Seconds after which growing curves are drawn anew."""
+
+_GLYPHS = {
+    "obstacle": "■",
+    "robot": "+",
+    "failure": "×",
+    "law": "◆",
+    "limits": "◆",
+    "hand": "●",
+    "density": "▲",
+}
+
+
+_FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+
+
+def time_axis(end: float) -> float:
+    """Return where the axis of time ends: a little beyond now, in steps, so that it rests mostly.
+
+    >>> [time_axis(t) for t in (0.0, 9.0, 9.9, 61.0)]
+    [10.0, 10.0, 15.0, 70.0]
+    """
+    if end <= 0.96 * SHORTEST:
+        return SHORTEST
+    step = round_length(max(end / 4.0, 1.0)) / 2.0 if end < 40.0 else round_length(end / 5.0)
+    step = max(step, 5.0)
+    return float(np.ceil((end * 1.03 + 1e-9) / step) * step)
+
+
+def value_axis(low: float, high: float) -> tuple[float, float, float]:
+    """Return begin, end and step of an axis that holds values between `low` and `high`.
+
+    It begins at zero unless that would leave the curves in the upper fifth.
+
+    >>> value_axis(0.9, 3.2)
+    (0.0, 3.36, 1.0)
+    """
+    if not np.isfinite([low, high]).all() or high <= 0.0:
+        return 0.0, 1.0, 0.5
+    begin = 0.0 if low < 0.8 * high else max(low - 1.5 * (high - low) - 0.02 * high, 0.0)
+    step = round_length(max((high - begin) / 2.5, 1e-6))
+    begin = float(np.floor(begin / step) * step)
+    return begin, float(f"{high + 0.05 * (high - begin):.6g}"), step
+
+
+class Chart:
+    """Draws the plot and the time line of a desk; keeps what changes seldom."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self._page: pygame.Surface | None = None
+        self._key: object = None
+        self._samples: object = None
+        self._drawn_at = -1.0
+        self._wanted = DISTANCE
+        self._other: Box | None = None
+        self.hover: tuple[int, int] | None = None
+        """Where the cursor is in the window."""
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Take another layout and theme."""
+        self.layout, self.theme = layout, theme
+        self._page = None
+
+    # what is plotted
+
+    @property
+    def plotted(self) -> Plotted:
+        """What is plotted now."""
+        return chosen(self.desk.session, self._wanted)
+
+    def switch(self) -> str:
+        """Plot the other quantity, if there are two."""
+        wanted = TIME if self.plotted is DISTANCE else DISTANCE
+        if wanted is TIME and chosen(self.desk.session, TIME) is not TIME:
+            return "all robots are equally fast: the mean time goes as the mean distance"
+        self._wanted, self._page = wanted, None
+        return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
+
+    def offers(self, at: tuple[int, int]) -> bool:
+        """Return whether the name of the other quantity is at a pixel of the window."""
+        return self._other is not None and inside(self._other, at)
+
+    # where time is
+
+    @property
+    def _span(self) -> tuple[float, float, float]:
+        """Left and right of the axis in pixels of the window, and the time at its end."""
+        left, _, width, _ = self.layout.chart
+        scale = self.layout.scale
+        beside = RIGHT if len(self.desk.session.lanes) == 1 else RIGHT_OF_SEVERAL
+        ghosts = max((float(ghost.time[-1]) for ghost in self.desk.session.ghosts), default=0.0)
+        end = time_axis(max(self.desk.session.end, ghosts))
+        return left + LEFT * scale, left + width - beside * scale, end
+
+    def time_at(self, x: float) -> float:
+        """Return the time at a pixel's column, s, within the run."""
+        left, right, end = self._span
+        time = (x - left) / max(right - left, 1.0) * end
+        return float(np.clip(time, 0.0, self.desk.session.end))
+
+    def column(self, time: float) -> float:
+        """Return the pixel's column of a time."""
+        left, right, end = self._span
+        return left + (right - left) * time / end
+
+    # drawing
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw both."""
+        session = self.desk.session
+        curves = [curve_of(lane, self.plotted) for lane in session.lanes]
+        samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
+        rest = (
+            *(tuple(lane.number for lane in session.lanes), len(session.events), len(session.ghosts)),
+            *(
+                self._span,
+                self.plotted,
+                self.desk.costs.state,
+                None if session.live else session.time,
+                session.serial,
+            ),
+        )
+        # curves grow sixty times a second, which nobody sees
+        old = self.desk.now - self._drawn_at >= REFRESHED
+        if self._page is None or rest != self._key or (old and samples != self._samples):
+            _, _, width, height = self.layout.chart
+            self._page = pygame.Surface((width, height + self.layout.track[3]), 0, 32)
+            self._key, self._samples, self._drawn_at = rest, samples, self.desk.now
+            canvas = Canvas(self._page, _FLAT, self.theme, self.layout.scale, np.zeros(1, dtype=np.intp))
+            self._plot(canvas)
+            self._track(canvas)
+        screen.blit(self._page, self.layout.chart[:2])
+        self._cursor(screen)
+        self._hovered(screen)
+
+    def _plot(self, canvas: Canvas) -> None:
+        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        canvas.surface.fill(theme.panel)
+        left, right, end = self._span
+        height = self.layout.chart[3]
+        top, bottom = TOP * scale, height - BOTTOM * scale
+        weighed = ", weighed by φ" if density_words(session.environment) else ""
+        what = self.plotted
+        title = f"{what.title}{weighed}, {what.unit}"
+        canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
+        self._offer(canvas, 12 * scale + canvas.text_width(title, bold=True))
+        if self.desk.costs.state:
+            canvas.text(self.desk.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
+        ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
+        values = [curve_of(lane, what).value for lane in session.lanes] + [ghost.value for ghost in ghosts]
+        some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
+        low, high, step = value_axis(float(some.min()), float(some.max()))
+
+        def place(time: Array, value: Array) -> Array:
+            x = left + (right - left) * time / end
+            y = bottom - (bottom - top) * (value - low) / (high - low)
+            return np.column_stack([x, y])
+
+        line = mix(theme.panel, theme.ink, 0.12)
+        for mark in np.arange(low, high, step):
+            y = bottom - (bottom - top) * (mark - low) / (high - low)
+            canvas.surface.fill(line, pygame.Rect(round(left), round(y), round(right - left), 1))
+            canvas.text(
+                f"{mark:.6g}",
+                (left - 7 * scale, y),
+                anchor="right",
+                colour=theme.faint,
+                size=theme.small_text,
+            )
+        for mark in np.arange(0.0, end + 1e-9, max(round_length(end / 6.0), 1.0)):
+            x = left + (right - left) * mark / end
+            canvas.text(
+                f"{mark:g} s",
+                (x, height - 0.5 * BOTTOM * scale),
+                anchor="middle",
+                colour=theme.faint,
+                size=theme.small_text,
+            )
+        for event in session.events:
+            x = round(left + (right - left) * event.time / end)
+            canvas.surface.fill(
+                mix(theme.panel, theme.ink, 0.3), pygame.Rect(x, round(top), 1, round(bottom - top))
+            )
+        self._event_words(canvas, list(session.events), left, right, end, top)
+        for ghost in ghosts:
+            points = place(ghost.time, ghost.value)
+            colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
+            for k in range(len(points) - 1):
+                if k % 4 < 3 or len(points) < 12:
+                    canvas.line(points[k].tolist(), points[k + 1].tolist(), colour)
+            if len(points):
+                wide = canvas.text_width(ghost.words, theme.small_text)
+                canvas.text(
+                    ghost.words,
+                    (max(points[-1][0] - 4 * scale, left + wide), points[-1][1] - 9 * scale),
+                    anchor="right",
+                    colour=colour,
+                    size=theme.small_text,
+                )
+        for lane in session.lanes:
+            curve = curve_of(lane, what)
+            points = place(curve.time, curve.value)
+            if len(points) > 1:
+                self._curve(canvas, _thinned(points), self._colour(lane))
+        self._values(canvas, place)
+
+    def _offer(self, canvas: Canvas, left: float) -> None:
+        """Name the other quantity beside the title, where there are two: a click plots it."""
+        self._other = None
+        if chosen(self.desk.session, TIME) is DISTANCE:
+            return
+        scale, words = self.layout.scale, (DISTANCE if self.plotted is TIME else TIME).short
+        left, small = left + 16 * scale, self.theme.small_text
+        canvas.text(f"{words} ›", (left, 0.5 * TOP * scale), colour=self.theme.faint, size=small)
+        x, y, _, _ = self.layout.chart
+        wide = canvas.text_width(f"{words} ›", small)
+        self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
+
+    def _curve(self, canvas: Canvas, points: Array, colour: Colour) -> None:
+        width = canvas.width(1.8)
+        canvas.segments(np.hstack([points[:-1], points[1:]]), colour, width)
+
+    def _event_words(
+        self, canvas: Canvas, events: list[Event], left: float, right: float, end: float, top: float
+    ) -> None:
+        """Write what happened beside its line, where there is room."""
+        free = left
+        for event in events:
+            x = left + (right - left) * event.time / end
+            words = f"{_GLYPHS.get(event.kind, '•')} {event.text}"
+            wide = canvas.text_width(words, self.theme.small_text)
+            if x < free or x + wide > right:
+                words = _GLYPHS.get(event.kind, "•")
+                wide = round(8 * self.layout.scale)
+                if x < free:
+                    continue
+            canvas.text(
+                words,
+                (x + 3 * self.layout.scale, top + 6 * self.layout.scale),
+                colour=self.theme.faint,
+                size=self.theme.small_text,
+            )
+            free = x + wide + 8 * self.layout.scale
+
+    def _values(self, canvas: Canvas, place: Callable[[Array, Array], Array]) -> None:
+        """Write each pane's value at the right, with the gap to the best; none over another."""
+        session, theme, scale = self.desk.session, self.theme, self.layout.scale
+        _, right, _ = self._span
+        time, known = compared(session, self.plotted)
+        if not known:
+            return
+        best = min(known.values())
+        lanes = sorted(
+            (each for each in session.lanes if each.number in known), key=lambda each: -known[each.number]
+        )
+        now = np.full(len(lanes), time)
+        wanted = place(now, np.array([known[lane.number] for lane in lanes]))[:, 1]
+        rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
+        for y, lane in zip(rows, lanes, strict=True):
+            value = known[lane.number]
+            words = f"{value:.3f}"
+            if len(known) > 1:
+                gap = f"  +{100 * (value / best - 1):.1f} %" if value > best else "  best"
+                words = f"{lane.law.label}  {value:.3f}{gap}"
+            canvas.text(
+                words, (right + 9 * scale, y), colour=self._colour(lane), bold=True, size=theme.small_text
+            )
+
+    def _track(self, canvas: Canvas) -> None:
+        """Draw the time line."""
+        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        left, right, _ = self._span
+        top = self.layout.chart[3]
+        middle = top + 0.5 * self.layout.track[3]
+        canvas.surface.fill(theme.panel, pygame.Rect(0, top, *self.layout.track[2:]))
+        thick = max(4, round(5 * scale))
+        box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
+        pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
+        canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
+        words = "live" if session.live else "past"
+        if session.live and session.history.thinned:
+            words = "live · past thinned"
+            if right + 9 * scale + canvas.text_width(words, size=theme.small_text) > self.layout.track[2]:
+                words = "thinned"
+        colour = theme.start if session.live else theme.final
+        canvas.text(
+            words,
+            (right + 9 * scale, middle),
+            colour=colour,
+            bold=not session.history.thinned or not session.live,
+            size=theme.small_text,
+        )
+
+    def _cursor(self, screen: pygame.Surface) -> None:
+        """Draw how far the run has come, the handle on the time line, and the line through the plot."""
+        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+        _, top, _, height = self.layout.chart
+        middle = self.layout.track[1] + 0.5 * self.layout.track[3]
+        thick = max(4, round(5 * scale))
+        x, begin = self.column(session.time), round(self.column(0.0))
+        bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
+        if not session.live:
+            bars.append((x, theme.final))
+            line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
+            screen.fill(theme.final, line)
+        for end, colour in bars:
+            bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
+            pygame.draw.rect(screen, colour, bar, border_radius=thick)
+        dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
+        for event in session.events:
+            canvas.stamp(dot, (self.column(event.time), middle))
+        fill = theme.ink if session.live else theme.final
+        radius = round(2 * 6.5 * scale) / 2
+        handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
+        canvas.stamp(handle, (x, middle))
+
+    def _hovered(self, screen: pygame.Surface) -> None:
+        """Tell what was at the time under the cursor: an event near it, or the values."""
+        over = self.hover
+        if over is None or not (inside(self.layout.chart, over) or inside(self.layout.track, over)):
+            return
+        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        left, right, _ = self._span
+        if not left <= over[0] <= right:
+            return
+        time = self.time_at(over[0])
+        near = [event for event in session.events if abs(self.column(event.time) - over[0]) < 5 * scale]
+        if near:
+            words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
+        else:
+            what = self.plotted
+            values = [(lane.law.label, curve_of(lane, what).at(time)) for lane in session.lanes]
+            known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
+            words = "   ".join([f"{time:.1f} s", *known])
+        _, top, _, height = self.layout.chart
+        x = round(self.column(time))
+        line = pygame.Rect(x, round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
+        screen.fill(mix(theme.panel, theme.ink, 0.35), line)
+        canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+        room = right - canvas.text_width(words)
+        tag(canvas, words, (min(x + 12 * scale, room), top + (TOP + 16) * scale))
+
+    def _colour(self, lane: Lane) -> Colour:
+        return curve_colour(self.desk, self.theme, lane)
+
+
+def curve_colour(desk: Desk, theme: Theme, lane: Lane) -> Colour:
+    """Return the colour of a pane's curve: its controller's, another one where that is taken."""
+    taken: list[Colour] = []
+    for other in desk.session.lanes:
+        own = theme.controllers.get(other.law.name)
+        free = [colour for colour in theme.others if colour not in taken]
+        taken.append(own if own is not None and own not in taken else free[0])
+        if other is lane:
+            break
+    return taken[-1]
+
+
+def spread(wanted: Array, gap: float, limit: float) -> list[float]:
+    """Return heights near the wanted ones, ascending as those are, apart by a gap, none beyond a limit.
+
+    >>> spread(np.array([10.0, 11.0, 40.0]), 5.0, 42.0)
+    [10.0, 15.0, 40.0]
+    """
+    rows: list[float] = []
+    for y in wanted.tolist():
+        rows.append(max(y, rows[-1] + gap) if rows else y)
+    for k in range(len(rows)):
+        rows[-1 - k] = min(rows[-1 - k], limit - gap * k)
+    return rows
+
+
+def _thinned(points: Array) -> Array:
+    """Return the points of a curve that differ by a pixel's part, the last one always."""
+    if len(points) < 400:
+        return points
+    columns = np.rint(points[:, 0] * 1.5)
+    keep = np.append(columns[1:] != columns[:-1], True)
+    return np.asarray(points[keep])

@@ -1,0 +1,136 @@
+"""Where everything stands in the window: arena, panel, plot, time line and status line. Pure arithmetic."""
+
+from __future__ import annotations
+
+from math import floor
+from typing import NamedTuple, TypeAlias
+
+from robocov_app.render.spacing import columns_for
+
+Box: TypeAlias = tuple[int, int, int, int]
+"""Left, top, width and height in pixels."""
+
+PANEL = 320
+CHART = 150
+TRACK = 26
+STATUS = 26
+GAP = 2
+LEGEND_ROW = 22
+SMALLEST = (900, 600)
+"""Width and height at scale 1 that everything has room in."""
+
+
+class Layout(NamedTuple):
+    """Boxes of a window of some size.
+
+    Attributes
+    ----------
+    size : (width, height)
+    scale : float
+        As it was asked for, or what of it the window has room for.
+    arena, chart, track, status : Box
+    panel : Box
+        Of no width while it is hidden.
+    panes : tuple of Box
+        In the arena.
+    legend : Box
+        Above several panes, which share it; of no height above a single one.
+    """
+
+    size: tuple[int, int]
+    scale: float
+    arena: Box
+    panel: Box
+    chart: Box
+    track: Box
+    status: Box
+    panes: tuple[Box, ...]
+    legend: Box
+
+
+def laid_out(
+    size: tuple[int, int],
+    scale: float,
+    panes: int,
+    aspect: float,
+    *,
+    panel: bool = True,
+    legend_rows: int = 1,
+    plot: bool = True,
+) -> Layout:
+    """Lay a window out.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    scale : float
+        Of text and lines.
+    panes : int
+    aspect : float
+        Width by height of the map.
+    panel : bool
+        Whether the panel is shown.
+    legend_rows : int
+        Of the legend that several panes share.
+    plot : bool
+        Whether there are a plot and a time line.
+
+    Examples
+    --------
+    >>> layout = laid_out((1280, 720), 1.0, 1, 4 / 3)
+    >>> layout.arena, layout.panel
+    ((0, 0, 960, 518), (960, 0, 320, 720))
+    """
+    width, height = size
+    scale = min(scale, largest_scale(size))
+    wide = min(round(PANEL * scale), width - 1) if panel else 0
+    left = width - wide
+    status = round(STATUS * scale)
+    track = round(TRACK * scale) if plot else 0
+    chart = min(round(CHART * scale), height // 3) if plot else 0
+    arena: Box = (0, 0, left, max(height - status - track - chart, 1))
+    legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
+    around = 68 * scale
+    columns = columns_for(panes, aspect, (left, max(arena[3] - legend, 1)), around)
+    rows = -(-panes // columns)
+    pane_width = (left - GAP * (columns - 1)) // columns
+    pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
+    boxes = tuple(
+        (
+            (k % columns) * (pane_width + GAP),
+            legend + (k // columns) * (pane_height + GAP),
+            pane_width,
+            max(pane_height, 1),
+        )
+        for k in range(panes)
+    )
+    return Layout(
+        size,
+        scale,
+        arena,
+        (left, 0, wide, height),
+        (0, arena[3], left, chart),
+        (0, arena[3] + chart, left, track),
+        (0, arena[3] + chart + track, left, status),
+        boxes,
+        (0, 0, left, legend),
+    )
+
+
+def largest_scale(size: tuple[int, int]) -> float:
+    """Return the largest scale that a window has room for: in steps, so that text does not tremble.
+
+    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480))]
+    [1.0, 1.125, 3.5, 0.625]
+    """
+    return max(floor(8 * min(size[0] / SMALLEST[0], size[1] / SMALLEST[1])) / 8, 0.25)
+
+
+def inside(box: Box, pixel: tuple[float, float]) -> bool:
+    """Return whether a pixel is in a box.
+
+    >>> inside((10, 10, 5, 5), (14, 10)), inside((10, 10, 5, 5), (15, 10))
+    (True, False)
+    """
+    left, top, width, height = box
+    return left <= pixel[0] < left + width and top <= pixel[1] < top + height

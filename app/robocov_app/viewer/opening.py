@@ -1,0 +1,195 @@
+"""Opening the window: with a display or without, from the command line's options."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.errors import InputError
+from robocov_app.viewer.actions import KEY_REPEAT
+from robocov_app.viewer.costs import LATTICE, DirectCosts, WorkerCosts
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.settings import Settings, load_settings, save_settings, settings_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robocov_app.viewer.costs import Costs
+    from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.window import Window
+
+NO_DISPLAY = (
+    "no display: the window needs one (over ssh, try ssh -X); "
+    "--frames N --out DIR renders it without, and robocov run needs none"
+)
+
+HEADLESS_FPS = 30
+"""Frames per second of what is rendered without a display."""
+
+
+@contextmanager
+def display(*, headless: bool, otherwise: str = NO_DISPLAY) -> Iterator[None]:
+    """Start pygame's display, real or not.
+
+    Raises
+    ------
+    InputError
+        When there is none: SDL would silently open a window that nobody sees, and run for ever.
+    """
+    if headless:
+        os.environ["SDL_VIDEODRIVER"] = "dummy"
+    elif sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    ):
+        raise InputError(otherwise)
+    import pygame
+
+    try:
+        pygame.display.init()
+    except pygame.error:
+        raise InputError(otherwise) from None
+    if not headless and pygame.display.get_driver() in ("offscreen", "dummy", "evdev"):
+        wanted = os.environ.get("SDL_VIDEODRIVER", "")
+        if pygame.display.get_driver() != wanted:
+            pygame.display.quit()
+            raise InputError(otherwise)
+    pygame.font.init()
+    pygame.key.set_repeat(*KEY_REPEAT)
+    try:
+        yield
+    finally:
+        pygame.display.quit()
+
+
+def screen_scale() -> float:
+    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
+    import pygame
+
+    sizes = pygame.display.get_desktop_sizes()
+    height = max((size[1] for size in sizes), default=1080)
+    return float(min(max(round(height / 1080 * 4) / 4, 1.0), 3.0))
+
+
+class Opening:
+    """How a window is opened.
+
+    Parameters
+    ----------
+    session : Session
+    map_name : str
+    folder : Path
+        Where things are saved.
+    theme, size, scale
+        None for what was used last.
+    shown : names of layers or None
+    headless : bool
+        Draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes.
+    laws : names of controllers
+        To choose from beside the built-in ones.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        map_name: str,
+        folder: Path,
+        *,
+        theme: str | None = None,
+        size: tuple[int, int] | None = None,
+        scale: float | None = None,
+        also: frozenset[str] = frozenset(),
+        without: frozenset[str] = frozenset(),
+        headless: bool = False,
+        laws: tuple[str, ...] = (),
+        lattice: int = LATTICE,
+    ) -> None:
+        self.session, self.map_name, self.folder = session, map_name, folder
+        self.theme, self.size, self.scale = theme, size, scale
+        self.also, self.without = also, without
+        self.headless, self.laws, self.lattice = headless, laws, lattice
+
+    @contextmanager
+    def window(self) -> Iterator[Window]:
+        """Give the window; settings are read before and kept afterwards.
+
+        Raises
+        ------
+        InputError
+            When there is no display.
+        """
+        keeper = None
+        try:
+            with display(headless=self.headless):
+                file = None if self.headless else settings_file()
+                settings, trouble = load_settings(file)
+                window = self._opened(settings)
+                window.desk.say(trouble)
+                keeper = window.keeper
+                try:
+                    yield window
+                    save_settings(settings_of(window, settings, self.scale), file)
+                finally:
+                    window.desk.costs.close()
+        finally:
+            # the window is gone; what is still being saved is waited for
+            if keeper is not None:
+                keeper.finish()
+                for words, bad in keeper.poll():
+                    if bad:
+                        sys.stderr.write(f"robocov: {words}\n")
+
+    def _opened(self, settings: Settings) -> Window:
+        from robocov_app.render.picture import standard_layers
+        from robocov_app.viewer.window import Window
+
+        layers = standard_layers()
+        shown = {layer.name for layer in layers if layer.default}
+        if settings.shown is not None:
+            shown = {layer.name for layer in layers} & set(settings.shown)
+        shown = (shown | self.also) - self.without
+        size = self.size or (settings.width, settings.height)
+        scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+        if self.size is None and not self.headless:
+            size = fitting(size)
+        if self.headless:
+            self.session.clock.budget = float("inf")
+        costs: Costs = DirectCosts(self.lattice) if self.headless else WorkerCosts(self.lattice)
+        try:
+            desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
+            desk.theme = self.theme or settings.theme
+            desk.fade = settings.fade
+            window = Window(desk, size, scale, patient=self.headless)
+        except BaseException:
+            costs.close()
+            raise
+        window.panel.show_tab(settings.tab)
+        return window
+
+
+def fitting(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size, or what of it the desktop has room for."""
+    import pygame
+
+    wide, high = max(pygame.display.get_desktop_sizes(), default=size)
+    return min(size[0], wide), min(size[1], high)
+
+
+def settings_of(window: Window, before: Settings, scale: float | None) -> Settings:
+    """Return what is worth remembering of a window."""
+    from robocov_app.viewer.panel import TABS
+
+    width, height = window.windowed or window.screen.get_size()
+    changes = {
+        "theme": window.desk.theme,
+        "fade": window.desk.fade,
+        "shown": tuple(sorted(window.desk.shown)),
+        "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
+        "width": min(max(width, 900), 7680),
+        "height": min(max(height, 600), 4320),
+    }
+    if scale is not None:
+        changes["scale"] = scale
+    return before.model_copy(update=changes)

@@ -1,0 +1,214 @@
+"""What the panel's sliders and words set: gains of a controller, limits of the team. Knows no pygame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from robocov.controllers.gains import Option
+from robocov.errors import ParameterError, shown
+from robocov.robots import UNITS
+from robocov_app.viewer.session.scenario import Limits
+
+if TYPE_CHECKING:
+    from robocov_app.viewer.session.scenario import Law
+
+SPAN = 30.0
+"""A slider reaches from so many times less than the default to so many times more."""
+
+_END = 0.985
+"""From here on a slider says "no limit" where there may be none."""
+
+_WORDS = {
+    "max_speed": "largest speed",
+    "max_acceleration": "acceleration",
+    "viscosity": "viscosity ν",
+    "sensing_range": "sensing",
+    "communication_range": "communication",
+    "radius": "radius",
+}
+_LIMIT_SPANS = {
+    "max_speed": (0.1, 10.0),
+    "max_acceleration": (0.1, 20.0),
+    "viscosity": (0.1, 20.0),
+    "sensing_range": (0.2, 30.0),
+    "communication_range": (0.5, 50.0),
+    "radius": (0.02, 1.0),
+}
+_MEANINGS = {
+    "max_speed": "kinematic limit, the same for every controller",
+    "max_acceleration": "kinematic limit, the same for every controller",
+    "viscosity": "ν of (28): what slows robots down",
+    "sensing_range": "how far the range sensor sees obstacles, from the robot's centre",
+    "communication_range": "how far robots hear each other",
+    "radius": "radius of a robot",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One slider.
+
+    Attributes
+    ----------
+    name : str
+        A gain, or ``team.`` and a limit.
+    label, unit, meaning : str
+    value, default : float or None
+        None for no limit.
+    low, high : float
+        Where the slider ends; typed values may go further.
+    optional : bool
+        Whether there may be no limit.
+    """
+
+    name: str
+    label: str
+    unit: str
+    meaning: str
+    value: float | None
+    default: float | None
+    low: float
+    high: float
+    optional: bool
+
+    def place(self) -> float:
+        """Return where the slider stands, 0 to 1: logarithmic, so that halves and doubles are as far."""
+        if self.value is None or math.isinf(self.value):
+            return 1.0
+        if self.high <= self.low:
+            part = 0.0
+        elif self.low <= 0.0:
+            part = (self.value - self.low) / (self.high - self.low)
+        elif self.value <= 0.0:
+            part = 0.0
+        else:
+            part = math.log(self.value / self.low) / math.log(self.high / self.low)
+        return min(max(part, 0.0), _END if self.optional else 1.0)
+
+    def at(self, place: float) -> float | None:
+        """Return the value of a place of the slider, to three digits, never beyond its ends."""
+        if self.optional and place > _END:
+            return None
+        if self.low <= 0.0:
+            value = self.low + place * (self.high - self.low)
+        else:
+            value = self.low * (self.high / self.low) ** place
+        return min(max(float(f"{value:.3g}"), self.low), self.high)
+
+    def words(self) -> str:
+        """Return the value as people type it."""
+        return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
+
+    def read(self, text: str) -> float | None:
+        """Return the value that was typed.
+
+        Raises
+        ------
+        ParameterError
+            When it is no number.
+        """
+        plain = text.strip().lower().replace(",", ".")
+        if self.optional and plain in ("none", "null", "no limit", "inf", "∞", ""):
+            return None
+        try:
+            value = float(plain)
+        except ValueError:
+            also = ", or none," if self.optional else ""
+            raise ParameterError(f"{self.label}: {shown(text)}, but a number{also} was wanted") from None
+        return value
+
+
+@dataclass(frozen=True)
+class Pick:
+    """One of several words, which stand side by side.
+
+    Attributes
+    ----------
+    name, label, meaning : str
+    value, default : str
+    offered : tuple of str
+        The words.
+    """
+
+    name: str
+    label: str
+    meaning: str
+    value: str
+    default: str
+    offered: tuple[str, ...]
+
+    def words(self) -> str:
+        """Return the value as people type it."""
+        return self.value
+
+    def read(self, text: str) -> str:
+        """Return the word that was typed, or begun.
+
+        Raises
+        ------
+        ParameterError
+            When it is none of them.
+        """
+        plain = text.strip().lower()
+        begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
+        exact = [word for word in begun if word.lower() == plain]
+        if len(exact or begun) != 1:
+            wanted = f"one of {', '.join(self.offered)} was wanted"
+            raise ParameterError(f"{self.label}: {shown(text)}, but {wanted}")
+        return (exact or begun)[0]
+
+
+def gain_parameters(law: Law) -> list[Parameter | Pick]:
+    """Return a slider for each gain of a controller that is a number, and the words of each other."""
+    found: list[Parameter | Pick] = []
+    for name, gain in law.known.items():
+        value = law.value(name)
+        if isinstance(gain, Option):
+            word = value if isinstance(value, str) else gain.default
+            found.append(Pick(name, name, gain.meaning, word, gain.default, gain.words))
+            continue
+        number = None if isinstance(value, str) else value
+        usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
+        if usual > 0 and gain.low >= 0:
+            low, high = max(usual / SPAN, gain.low), min(usual * SPAN, gain.high)
+            low = low if low > 0 else usual / SPAN
+        else:
+            low, high = max(gain.low, -SPAN * abs(usual)), min(gain.high, SPAN * abs(usual))
+        found.append(
+            Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
+        )
+    return found
+
+
+def limit_parameters(limits: Limits) -> list[Parameter]:
+    """Return a slider for each limit of the team; what it sets, it sets for all robots."""
+    usual = Limits()
+    mixed = {name for name, _ in limits.different}
+    return [
+        Parameter(
+            f"team.{name}",
+            f"{label} ≠" if name in mixed else label,
+            UNITS[name],
+            _MEANINGS[name] + ("; robots differ in it until it is set here" if name in mixed else ""),
+            _finite(getattr(limits, name)),
+            _finite(getattr(usual, name)),
+            *_LIMIT_SPANS[name],
+            name.endswith("_range"),
+        )
+        for name, label in _WORDS.items()
+    ]
+
+
+def with_limit(limits: Limits, name: str, value: float | None) -> Limits:
+    """Return the limits with another value of one; `name` may begin with ``team.``."""
+    name = name.removeprefix("team.")
+    number = math.inf if value is None else value
+    # set for all: what robots had of their own is gone
+    different = tuple(each for each in limits.different if each[0] != name)
+    return replace(limits, **{name: number}, different=different)
+
+
+def _finite(value: float) -> float | None:
+    return None if math.isinf(value) else value

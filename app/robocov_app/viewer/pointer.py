@@ -1,0 +1,166 @@
+"""The mouse: what is pressed, dragged and let go where, and what that means."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov_app.viewer.brush import Brush
+from robocov_app.viewer.layout import inside
+from robocov_app.viewer.mouse import DOUBLE, Mouse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.viewer.arena import Arena
+    from robocov_app.viewer.chart import Chart
+    from robocov_app.viewer.layout import Box
+    from robocov_app.viewer.panel import Panel
+    from robocov_app.viewer.presenter import Desk
+
+_TAKES_ROBOTS = ("hand", "eraser", "failure")
+"""Tools that take hold of a robot."""
+
+_SLIP = 5.0
+"""Pixels that a click may move."""
+
+
+class Pointer(Mouse):
+    """Turns events of the mouse into what panel, arena, chart and tools do.
+
+    Parameters
+    ----------
+    desk, arena, chart, panel
+    interrupt : callable
+        Called when something is pressed in the arena: the tour ends.
+    """
+
+    def __init__(
+        self, desk: Desk, arena: Arena, chart: Chart, panel: Panel, interrupt: Callable[[], object]
+    ) -> None:
+        super().__init__(panel)
+        self._desk, self._arena, self._chart = desk, arena, chart
+        self._interrupt = interrupt
+        self._held = 0
+
+    def _panel_box(self) -> Box:
+        return self._arena.layout.panel
+
+    def _over_panel(self) -> None:
+        self._desk.cursor = None
+
+    def _turned(self, factor: float) -> None:
+        if self._arena.pane_at(self.at) is None:
+            return
+        if isinstance(self._desk.tool, Brush):
+            self._desk.widen(factor)
+        else:
+            self._arena.zoom(factor, self.at)
+
+    def show(self) -> None:
+        """Let the cursor, and a ring around the robot under it, tell what a press would do."""
+        desk, arena, layout = self._desk, self._arena, self._arena.layout
+        pane = arena.pane_at(self.at) if desk.cursor is not None else None
+        number = None
+        if pane is not None and desk.tool.name in _TAKES_ROBOTS:
+            number = arena.robot_at(self.at, pane)
+        arena.hovered = (-1, -1) if pane is None or number is None else (pane, number)
+        if inside(layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = pygame.SYSTEM_CURSOR_ARROW
+        if number is not None:
+            shape = pygame.SYSTEM_CURSOR_HAND
+        elif pane is not None and desk.tool is not desk.hand:
+            shape = pygame.SYSTEM_CURSOR_CROSSHAIR
+        elif inside(layout.track, self.at) or inside(layout.chart, self.at):
+            offered = self._chart.offers(self.at)
+            shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
+        self._show_cursor(shape)
+
+    def leave(self) -> None:
+        """The cursor is not in the window any more."""
+        self._desk.cursor = None
+        self._chart.hover = None
+
+    def _pressed(self, event: pygame.event.Event, now: float) -> None:
+        desk, layout = self._desk, self._arena.layout
+        if self._drag:  # a second button while the first is held
+            return
+        pane = self._arena.pane_at(event.pos)
+        self._pressed_at, self._button = event.pos, event.button
+        if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
+            if event.button == 1 and self._chart.offers(event.pos):
+                desk.attempt(self._chart.switch)
+            elif event.button == 1:
+                self._interrupt()
+                self._drag = "time"
+                desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
+            return
+        if pane is None or event.button not in (1, 2, 3):
+            return
+        brush = desk.tool if isinstance(desk.tool, Brush) else None
+        if event.button != 1 and not (brush and event.button == 3):
+            self._drag = "pan"
+            return
+        if brush:
+            brush.lowers = event.button == 3
+        self._interrupt()
+        pane = min(pane, len(desk.session.lanes) - 1)
+        if desk.active != pane:
+            desk.active = pane
+            desk.version += 1
+        then, where = self._last_click
+        double = now - then < DOUBLE and _far(where, event.pos) < _SLIP
+        self._last_click = now, event.pos
+        if double and desk.tool.name in ("polygon", "wall"):
+            desk.attempt(lambda: desk.tool.finish(desk.session))
+            return
+        point = self._arena.to_world(event.pos, pane)
+        number, reach = self._arena.robot_at(event.pos, pane), self._arena.reach(pane)
+        desk.attempt(lambda: desk.tool.press(desk.session, point, reach, number))
+        if desk.tool is desk.hand and number is not None:
+            self._panel.show_tab("robot")
+        self._drag = "pan" if desk.tool is desk.hand and not desk.hand.holds else "tool"
+        self._held = pane
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        desk = self._desk
+        pane = self._arena.pane_at(event.pos)
+        over = inside(self._arena.layout.panel, event.pos)
+        desk.cursor = self._arena.to_world(event.pos, pane) if pane is not None and not over else None
+        self._chart.hover = event.pos if not self._drag else None
+        if self._drag == "time":
+            time = self._chart.time_at(event.pos[0])
+            desk.attempt(lambda: desk.look_at(time))
+        elif self._drag == "pan":
+            self._arena.pan(*event.rel)
+        elif self._drag == "tool":
+            point = self._arena.to_world(event.pos, self._pane())
+            desk.attempt(lambda: desk.tool.move(desk.session, point))
+        elif desk.cursor is not None:
+            desk.tool.move(desk.session, desk.cursor)
+
+    def _released(self, event: pygame.event.Event) -> None:
+        desk, drag = self._desk, self._drag
+        if event.button != self._button:  # another one than the one that is held
+            return
+        self._drag = ""
+        clicked = _far(event.pos, self._pressed_at) < _SLIP
+        if drag == "tool":
+            point = self._arena.to_world(event.pos, self._pane())
+            desk.attempt(lambda: desk.tool.release(desk.session, point))
+        elif drag == "pan" and clicked and event.button == 3:
+            desk.attempt(lambda: desk.tool.finish(desk.session))
+        elif drag == "pan" and clicked and event.button == 1 and desk.tool is desk.hand:
+            desk.hand.selected = None
+            desk.version += 1
+
+    def _pane(self) -> int:
+        return min(self._held, len(self._arena.layout.panes) - 1)
+
+
+def _far(a: tuple[int, int], b: tuple[int, int]) -> float:
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -1,0 +1,419 @@
+"""The desk: what every key, button and typed command does, and what is to be shown. Knows no pygame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocov.controllers import CONTROLLERS
+from robocov.errors import InputError, ParameterError, RobocovError
+from robocov.mapfile import bundled_maps, load_map, save_map
+from robocov_app.terminal.output import free_name
+from robocov_app.viewer.brush import Brush
+from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
+from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
+from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.tools import Hand, Wall, toolbox
+from robocov_app.viewer.typed import command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from robocov.controllers.gains import Value
+    from robocov_app.viewer.costs import Costs
+    from robocov_app.viewer.session.pane import Lane
+    from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.tool import Point, Tool
+
+SAID_FOR = 5.0
+"""Seconds for which a message stays."""
+
+FADE = 12.0
+"""Seconds of path that trajectories show where they fade."""
+
+
+class Desk:
+    """What the user does, in terms of the session, and what of it is shown.
+
+    Parameters
+    ----------
+    session : Session
+    costs : Costs
+    shown : set of names of layers
+    folder : Path
+        Where things are saved.
+    map_name : str
+        What the user calls the map: a bundled name or a path.
+    laws : names of controllers
+        To choose from beside the built-in ones: installed ones, and those of the user's files.
+
+    Attributes
+    ----------
+    tool : Tool
+    active : int
+        Which pane gains and controllers are chosen for.
+    version : int
+        Grows whenever panel and arena have to look again at what there is.
+    message : str
+        What was said last, empty when it is old.
+    now : float, s
+        How long the desk has been used.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        costs: Costs,
+        shown: set[str],
+        folder: Path,
+        map_name: str = "",
+        laws: Iterable[str] = (),
+    ) -> None:
+        self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
+        self.map_name = map_name
+        self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
+        self.tools = toolbox()
+        self.tool: Tool = self.tools["hand"]
+        self.active = 0
+        self.version = 0
+        self.theme = "light"
+        self.fade = False
+        self.panel = True
+        self.message = ""
+        self.trouble = False
+        self.filming = False
+        self._said = 0.0
+        self.now = 0.0
+        self.cursor: Point | None = None
+        self._mapped: object = None
+        self._doing: dict[str, Callable[[], None]] = self._what_to_do()
+        self.look_at_map()
+
+    # what there is
+
+    @property
+    def hand(self) -> Hand:
+        """The tool that drags; it knows which robot is asked about."""
+        tool = self.tools["hand"]
+        assert isinstance(tool, Hand)
+        return tool
+
+    @property
+    def selected(self) -> int | None:
+        """The number of the robot that is asked about, if it is there."""
+        number = self.hand.selected
+        circumstances = self.session.circumstances(self.lane)
+        there = number in circumstances.numbers or number in circumstances.failed
+        return number if there else None
+
+    @property
+    def lane(self) -> Lane:
+        """The pane that is chosen."""
+        self.active = min(self.active, len(self.session.lanes) - 1)
+        return self.session.lanes[self.active]
+
+    def parameters(self) -> list[Parameter | Pick]:
+        """Return all sliders and words: the chosen controller's gains, then the team's limits."""
+        circumstances = self.session.circumstances(self.lane)
+        return [*gain_parameters(circumstances.law), *limit_parameters(circumstances.limits)]
+
+    def maps(self) -> list[str]:
+        """Return the maps to choose from: the bundled ones, and the one that is open."""
+        return list(dict.fromkeys([*bundled_maps(), *([self.map_name] if self.map_name else [])]))
+
+    # messages
+
+    def say(self, words: str, *, trouble: bool = False) -> None:
+        """Tell something for a while."""
+        if words:
+            self.message, self.trouble, self._said = words, trouble, self.now
+
+    def pass_time(self, seconds: float) -> None:
+        """Let the clock go on; old messages go."""
+        self.now += seconds
+        if self.message and self.now - self._said > SAID_FOR:
+            self.message = ""
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Do something; what cannot be done is told, in a sentence."""
+        try:
+            words = action()
+        except RobocovError as error:
+            self.say(plain(str(error)), trouble=True)
+        else:
+            if isinstance(words, str):
+                self.say(words)
+        self.version += 1
+        self.look_at_map()
+
+    def look_at_map(self) -> None:
+        """Let the cost know when there is another map."""
+        environment = self.session.environment
+        # while it is painted the cost would never be ready
+        if environment is not self._mapped and not getattr(self.tool, "painting", False):
+            self._mapped = environment
+            self.costs.environment(environment)
+
+    # doing
+
+    def do(self, name: str) -> bool:
+        """Do the action of this name; return whether it is one of the desk's."""
+        kind, _, what = name.partition(":")
+        if kind == "layer":
+            self.shown ^= {what}
+            self.version += 1
+            return True
+        if kind == "tool":
+            self.tool.cancel(self.session)
+            self.tool = self.tools[what]
+            self.say(f"{self.tool.title}: {self.tool.hint}")
+            self.version += 1
+            return True
+        if name not in self._doing:
+            return False
+        self.attempt(self._doing[name])
+        return True
+
+    def _what_to_do(self) -> dict[str, Callable[[], None]]:
+        return {
+            "pause": self.pause,
+            "step": lambda: self.session.step(),
+            "restart": self.restart,
+            "settle": self.settle,
+            "slower": lambda: self.change_speed(-1),
+            "faster": lambda: self.change_speed(1),
+            "seed": lambda: self.restart(seed=self.session.scenario.seed + 1),
+            "start": self.next_start,
+            "more": lambda: self.restart(robots=self.session.scenario.robots + 1),
+            "fewer": lambda: self.restart(robots=self.session.scenario.robots - 1),
+            "map:next": lambda: self.next_map(1),
+            "map:previous": lambda: self.next_map(-1),
+            "back": lambda: self.look_by(-1),
+            "forward": lambda: self.look_by(1),
+            "back:second": lambda: self.look_at(self.session.time - 1.0),
+            "forward:second": lambda: self.look_at(self.session.time + 1.0),
+            "first": lambda: self.look_at(0.0),
+            "live": lambda: self.session.look_at(self.session.end),
+            "branch": self.branch,
+            "law": self.next_law,
+            "pane:add": self.add_pane,
+            "pane:remove": lambda: self.session.remove_pane(self.lane),
+            "pane:next": self.next_pane,
+            "undo": self.undo,
+            "redo": self.redo,
+            "robot:next": lambda: self.ask_next(1),
+            "robot:previous": lambda: self.ask_next(-1),
+            "robot:fail": self.fail_or_revive,
+            "robot:remove": self.remove_robot,
+            "finish": lambda: self.say(self.tool.finish(self.session) or ""),
+            "cancel": self.cancel,
+            "wider": lambda: self.widen(1.25),
+            "narrower": lambda: self.widen(0.8),
+            "theme": self.switch_theme,
+            "fade": self.switch_fade,
+            "panel": self.switch_panel,
+            "save:map": self.save_map,
+        }
+
+    def pause(self) -> None:
+        """Play or pause."""
+        self.session.playing = not self.session.playing
+        self.session.stop_when_settled = False
+
+    def settle(self) -> None:
+        """Play until no robot gets anywhere any more."""
+        session = self.session
+        session.stop_when_settled = not session.stop_when_settled
+        if session.stop_when_settled:
+            session.playing = True
+            session.settled = False
+            self.say("plays until the team has settled")
+
+    def restart(self, **changes: object) -> None:
+        """Begin anew, with changes of the scenario if there are any."""
+        self.session.restart(**changes)
+
+    def change_speed(self, by: int) -> None:
+        """Play faster or slower."""
+        k = speed_index(self.session.clock.speed) + by
+        self.set_speed(SPEEDS[min(max(k, 0), len(SPEEDS) - 1)])
+
+    def set_speed(self, speed: float) -> None:
+        """Play so many simulated seconds per second."""
+        self.session.clock.speed = speed
+        self.say(f"speed {speed_words(speed)}")
+
+    def next_start(self) -> None:
+        """Begin anew at the next start of the map."""
+        names = self.starts()
+        now = self.session.scenario.start_name
+        # an obstacle may have covered the start since
+        k = names.index(now) if now in names else -1
+        self.restart(start=names[(k + 1) % len(names)])
+
+    def starts(self) -> list[str]:
+        """Return the names of the map's starts."""
+        return list(dict.fromkeys([*self.session.environment.starts, "uniform"]))
+
+    def next_map(self, by: int) -> None:
+        """Open the next map that has room for the team."""
+        maps = self.maps()
+        now = maps.index(self.map_name) if self.map_name in maps else 0
+        passed = []
+        for k in range(1, len(maps) + 1):
+            name = maps[(now + by * k) % len(maps)]
+            try:
+                self.open_map(name)
+            except InputError:
+                passed.append(name)
+                continue
+            if passed:
+                self.say(f"no room for {self.session.scenario.robots} robots: {', '.join(passed)}")
+            return
+
+    def open_map(self, name: str) -> None:
+        """Begin anew on another map.
+
+        Raises
+        ------
+        MapError, StartError
+            When it cannot be loaded, or has no room for the team.
+        """
+        self.session.restart(environment=load_map(name))
+        self.map_name = name
+
+    def look_by(self, moments: int) -> None:
+        """Look a few moments back or on; playing stops."""
+        self.session.playing = False
+        self.session.look_by(moments)
+
+    def look_at(self, time: float) -> None:
+        """Look at a moment; playing stops."""
+        self.session.playing = False
+        self.session.look_at(time)
+
+    def branch(self) -> None:
+        """Go on from the moment that is shown."""
+        if self.session.branch():
+            self.session.playing = True
+            self.say("goes on from here; what came after stays as a ghost curve")
+        else:
+            self.say("this is the present: go back first (←, or drag the time line)")
+
+    def next_law(self) -> None:
+        """Let the next controller take over in the chosen pane."""
+        now = self.session.circumstances(self.lane).law.name
+        k = self.laws.index(now) if now in self.laws else -1
+        self.session.set_law(self.lane, Law(self.laws[(k + 1) % len(self.laws)]))
+
+    def add_pane(self) -> None:
+        """Compare with a controller that is not there yet."""
+        there = {lane.law.name for lane in self.session.lanes}
+        name = next((name for name in self.laws if name not in there), self.laws[0])
+        self.session.add_pane(Law(name))
+        self.active = len(self.session.lanes) - 1
+        self.say("all begin anew, from the same starts")
+
+    def next_pane(self) -> None:
+        """Choose the next pane."""
+        self.active = (self.active + 1) % len(self.session.lanes)
+
+    def undo(self) -> None:
+        """Take the last edit back."""
+        words = self.session.undo.undo()
+        self.say(f"undone: {words}" if words else "nothing to undo")
+
+    def redo(self) -> None:
+        """Do again what was taken back."""
+        words = self.session.undo.redo()
+        self.say(f"done again: {words}" if words else "nothing to redo")
+
+    def ask_next(self, by: int) -> None:
+        """Ask the next robot."""
+        circumstances = self.session.circumstances(self.lane)
+        numbers = sorted([*circumstances.numbers, *circumstances.failed])
+        if self.selected is None:
+            self.hand.selected = numbers[0 if by > 0 else -1]
+        else:
+            self.hand.selected = numbers[(numbers.index(self.selected) + by) % len(numbers)]
+
+    def fail_or_revive(self) -> None:
+        """Let the robot that is asked fail, or work again."""
+        number = self._asked()
+        if number in self.session.circumstances(self.lane).failed:
+            self.session.revive_robot(number)
+        else:
+            self.session.fail_robot(number)
+
+    def remove_robot(self) -> None:
+        """Take the robot that is asked out."""
+        self.session.remove_robot(self._asked())
+
+    def _asked(self) -> int:
+        if self.selected is None:
+            raise ParameterError("no robot is chosen: click one first, or press Tab")
+        return self.selected
+
+    def cancel(self) -> None:
+        """Give up what is being drawn, else put the tool away."""
+        if not self.tool.cancel(self.session) and self.tool is not self.hand:
+            self.tool = self.hand
+
+    def widen(self, factor: float) -> None:
+        """Draw wider walls, or narrower ones; with the brush in hand, take a larger or smaller one."""
+        if isinstance(self.tool, Brush):
+            self.say(self.tool.widen(self.session, factor))
+            return
+        wall = self.tools["wall"]
+        assert isinstance(wall, Wall)
+        wall.widen(factor)
+        self.say(f"walls are {wall.width:g} m wide")
+
+    def switch_theme(self) -> None:
+        """Light or dark."""
+        self.theme = "dark" if self.theme == "light" else "light"
+
+    def switch_fade(self) -> None:
+        """Let trajectories fade, or not."""
+        self.fade = not self.fade
+        self.say(f"trajectories show the last {FADE:g} s" if self.fade else "trajectories stay")
+
+    def switch_panel(self) -> None:
+        """Hide the panel, or show it."""
+        self.panel = not self.panel
+
+    def save_map(self) -> None:
+        """Write the map as it is now to a file that is not there yet."""
+        stem = Path(self.map_name).stem or "map"
+        target = free_name(self.folder, stem, ".json")
+        save_map(self.session.environment, target)
+        self.map_name = str(target)
+        self.say(f"map saved: {target}")
+
+    def set_parameter(self, name: str, value: Value) -> None:
+        """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""
+        circumstances = self.session.circumstances(self.lane)
+        if name.startswith("team.") and not isinstance(value, str):
+            self.session.set_limits(with_limit(circumstances.limits, name, value))
+        else:
+            self.session.set_law(self.lane, circumstances.law.with_gain(name, value))
+
+    def set_law(self, pane: int, name: str) -> None:
+        """Let a controller take over in a pane."""
+        lane = self.session.lanes[pane]
+        if self.session.circumstances(lane).law.name != name:
+            self.session.set_law(lane, Law(name))
+        self.active = pane
+
+    def command(self, text: str) -> None:
+        """Do what was typed, see `typed.command`: ``k_rep 0.5``, ``robots 12``, ``map office``, ..."""
+        command(self, text)
+
+
+def plain(message: str) -> str:
+    """Return a message without the places in files that mean nothing in a window.
+
+    >>> plain("team.max_speed: 0 m/s, but a number was wanted")
+    'max_speed: 0 m/s, but a number was wanted'
+    """
+    return message.removeprefix("team.").removeprefix("obstacles: ")

@@ -1,0 +1,172 @@
+"""Cost against time, one curve for each pane, with what happened; bounded like everything here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from robocov.arrays import Array
+    from robocov_app.viewer.session.pane import Lane
+    from robocov_app.viewer.session.session import Session
+
+MOST_SAMPLES = 3000
+"""When a curve has so many, every second one of its older half goes."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened.
+
+    Attributes
+    ----------
+    time : float, s
+    kind : str
+        ``obstacle``, ``robot``, ``failure``, ``law``, ``limits`` or ``hand``.
+    text : str
+    """
+
+    time: float
+    kind: str
+    text: str
+
+
+class Curve:
+    """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
+
+    def __init__(self) -> None:
+        self._time: list[float] = []
+        self._value: list[float] = []
+
+    def __len__(self) -> int:
+        return len(self._time)
+
+    @property
+    def time(self) -> Array:
+        """Times, (k,) s."""
+        return np.array(self._time)
+
+    @property
+    def value(self) -> Array:
+        """Mean distances, (k,) m, or times, (k,) s."""
+        return np.array(self._value)
+
+    @property
+    def last_time(self) -> float:
+        """The time of the newest sample, s; minus infinity if there is none."""
+        return self._time[-1] if self._time else -np.inf
+
+    def add(self, time: float, value: float) -> None:
+        """Append a sample; one that is earlier than the last is left out, one of its time replaces it."""
+        if time < self.last_time - 1e-9 or not np.isfinite([time, value]).all():
+            return
+        if time <= self.last_time + 1e-9:
+            self._value[-1] = value
+            return
+        if len(self._time) >= MOST_SAMPLES:
+            half = MOST_SAMPLES // 2
+            self._time[:half] = self._time[:half:2]
+            self._value[:half] = self._value[:half:2]
+        self._time.append(time)
+        self._value.append(value)
+
+    def copy(self) -> Curve:
+        """Return a curve of its own with the same samples."""
+        twin = Curve()
+        twin._time, twin._value = self._time[:], self._value[:]
+        return twin
+
+    def cut(self, time: float) -> Curve:
+        """Forget what came after `time`; return it, the last sample before it too."""
+        k = int(np.searchsorted(self._time, time + 1e-6, side="right"))
+        rest = Curve()
+        rest._time, rest._value = self._time[max(k - 1, 0) :], self._value[max(k - 1, 0) :]
+        del self._time[k:], self._value[k:]
+        return rest
+
+    def at(self, time: float) -> float:
+        """Return the value at a time, between samples on the straight line; nan before the first.
+
+        After the last sample it is that one's.
+        """
+        if not self._time or time < self._time[0] - 1e-6:
+            return float("nan")
+        return float(np.interp(time, self._time, self._value))
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """The rest of a curve that was left when the run was resumed from an earlier moment.
+
+    Attributes
+    ----------
+    law : str
+        Name of the controller.
+    words : str
+        What was different then.
+    time : (k,) s
+    value : (k,) m or s
+    of : str
+        What the value is: "distance" or "time".
+    """
+
+    law: str
+    words: str
+    time: Array
+    value: Array
+    of: str = "distance"
+
+
+class Plotted(NamedTuple):
+    """What can be plotted.
+
+    Attributes
+    ----------
+    name : str
+    title, short : str
+        As people call it.
+    unit : str
+    """
+
+    name: str
+    title: str
+    short: str
+    unit: str
+
+
+DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean distance", "m")
+TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")
+
+
+def speeds_of(session: Session, lane: Lane) -> Array | None:
+    """Return how fast each robot that is shown can go, (n,) m/s; None where all are equally fast.
+
+    Robots that have failed are remembered: who is left may be equally fast, and the curve goes on.
+    """
+    there = session.circumstances(lane)
+    if "max_speed" not in dict(there.limits.different):
+        return None
+    return there.limits.team(there.numbers).max_speed
+
+
+def chosen(session: Session, wanted: Plotted) -> Plotted:
+    """Return what is plotted: what is wanted, if there is a choice."""
+    return wanted if any(len(lane.times) for lane in session.lanes) else DISTANCE
+
+
+def curve_of(lane: Lane, what: Plotted) -> Curve:
+    """Return a lane's curve of what is plotted."""
+    return lane.times if what is TIME else lane.curve
+
+
+def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
+    """Return the newest time not after now for which the costs of all panes are known, and these by number.
+
+    They come in one after the other; a pane without any yet is left out.
+    """
+    curves = {lane.number: curve_of(lane, what) for lane in session.lanes if len(curve_of(lane, what))}
+    time = min([session.time, *(curve.last_time for curve in curves.values())])
+    values = {number: curve.at(time) for number, curve in curves.items()}
+    return time, {number: value for number, value in values.items() if np.isfinite(value)}

@@ -1,0 +1,272 @@
+"""The past of a run, so that it can be looked at again and resumed from: bounded, thinned with age."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from robocov.environment import CircleObstacle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from robocov.arrays import Array, IntArray
+    from robocov.conditions import Conditions
+    from robocov.conditions.perception import Inbox
+    from robocov.environment import Environment
+    from robocov.observation import Decision
+    from robocov.robots import Team
+    from robocov_app.viewer.session.scenario import Law, Limits
+
+MOST_BYTES = 24_000_000
+"""Memory that the moments of a window may take."""
+
+_OVERHEAD = 700
+"""Bytes that a moment of one pane takes beside its arrays."""
+
+_FEWEST = 300
+"""Moments that are kept however large they are."""
+
+_KEPT = 0.75
+"""Of the moments, so many stay at most when they are thinned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Circumstances:
+    """What stays as it is from one touch to the next.
+
+    Attributes
+    ----------
+    environment : Environment
+        The map as it is, without robots that failed.
+    law : Law
+    limits : Limits
+    numbers : (n,) int
+        What people call the robots that work, in the order of the rows.
+    failed : dict of number to (x, y) m
+        Robots that stand where they failed.
+    conditions : Conditions or None
+        What goes wrong with messages and sensors; None: nothing. Failing and joining is not among it.
+    """
+
+    environment: Environment
+    law: Law
+    limits: Limits
+    numbers: tuple[int, ...]
+    failed: Mapping[int, tuple[float, float]]
+    conditions: Conditions | None = None
+
+    @property
+    def solid(self) -> Environment:
+        """The map with the robots that failed as obstacles, which is what the others sense."""
+        if not self.failed:
+            return self.environment
+        radii = tuple(map(self.limits.radius_of, self.failed))
+        return _with_wrecks(self.environment, tuple(self.failed.values()), radii)
+
+    @property
+    def team(self) -> Team:
+        """The robots that work."""
+        return self.limits.team(self.numbers)
+
+
+# circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
+@lru_cache(maxsize=8)
+def _with_wrecks(
+    environment: Environment, places: tuple[tuple[float, float], ...], radii: tuple[float, ...]
+) -> Environment:
+    wrecks = tuple(map(CircleObstacle, places, radii))
+    return replace(environment, obstacles=(*environment.obstacles, *wrecks))
+
+
+class State(NamedTuple):
+    """One pane at one moment.
+
+    Attributes
+    ----------
+    circumstances : Circumstances
+    positions, velocities : (n, 2) m and m/s
+    memory : object
+        What the controller remembered; None where it can do without.
+    recorded : Decision or None
+        What was decided then, where it comes from a record.
+    inbox : Inbox or None
+        The messages that the robots had; None where they know the others as they are.
+    """
+
+    circumstances: Circumstances
+    positions: Array
+    velocities: Array
+    memory: Any
+    recorded: Decision | None = None
+    inbox: Inbox | None = None
+
+
+class Moment(NamedTuple):
+    """All panes at one moment.
+
+    Attributes
+    ----------
+    step : int
+        Steps since the start.
+    states : dict of pane to State
+    """
+
+    step: int
+    states: Mapping[int, State]
+
+
+class History:
+    """Moments in their order.
+
+    When they would take more than `most_bytes`, the older ones are thinned: of those that have grown old
+    only every second step stays, of still older ones every fourth, and so on. The newest all stay, and so
+    do, unless they are too many themselves, those since which something was touched.
+
+    Parameters
+    ----------
+    dt : float, s
+    most_bytes : int
+    """
+
+    def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
+        self.dt = dt
+        self._most = most_bytes
+        self._moments: list[Moment] = []
+        self._steps: list[int] = []
+        self._sizes: list[int] = []
+        self._bytes = 0
+        self.thinned = 0
+        """How many moments are gone."""
+
+    def __len__(self) -> int:
+        return len(self._moments)
+
+    def __getitem__(self, k: int) -> Moment:
+        return self._moments[k]
+
+    @property
+    def last(self) -> Moment:
+        """The newest moment."""
+        return self._moments[-1]
+
+    @property
+    def steps(self) -> list[int]:
+        """The steps of the moments, ascending; not to be changed."""
+        return self._steps
+
+    def since(self, k: int) -> list[Moment]:
+        """Return the moments from number `k` on."""
+        return self._moments[k:]
+
+    def time(self, k: int) -> float:
+        """Return the time of moment `k`, s."""
+        return self._steps[k] * self.dt
+
+    def add(self, moment: Moment) -> None:
+        """Append a moment that is later than all."""
+        self._moments.append(moment)
+        self._steps.append(moment.step)
+        self._sizes.append(_size(moment))
+        self._bytes += self._sizes[-1]
+        count = len(self._moments) + 1
+        while self._bytes > self._most and _FEWEST < len(self._moments) < count:
+            count = len(self._moments)
+            self._thin()
+
+    def amend(self, moment: Moment) -> None:
+        """Replace the newest moment, if it is of the same step; else append."""
+        if self._moments and self._moments[-1].step == moment.step:
+            self.cut(len(self._moments) - 2)
+        self.add(moment)
+
+    def at(self, time: float) -> int:
+        """Return the number of the last moment not after `time`, the first if there is none."""
+        return max(bisect_right(self._steps, time / self.dt + 1e-6) - 1, 0)
+
+    def cut(self, k: int) -> None:
+        """Forget what came after moment `k`."""
+        self._bytes -= sum(self._sizes[k + 1 :])
+        del self._moments[k + 1 :], self._steps[k + 1 :], self._sizes[k + 1 :]
+
+    def until(self, k: int) -> History:
+        """Return a history of its own that ends with moment `k`."""
+        twin = History(self.dt, self._most)
+        twin._moments, twin._steps = self._moments[: k + 1], self._steps[: k + 1]
+        twin._sizes = self._sizes[: k + 1]
+        twin._bytes, twin.thinned = sum(twin._sizes), self.thinned
+        return twin
+
+    def _thin(self) -> None:
+        """Leave at most `_KEPT`: all of the newest, ever fewer of what is older."""
+        count = len(self._moments)
+        steps = np.array(self._steps)
+        age = steps[-1] - steps
+        touched = np.array([True, *map(_changes, self._moments, self._moments[1:])])
+        for always in (touched, np.arange(count) == 0):
+            whole, keep = count // 2, np.ones(count, dtype=bool)
+            while whole > 1 and keep.sum() > _KEPT * count:
+                whole //= 2
+                keep = always | (steps % _strides(age, int(age[-1 - whole])) == 0)
+            if keep.sum() <= _KEPT * count:
+                break
+        kept = np.flatnonzero(keep).tolist()
+        self.thinned += count - len(kept)
+        self._moments = [self._moments[k] for k in kept]
+        self._steps = [self._steps[k] for k in kept]
+        self._sizes = [self._sizes[k] for k in kept]
+        self._bytes = sum(self._sizes)
+
+
+def _strides(age: IntArray, recent: int) -> IntArray:
+    """Return of how many steps one is kept at ages: 1 while recent, 2, 4, 8 as the age doubles.
+
+    >>> _strides(np.array([0, 100, 101, 200, 201, 401, 801]), 100).tolist()
+    [1, 1, 2, 2, 4, 8, 16]
+    """
+    return np.asarray(2 ** np.ceil(np.log2(np.maximum(age / recent, 1.0))).astype(np.intp))
+
+
+def _changes(before: Moment, after: Moment) -> bool:
+    """Whether something was touched between two moments: such are kept, so that no event is lost."""
+    return any(
+        pane in before.states and before.states[pane].circumstances is not state.circumstances
+        for pane, state in after.states.items()
+    )
+
+
+def _size(moment: Moment) -> int:
+    """Return about how many bytes a moment takes."""
+    return sum(
+        _OVERHEAD
+        + state.positions.nbytes
+        + state.velocities.nbytes
+        + _bytes_of(state.memory)
+        + _bytes_of(state.inbox)
+        for state in moment.states.values()
+    )
+
+
+def _bytes_of(memory: Any, depth: int = 4) -> int:
+    """Return about how many bytes a memory takes, by the arrays in it."""
+    if isinstance(memory, np.ndarray):
+        return memory.nbytes
+    if memory is None or depth == 0:
+        return 0
+    if isinstance(memory, str | bytes):
+        return len(memory)
+    parts: Iterable[Any] = ()
+    if isinstance(memory, Mapping):
+        parts = memory.values()
+    elif isinstance(memory, Collection):
+        parts = memory
+    elif is_dataclass(memory):
+        parts = (getattr(memory, item.name) for item in fields(memory))
+    elif hasattr(memory, "__dict__"):
+        parts = vars(memory).values()
+    return 50 + sum(_bytes_of(part, depth - 1) for part in parts)

@@ -1,0 +1,298 @@
+"""One controller at work on the team: a pane of the window."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from robocov.controllers import remembers
+from robocov.errors import StartError
+from robocov.simulation import Simulation
+from robocov.world.relocation import relocated
+from robocov_app.render.sensed import Sensed
+from robocov_app.viewer.session.curves import Curve, Ghost
+from robocov_app.viewer.session.history import Circumstances, State
+from robocov_app.viewer.session.scenario import branch_words
+from robocov_app.viewer.session.trail import Trail
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from robocov.arrays import Array
+    from robocov.environment import Environment
+    from robocov.observation import Decision
+    from robocov.robots import Team
+    from robocov_app.viewer.session.scenario import Law
+
+SENSED_EVERY = 3
+"""What is sensed is noted at every so many steps."""
+
+
+class Wanted(NamedTuple):
+    """How a lane is to go on.
+
+    Attributes
+    ----------
+    circumstances : Circumstances
+    positions, velocities : (n, 2) m and m/s, or None
+        By default the present ones.
+    """
+
+    circumstances: Circumstances
+    positions: Array | None = None
+    velocities: Array | None = None
+
+
+class Lane:
+    """A team under one controller, which can be touched.
+
+    A robot that failed stands where it is and says nothing: the others do not hear it any more, but their
+    range sensors see it, as they see any obstacle.
+
+    Parameters
+    ----------
+    number : int
+        Of the pane, for good.
+    circumstances : Circumstances
+    positions : (n, 2) m
+    dt : float, s
+    velocities : (n, 2) m/s or None
+        At rest by default.
+    time : float, s
+
+    Raises
+    ------
+    StartError
+        When a robot is in a wall or in another one.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        circumstances: Circumstances,
+        positions: Array,
+        dt: float,
+        velocities: Array | None = None,
+        time: float = 0.0,
+    ) -> None:
+        self.number = number
+        self.circumstances = circumstances
+        self.simulation = simulation_of(circumstances, positions, dt, velocities, time)
+        self.starts = np.array(positions, dtype=float)
+        self.trail = Trail(len(positions))
+        self.trail.add(time, self.simulation.positions)
+        self.curve, self.times = Curve(), Curve()
+        self.sensed = Sensed()
+        self._steps = 0
+
+    @property
+    def law(self) -> Law:
+        """The controller as it was chosen."""
+        return self.circumstances.law
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """What people call the robots that work, row by row."""
+        return self.circumstances.numbers
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.simulation.time
+
+    def row(self, number: int) -> int | None:
+        """Return the row of a robot by its number; None where it does not work."""
+        return self.numbers.index(number) if number in self.numbers else None
+
+    def decide(self) -> Decision:
+        """Let the controller decide on the present, which the next step carries out.
+
+        Raises
+        ------
+        ParameterError
+            When it fails.
+        """
+        return self.simulation.snapshot.decision
+
+    def step(self, pushes: Array | None = None) -> None:
+        """Make one control step."""
+        if self._steps % SENSED_EVERY == 0:
+            seen = self.simulation.snapshot.seen
+            self.sensed.add(seen.time, self.numbers, seen.obstacle_points)
+        self._steps += 1
+        self.simulation.step(pushes)
+        self.trail.add(self.time, self.simulation.positions)
+
+    def leave(self, time: float) -> list[Ghost]:
+        """Cut the curves at a time, s; return what came after it, where there is more than a moment."""
+        self.curve, self.times = self.curve.copy(), self.times.copy()
+        rests = (("distance", self.curve.cut(time)), ("time", self.times.cut(time)))
+        words = branch_words(self.law)
+        return [Ghost(self.law.name, words, rest.time, rest.value, of) for of, rest in rests if len(rest) > 1]
+
+    def state(self) -> State:
+        """Return what is needed to go on from here."""
+        simulation = self.simulation
+        # who wrote a controller may have it change what it remembers
+        memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
+        return State(
+            self.circumstances, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox
+        )
+
+    def resume(self, state: State, simulation: Simulation, starts: Array, trail: Trail) -> None:
+        """Go on from an earlier state.
+
+        Parameters
+        ----------
+        state : State
+        simulation : Simulation
+            What `resumed` returns of it.
+        starts : (n, 2) m
+        trail : Trail
+            Up to then, of the robots that worked then.
+        """
+        self.circumstances, self.simulation = state.circumstances, simulation
+        self.starts, self.trail = starts, trail
+        self.sensed = self.sensed.copy()
+        self.sensed.cut(simulation.time)
+
+    def changed(self, wanted: Wanted) -> Simulation:
+        """Return the simulation that goes on from here as wanted; the lane stays as it is.
+
+        Robots that do not fit any more are pushed out of what is in the way.
+
+        Raises
+        ------
+        StartError
+            When there is no room for a robot.
+        ParameterError
+            When the controller or the team does not take a value.
+        """
+        old, circumstances = self.simulation, wanted.circumstances
+        environment, team = circumstances.solid, circumstances.team
+        # the same controller goes on remembering
+        controller = None if circumstances.law == self.law else circumstances.law.made()
+        if self._only_weighed(wanted):
+            return old.with_density(environment)
+        changed = _fitted(
+            lambda positions, velocities: old.changed(
+                environment=environment,
+                controller=controller,
+                team=team,
+                positions=positions,
+                velocities=velocities,
+            ),
+            environment.at(old.time),
+            team,
+            old.positions if wanted.positions is None else wanted.positions,
+            old.velocities if wanted.velocities is None else wanted.velocities,
+        )
+        if old.inbox is not None and circumstances.numbers != self.numbers:
+            # who stays keeps the messages of who stays
+            rows = [-1 if self.row(number) is None else self.row(number) for number in circumstances.numbers]
+            changed = changed.remembering(changed.memory, old.inbox.rearranged(np.array(rows, dtype=np.intp)))
+        return changed
+
+    def _only_weighed(self, wanted: Wanted) -> bool:
+        """Return whether nothing is wanted to be otherwise but the density, as when it is painted."""
+        now, then = self.circumstances, wanted.circumstances
+        alike = all(
+            getattr(now, name) == getattr(then, name) for name in ("law", "limits", "numbers", "failed")
+        )
+        placed = wanted.positions is not None or wanted.velocities is not None
+        return alike and not placed and then.environment.same_place(now.environment)
+
+    def take(self, circumstances: Circumstances, simulation: Simulation) -> None:
+        """Go on with what `changed` returned."""
+        if circumstances.numbers != self.numbers:
+            self._renumber(self.numbers, circumstances.numbers, simulation.positions)
+        self.simulation, self.circumstances = simulation, circumstances
+        self.trail.add(self.time, simulation.positions, always=True)
+
+    def _renumber(self, before: Sequence[int], after: Sequence[int], positions: Array) -> None:
+        """Let trail and starts follow the robots that are there now."""
+        old, times = self.trail.positions, self.trail.time
+        trail = Trail(len(after))
+        rows = np.full((len(old), len(after), 2), np.nan)
+        starts = np.array(positions, dtype=float)
+        for row, number in enumerate(after):
+            if number in before:
+                rows[:, row] = old[:, before.index(number)]
+                starts[row] = self.starts[before.index(number)]
+        for time, place in zip(times.tolist(), rows, strict=True):
+            trail.add(time, place, always=True)
+        self.trail, self.starts = trail, starts
+
+
+def with_failed(circumstances: Circumstances) -> Environment:
+    """Return the map with the robots that failed as obstacles, which is what the others sense."""
+    return circumstances.solid
+
+
+def simulation_of(
+    circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None, time: float
+) -> Simulation:
+    """Return a simulation in these circumstances.
+
+    Raises
+    ------
+    StartError, ParameterError
+        As `Simulation`.
+    """
+    return Simulation(
+        circumstances.solid,
+        circumstances.law.made(),
+        positions,
+        circumstances.team,
+        dt,
+        velocities=velocities,
+        time=time,
+        conditions=circumstances.conditions,
+    )
+
+
+def resumed(state: State, dt: float, time: float) -> Simulation:
+    """Return a simulation that goes on from a state, with what the controller remembered.
+
+    Raises
+    ------
+    StartError, ParameterError
+        When there is no room for robots that were pressed too far into something, or the controller
+        cannot begin any more.
+    """
+    circumstances = state.circumstances
+    simulation = _fitted(
+        lambda positions, velocities: simulation_of(circumstances, positions, dt, velocities, time),
+        circumstances.solid.at(time),
+        circumstances.team,
+        state.positions,
+        state.velocities,
+    )
+    if state.memory is not None or state.inbox is not None:
+        memory = simulation.memory if state.memory is None else state.memory
+        simulation = simulation.remembering(memory, state.inbox)
+    return simulation
+
+
+def _fitted(
+    make: Callable[[Array, Array], Simulation],
+    environment: Environment,
+    team: Team,
+    positions: Array,
+    velocities: Array,
+) -> Simulation:
+    """Return what `make` makes of (n, 2) m and m/s; robots that do not fit come to rest where they do.
+
+    Raises
+    ------
+    StartError
+        When there is no room for a robot.
+    """
+    try:
+        return make(positions, velocities)
+    except StartError:
+        placed = relocated(environment, positions, team)
+        moved = np.hypot(*(placed - positions).T) > 1e-3
+        return make(placed, np.where(moved[:, None], 0.0, velocities))

@@ -1,0 +1,339 @@
+"""Saved runs in the window again: as the past of a session that can be looked at and gone on from."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from robocov.controllers import CONTROLLERS, informed, remembers
+from robocov.errors import InputError, ParameterError, RobocovError
+from robocov.observation import Decision
+from robocov_app.runs.saved import roster_of
+from robocov_app.viewer.session.curves import Event
+from robocov_app.viewer.session.history import MOST_BYTES, Circumstances, History, Moment, State
+from robocov_app.viewer.session.pane import SENSED_EVERY, Lane, resumed
+from robocov_app.viewer.session.scenario import MOST_PANES, Law, Limits, Scenario
+from robocov_app.viewer.session.session import Session
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from robocov.arrays import Array
+    from robocov.controllers.base import Controller
+    from robocov.controllers.gains import Gain, Option
+    from robocov.observation import Observations
+    from robocov.observation.region import Region
+    from robocov.record import Record
+    from robocov.robots import Team
+    from robocov_app.runs.saved import Saved
+
+MOST_OF_RECORDS = 400_000_000
+"""Bytes that the moments of records may take, beside their arrays; of longer ones old moments are thinned."""
+
+_OF_A_MOMENT = 1500
+"""About how many bytes a moment of one pane takes, beside those arrays."""
+
+
+@dataclass(frozen=True)
+class LostLaw(Law):
+    """A controller that is not loaded, or does not take its gains: its runs can be looked at.
+
+    Attributes
+    ----------
+    title : str
+        What people called it.
+    reason : str
+        Why it cannot be had.
+    """
+
+    title: str = ""
+    reason: str = ""
+
+    @property
+    def label(self) -> str:
+        """The controller as people called it."""
+        return self.title
+
+    @property
+    def known(self) -> dict[str, Gain | Option]:
+        """Nothing is known of its gains."""
+        return {}
+
+    def made(self) -> Controller:
+        """Say that there is no such controller.
+
+        Raises
+        ------
+        ParameterError
+            Always.
+        """
+        raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
+
+
+@dataclass(frozen=True)
+class _StandIn(LostLaw):
+    """What holds the place of a lost controller at the end of its run, until somebody wants to go on."""
+
+    def made(self) -> Controller:
+        return _Nobody(self)
+
+
+@dataclass(frozen=True)
+class _Nobody:
+    name: ClassVar[str] = "nobody"
+    label: ClassVar[str] = "nobody"
+    summary: ClassVar[str] = "stands for a controller that is not there any more"
+    law: LostLaw
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Nothing is remembered."""
+
+    def decide(self, seen: Observations, memory: None) -> Decision:
+        """Say that there is no such controller."""
+        LostLaw.made(self.law)
+        raise AssertionError
+
+
+def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) -> Session:
+    """Return a session whose past is a saved run, or the runs of a comparison side by side.
+
+    Its beginning is looked at, and it plays.
+
+    Parameters
+    ----------
+    saved : sequence of Saved
+    controllers : sequence of str
+        Those that may be loaded beside the built-in ones, so that their runs can be gone on with: names
+        that the user has typed, never ones of the runs themselves.
+
+    Raises
+    ------
+    InputError
+        When the runs do not go together, or are none that the window can show.
+    """
+    saved = [each._replace(record=_paced(each.record)) for each in saved]
+    records = [each.record for each in saved]
+    _check(saved)
+    rosters = [roster_of(record) for record in records]
+    first, dt = records[0], control_dt(records[0])
+    limits, environment = Limits.of(first.team, rosters[0].numbers), rosters[0].environment
+    laws = [law_of(record, controllers) for record in records]
+    casts = [
+        Circumstances(environment, law, limits, roster.numbers, roster.failed)
+        for law, roster in zip(laws, rosters, strict=True)
+    ]
+    history = _history_of(records, casts, dt)
+    begin = history[0].states[0]
+    standing = begin._replace(circumstances=_standing(begin.circumstances))
+    given = resumed(standing._replace(memory=None), dt, 0.0)
+    # robots that join later have no place yet but that in the record
+    places, moving = np.array(first.positions[0]), np.array(first.velocities[0])
+    places[first.working[0]], moving[first.working[0]] = given.positions, given.velocities
+    session = Session(
+        Scenario(
+            environment,
+            tuple(_standing(cast).law for cast in casts),
+            len(first.team),
+            first.start if first.start in environment.starts else None,
+            first.seed or 0,
+            limits,
+            dt,
+            places,
+            moving if first.velocities[0].any() else None,
+            first.conditions,
+        )
+    )
+    session.scenario = replace(session.scenario, laws=tuple(laws))
+    for lane, each in zip(session.lanes, saved, strict=True):
+        _put(lane, each, history)
+    session.recall(session.lanes, history)
+    session.events.extend(_events_of(first))
+    return session
+
+
+def control_dt(record: Record) -> float:
+    """Return the control period, s; moments of a record may be farther apart than that."""
+    dt = float(record.session.get("control_dt_s", record.dt))
+    return dt if abs(record.dt / dt - round(record.dt / dt)) < 1e-6 else record.dt
+
+
+def _paced(record: Record) -> Record:
+    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even.
+
+    So do those of the window that are thinned with age.
+    """
+    gap = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
+    steps = round(gap / record.dt)
+    if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
+        return record
+    return replace(
+        record, dt=steps * record.dt, session={**record.session, "control_dt_s": control_dt(record)}
+    )
+
+
+def law_of(record: Record, controllers: Sequence[str] = ()) -> Law:
+    """Return the controller of a record: a built-in one, or the one of `controllers` that is called as it."""
+    kind = record.controller.rpartition(":")[2]
+    known = [name for name in controllers if name.rpartition(":")[2] == kind]
+    if record.controller in (*CONTROLLERS, *known):
+        law = Law(record.controller, dict(record.gains))
+    elif known:
+        law = Law(known[0], dict(record.gains))
+    else:
+        name = f"FILE.py:{kind}" if kind != record.controller else kind
+        reason = (
+            f"{record.label} is none of robocov's controllers; to go on, open it with --controller {name}"
+        )
+        return LostLaw(record.controller, dict(record.gains), record.label, reason)
+    try:
+        law.made()
+        gains = {name: value for name, value in law.gains.items() if value != law.known[name].default}
+        return replace(law, gains=gains)
+    except RobocovError as error:
+        return LostLaw(record.controller, dict(record.gains), record.label, str(error))
+
+
+def _check(saved: Sequence[Saved]) -> None:
+    """Make sure that the window can show the runs, all of them in step."""
+    if not 1 <= len(saved) <= MOST_PANES:
+        raise InputError(
+            f"{saved[0].folder.parent}: {len(saved)} runs, but the window has room for {MOST_PANES}; "
+            f"--frames and --video show all"
+        )
+    first = saved[0].record
+    for each in saved:
+        record, where = each.record, each.folder
+        even = np.arange(len(record)) * record.dt
+        if not np.allclose(record.time - record.time[0], even, rtol=1e-6, atol=1e-3 * record.dt):
+            raise InputError(f"{where / 'record.npz'}: time: moments {record.dt:g} s apart were wanted")
+        for what, mine, others in (
+            ("dt_s", record.dt, first.dt),
+            ("moments", len(record), len(first)),
+            ("team", record.team.to_dict(), first.team.to_dict()),
+            ("robots", roster_of(record).numbers, roster_of(first).numbers),
+            ("conditions", record.conditions, first.conditions),
+        ):
+            if mine != others:
+                raise InputError(
+                    f"{where}: {what}: {mine}, but {others} as in {saved[0].folder} was wanted; "
+                    f"--frames and --video show both"
+                )
+
+
+def _standing(circumstances: Circumstances) -> Circumstances:
+    """Return the circumstances with somebody in the place of a controller that is not there any more."""
+    law = circumstances.law
+    if not isinstance(law, LostLaw):
+        return circumstances
+    return replace(circumstances, law=_StandIn(law.name, law.gains, law.title, law.reason))
+
+
+def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], dt: float) -> History:
+    """Return the past that records tell of; its arrays are theirs."""
+    first = records[0]
+    stride = round(first.dt / dt)
+    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
+    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
+    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
+    for k in range(len(first)):
+        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}))
+    return history
+
+
+def _states_of(record: Record, cast: Circumstances) -> list[State]:
+    positions, velocities, forces, goals = (
+        _fixed(array) for array in (record.positions, record.velocities, record.forces, record.goals)
+    )
+    nowhere = [bool(np.isnan(rows).all()) for rows in goals]
+    states = []
+    for k, (memory, there) in enumerate(
+        zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
+    ):
+        rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
+        decision = Decision(forces[k][rows], None if nowhere[k] else goals[k][rows])
+        states.append(State(there, positions[k][rows], velocities[k][rows], memory, decision))
+    return states
+
+
+def _circumstances_of(record: Record, cast: Circumstances) -> Iterator[Circumstances]:
+    """Yield the circumstances of each moment: who worked then, and who had failed.
+
+    What robots had heard no record tells: who goes on from a moment lets them begin with no messages.
+    """
+    if record.conditions is None:
+        yield from [cast] * len(record)
+        return
+    known: dict[bytes, Circumstances] = {}
+    rest = record.conditions.of_robots_that_stay()
+    for places, working, there in zip(record.positions, record.working, record.present, strict=True):
+        key = working.tobytes() + there.tobytes()
+        if key not in known:
+            failed = {
+                cast.numbers[row]: tuple(places[row].tolist()) for row in np.flatnonzero(there & ~working)
+            }
+            numbers = tuple(cast.numbers[row] for row in np.flatnonzero(working))
+            known[key] = replace(cast, numbers=numbers, failed={**cast.failed, **failed}, conditions=rest)
+        yield known[key]
+
+
+def _memories_of(record: Record, law: Law) -> list[Any]:
+    """Return what the controller remembered at each moment.
+
+    A record does not tell, but the controller can be asked again. Where it does not decide as it did, it is
+    not what it was: from there on it is to begin anew.
+    """
+    nothing: list[Any] = [None] * len(record)
+    if isinstance(law, LostLaw):
+        return nothing
+    controller = law.made()
+    if not remembers(controller):
+        return nothing
+    found: list[Any] = []
+    try:
+        controller = informed(controller, record.environment.static)
+        memory = controller.begin(record.environment.region, record.team)
+        for k in range(len(record)):
+            found.append(deepcopy(memory))
+            decision = controller.decide(record.snapshot(k).seen, memory)
+            if not np.allclose(decision.forces, record.forces[k], rtol=1e-9, atol=1e-9):
+                break
+            memory = decision.memory
+    except (Exception, SystemExit):  # a user's controller may do anything
+        pass
+    return found + nothing[len(found) :]
+
+
+def _put(lane: Lane, saved: Saved, history: History) -> None:
+    """Let a lane be at the end of a run."""
+    record, last = saved.record, history.last
+    state = last.states[lane.number]
+    standing = state._replace(circumstances=_standing(state.circumstances))
+    lane.simulation = resumed(standing, history.dt, last.step * history.dt)
+    lane.circumstances = state.circumstances
+    lane.starts = record.positions[0][record.working[-1]]
+    for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
+        numbers = history[k].states[lane.number].circumstances.numbers
+        lane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
+    if saved.history is not None:
+        for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
+            lane.curve.add(float(time), float(value))
+        if saved.history.mean_time is not None:
+            for time, value in zip(saved.history.time, saved.history.mean_time, strict=True):
+                lane.times.add(float(time), float(value))
+
+
+def _events_of(record: Record) -> list[Event]:
+    """Return when robots were dragged."""
+    return [
+        Event(touched["to_s"], "hand", f"robot {', '.join(map(str, touched['robots']))} was dragged")
+        for touched in record.session.get("touched", ())
+    ]
+
+
+def _fixed(array: Array) -> Array:
+    view = array.view()
+    view.setflags(write=False)
+    return view

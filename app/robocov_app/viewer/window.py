@@ -1,0 +1,406 @@
+"""The window: events in, frames out. What happens between is the desk's and the session's."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+
+from robocov.errors import RobocovError
+from robocov.files.atomic import written
+from robocov_app.render.picture import standard_layers
+from robocov_app.render.theme import theme_named
+from robocov_app.runs.recording import png_bytes
+from robocov_app.terminal.output import free_name
+from robocov_app.viewer.actions import all_actions
+from robocov_app.viewer.arena import Arena
+from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.film import FPS as FILM_FPS
+from robocov_app.viewer.film import Film, pixels
+from robocov_app.viewer.inspector import report_on
+from robocov_app.viewer.keyboard import Keyboard
+from robocov_app.viewer.layout import inside, laid_out
+from robocov_app.viewer.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
+from robocov_app.viewer.panel import TABS, Panel
+from robocov_app.viewer.pointer import Pointer
+from robocov_app.viewer.presenter import plain
+from robocov_app.viewer.report_page import ReportPage
+from robocov_app.viewer.screen import shown, undisturbed
+from robocov_app.viewer.session.curves import speeds_of
+from robocov_app.viewer.session.keeping import Keeper
+from robocov_app.viewer.status import HINT, draw_status, facts
+from robocov_app.viewer.tour import Tour
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.viewer.inspector import Report
+    from robocov_app.viewer.presenter import Desk
+
+FPS = 60
+"""Frames per second that are aimed at."""
+
+_ASKED_AGAIN = 0.2
+"""Seconds between two looks of the inspector."""
+
+_SELDOM = 0.1
+"""Seconds after which the panel looks at its widgets also while nobody is near."""
+
+_PAN = 60
+"""Pixels that a key pans."""
+
+_GOES_ON_WITH = frozenset({"help", "theme", "screenshot", "film", "panel", "fullscreen", "quit"})
+"""What may be done without ending the tour."""
+
+OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+"""Types of events that the mouse makes."""
+
+
+class Window:
+    """Shows a desk and lets it be touched.
+
+    Parameters
+    ----------
+    desk : Desk
+    size : (width, height), px
+    scale : float
+        Of text and lines.
+    patient : bool
+        Nobody watches: films wait for their encoder instead of leaving frames out.
+    screen : pygame.Surface or None
+        Of a window that is there already.
+    """
+
+    hint = HINT
+
+    def __init__(
+        self,
+        desk: Desk,
+        size: tuple[int, int],
+        scale: float,
+        *,
+        patient: bool = False,
+        screen: pygame.Surface | None = None,
+    ) -> None:
+        self.desk = desk
+        self.scale = scale
+        self.closed = False
+        self.help = False
+        self.tour: Tour | None = None
+        self.film: Film | None = None
+        self.keeper = Keeper()
+        self.titles = {layer.name: layer.title for layer in standard_layers()}
+        self.windowed: tuple[int, int] | None = None
+        self.screen = screen or shown(size)
+        pygame.display.set_caption("robocov")
+        self.arena = Arena(desk, theme_named(desk.theme))
+        self.chart = Chart(desk)
+        self.panel = Panel(desk, self.titles, self.do)
+        self.palette = Palette(desk, self.titles)
+        self.report_page = ReportPage()
+        self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
+        actions = all_actions(self.titles)
+        self.keyboard = Keyboard(desk, self.panel, self.palette, actions, lambda name: self.do(name))
+        self._patient = patient
+        self._own = self._what_to_do()
+        self._arranged: tuple[object, ...] | None = None
+        self._report: Report | None = None
+        self._report_at = 0.0
+        self._now = 0.0
+        self._rate = float(FPS)
+        self._steps_rate = 0.0
+        self._serial = -1
+        self._unseen = 0.0
+        self._arrange()
+        self.draw()
+
+    # frames
+
+    def run(self) -> None:
+        """Go on until the window is closed."""
+        clock = pygame.time.Clock()
+        before = perf_counter()
+        try:
+            with undisturbed():
+                while not self.closed:
+                    now = perf_counter()
+                    self.frame(now - before)
+                    before = now
+                    clock.tick(FPS)
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End what is going on beside the window."""
+        if self.film is not None:
+            self.desk.attempt(self.toggle_film)
+        self.desk.costs.close()
+
+    def frame(self, seconds: float) -> None:
+        """Take what has happened, let so many seconds pass, and draw."""
+        self.advance(seconds)
+        if not self.closed:
+            self.draw()
+            if self.film is not None:
+                self.film.add(self.screen, seconds)
+
+    def advance(self, seconds: float) -> None:
+        """Take what has happened, and let so many seconds pass."""
+        for event in pygame.event.get():
+            self.take(event)
+        if self.closed:
+            return
+        self._now += seconds
+        if seconds > 0:
+            self._rate += 0.05 * (min(1.0 / seconds, 1000.0) - self._rate)
+        self._pass_time(seconds)
+        self._ask_costs()
+        self._arrange()
+        self._update_panel(seconds)
+        self.pointer.show()
+
+    def _pass_time(self, seconds: float) -> None:
+        desk, session = self.desk, self.desk.session
+        desk.pass_time(seconds)
+        for words, trouble in self.keeper.poll():
+            desk.say(words, trouble=trouble)
+        if self.tour is not None:
+            self.tour.advance(seconds)
+            if self.tour.done:
+                self.tour = None
+        playing = session.playing
+        try:
+            steps = session.advance(seconds)
+            for lane in session.lanes:
+                session.snapshot(lane)  # what is decided belongs to the simulation, not to drawing
+        except RobocovError as error:
+            steps = 0
+            desk.say(plain(str(error)), trouble=True)
+        if session.playing != playing:
+            desk.version += 1
+            if session.settled:
+                desk.say(f"settled at {session.time:.1f} s")
+        if seconds > 0:
+            self._steps_rate += 0.1 * (steps / seconds - self._steps_rate)
+        desk.look_at_map()
+
+    def _ask_costs(self) -> None:
+        """Ask for the cost of what is shown, and note the answers that tell of the present."""
+        desk, session = self.desk, self.desk.session
+        if session.serial != self._serial:
+            self._serial = session.serial
+            desk.costs.forget()
+        point = None
+        if "path" in desk.shown and desk.cursor is not None:
+            point = np.array(desk.cursor)
+        for lane in session.lanes:
+            positions = session.positions(lane)
+            known = desk.costs.known.get(lane.number)
+            if (
+                known is not None
+                and point is None
+                and abs(known.time - session.time) < 1e-9
+                and np.array_equal(known.result.positions, positions)
+            ):
+                continue
+            desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
+        for pane, known in desk.costs.poll():
+            for lane in session.lanes:
+                if lane.number == pane and known.time <= lane.time + 1e-9:
+                    lane.curve.add(known.time, known.result.mean_distance)
+                    if known.travel_time is not None:
+                        lane.times.add(known.time, known.travel_time)
+
+    def _arrange(self) -> None:
+        """Lay the window out anew when its size, look or number of panes is another."""
+        desk, session = self.desk, self.desk.session
+        size = self.screen.get_size()
+        panes = len(session.lanes)
+        rows = self.arena.shared_rows() if panes > 1 and self._arranged else 1
+        low_x, low_y, high_x, high_y = session.environment.region.bounds
+        aspect = (high_x - low_x) / (high_y - low_y)
+        outer = (size, self.scale, desk.panel, desk.theme)
+        key = (outer, panes, round(aspect, 3), max(rows, 1))
+        if key == self._arranged:
+            return
+        before, self._arranged = self._arranged, key
+        theme = theme_named(desk.theme)
+        layout = laid_out(size, self.scale, panes, aspect, panel=desk.panel, legend_rows=max(rows, 1))
+        self.layout, self.theme = layout, theme
+        self.arena.arrange(layout, theme)
+        self.chart.arrange(layout, theme)
+        if before is None or outer != before[0]:
+            self.panel.arrange(layout, theme)
+
+    def _update_panel(self, seconds: float) -> None:
+        """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
+        self._unseen += seconds
+        self.panel.covered = self.tour is not None
+        near = inside(self.layout.panel, self.pointer.at) or self.panel.busy
+        if near or self._unseen >= _SELDOM:
+            self.panel.update(self._unseen)
+            self._unseen = 0.0
+
+    def draw(self) -> None:
+        """Draw everything, and show it."""
+        layout, theme, desk = self.layout, self.theme, self.desk
+        if len(layout.panes) > 1:
+            self.screen.fill(theme.background, pygame.Rect(layout.arena))
+        self.arena.draw(self.screen)
+        self.chart.draw(self.screen)
+        filmed = None if self.film is None else self.film.frames / FILM_FPS
+        said = facts(desk, self._rate, self._steps_rate, filmed)
+        draw_status(self.screen, layout, theme, said, self.hint)
+        if layout.panel[2] and self.tour is not None:
+            draw_tour(self.screen, layout, theme, self.tour)
+        elif layout.panel[2]:
+            self.panel.fill(self.screen)
+            if self.panel.tab == "robot":
+                self._inspect()
+                self.report_page.draw(self.screen, self.panel.body, theme, layout.scale, self._report)
+            self.panel.draw(self.screen)
+        if self.tour is not None and not layout.panel[2]:
+            draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
+        draw_message(self.screen, desk, layout, theme)
+        if self.help:
+            draw_help(self.screen, layout, theme, self.titles)
+        elif self.palette.open:
+            self.palette.draw(self.screen, layout, theme)
+        pygame.display.flip()
+
+    def _over_report(self) -> bool:
+        covered = self.tour is not None or self.panel.unfolded
+        return self.panel.tab == "robot" and inside(self.panel.body, self.pointer.at) and not covered
+
+    def _inspect(self) -> None:
+        """Let the inspector explain the robot that is asked, a few times a second."""
+        number = self.desk.selected
+        if number is None:
+            self._report = None
+        elif self._report is None or not 0.0 <= self._now - self._report_at < _ASKED_AGAIN:
+            self._report_at = self._now
+            self._report = report_on(self.desk, number)
+
+    # doing
+
+    def do(self, name: str) -> None:
+        """Do the action of this name."""
+        if self.tour is not None and name in ("back", "forward"):
+            self.tour.skip(1 if name == "forward" else -1)
+            return
+        if name not in _GOES_ON_WITH and self._end_tour() and name in ("cancel", "tour"):
+            return
+        if name == "cancel" and (self.help or self.palette.open):
+            self.help = self.palette.open = False
+            return
+        if name in self._own:
+            self.desk.attempt(self._own[name])
+        else:
+            self.desk.do(name)
+        self._report = None
+        if name in ("robot:next", "robot:previous"):
+            self.panel.show_tab("robot")
+
+    def _what_to_do(self) -> dict[str, Callable[[], object]]:
+        return {
+            "fit": self.arena.fit,
+            "zoom:in": lambda: self.arena.zoom(1.25, self._middle()),
+            "zoom:out": lambda: self.arena.zoom(0.8, self._middle()),
+            "pan:left": lambda: self.arena.pan(_PAN, 0),
+            "pan:right": lambda: self.arena.pan(-_PAN, 0),
+            "pan:up": lambda: self.arena.pan(0, _PAN),
+            "pan:down": lambda: self.arena.pan(0, -_PAN),
+            "plot": self.chart.switch,
+            "tab": self._next_tab,
+            "fullscreen": self._fullscreen,
+            "screenshot": self.screenshot,
+            "film": self.toggle_film,
+            "help": self._toggle_help,
+            "palette": self.palette.show,
+            "tour": self._start_tour,
+            "save:run": self._save_run,
+            "quit": self._quit,
+        }
+
+    def _end_tour(self) -> bool:
+        if self.tour is None:
+            return False
+        self.tour.end()
+        self.tour = None
+        self.desk.say("the tour has ended")
+        return True
+
+    def _middle(self) -> tuple[float, float]:
+        if self.arena.pane_at(self.pointer.at) is not None:
+            return self.pointer.at
+        left, top, width, height = self.layout.panes[0]
+        return left + width / 2, top + height / 2
+
+    def _next_tab(self) -> None:
+        self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
+
+    def _fullscreen(self) -> None:
+        # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
+        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
+        self.screen = shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+
+    def _toggle_help(self) -> None:
+        self.help = not self.help
+
+    def _quit(self) -> None:
+        self.closed = True
+
+    def _start_tour(self) -> None:
+        self.tour = Tour(self.desk, self.arena.fit)
+
+    def _save_run(self) -> str:
+        return self.keeper.save(self.desk.session, self.desk.folder, self.desk.map_name)
+
+    def screenshot(self) -> str:
+        """Save what is in the window as a PNG."""
+        target = free_name(self.desk.folder, "robocov", ".png")
+        with written(target) as part:
+            part.write_bytes(png_bytes(pixels(self.screen)))
+        return f"screenshot saved: {target}"
+
+    def toggle_film(self) -> str:
+        """Begin to record what is in the window, or end it."""
+        if self.film is None:
+            target = free_name(self.desk.folder, "robocov", ".mp4")
+            self.film = Film(target, self.screen.get_size(), patient=self._patient)
+            self.desk.filming = True
+            return f"recording {target}; F9 ends it"
+        film, self.film = self.film, None
+        self.desk.filming = False
+        film.close()
+        left_out = f", {film.left_out} frames left out" if film.left_out else ""
+        return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
+
+    # events
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take one event."""
+        if event.type == pygame.QUIT:
+            self.closed = True
+        elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+            self.screen = pygame.display.get_surface() or self.screen
+        elif event.type == pygame.KEYDOWN:
+            self.keyboard.press(event)
+        elif event.type == pygame.TEXTINPUT and self.palette.open:
+            self.keyboard.letters(event.text)
+        elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
+            self.help = self.palette.open = False
+        elif event.type == pygame.MOUSEWHEEL and self._over_report():
+            self.report_page.wheel(event.y, self.scale)
+        elif event.type in OF_THE_MOUSE:
+            self.pointer.take(event, self._now)
+        elif event.type == pygame.WINDOWLEAVE:
+            self.pointer.leave()
+        else:
+            if event.type == pygame.KEYUP:
+                self.keyboard.release(event)
+            elif event.type == pygame.WINDOWFOCUSLOST:
+                self.keyboard.leave()
+            self.panel.take(event)

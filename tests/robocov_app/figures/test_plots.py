@@ -1,0 +1,392 @@
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from clear_pages import all_clear, overlap
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from robocov.errors import ParameterError
+from robocov.robots import Team
+from robocov.voronoi import partition
+from robocov_app.figures.curves import end_label, spread
+from robocov_app.figures.page import tone
+from robocov_app.figures.runs import (
+    plot_comparison,
+    plot_cost,
+    plot_environment,
+    plot_trajectories,
+    save_figure,
+)
+from robocov_app.render.theme import DARK, LIGHT
+
+SIZES = [(900, 600), (1400, 901), (2560, 1440)]
+MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]
+T = np.linspace(0.0, 60.0, 121)
+
+
+def curves(*finals):
+    names = ["rapf", "rpf", "lloyd", "other"]
+    return [
+        (name.upper(), name, T, final + 2 * np.exp(-T / 10))
+        for name, final in zip(names, finals, strict=False)
+    ]
+
+
+@pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
+@pytest.mark.parametrize("size", [None, *SIZES])
+def test_nothing_covers_or_cuts_anything(environment, size):
+    record = run_of(environment, 6)
+    all_clear(plot_trajectories(record, size=size, mean_distance=1.2345))
+    all_clear(plot_environment(environment, size=size))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("size", [None, (900, 600), (2560, 1440)])
+@pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
+    records = [run_of(environment, 4, seed=k) for k in range(count)]
+    figure = plot_comparison(records, size=size, mean_distances=[1.0 + k for k in range(count)])
+    assert len(figure.axes) == count
+    all_clear(figure)
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}) == 1
+    sizes = np.array([axes.get_window_extent().size for axes in figure.axes])
+    assert np.ptp(sizes, axis=0).max() < 1e-6
+    words = [text.get_text() for text in figure.texts]
+    for k in range(count):
+        assert any(f"mean distance {1.0 + k:.3f} m" in text for text in words)
+
+
+def test_maps_of_different_sizes_are_compared_at_one_scale():
+    figure = plot_comparison([run_of(ROOMS, 3), run_of(HALL, 3)])
+    first, second = figure.axes
+    assert first.get_xlim() == second.get_xlim() == (0.0, 16.0)
+    assert first.get_ylim() == second.get_ylim() == (0.0, 11.0)
+
+
+@pytest.mark.parametrize("environment", MAPS, ids=lambda map_: map_.name)
+def test_the_arena_is_not_distorted(environment):
+    axes = plot_trajectories(run_of(environment, 3), size=(1000, 800)).axes[0]
+    box = axes.get_window_extent()
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    assert box.width / (right - left) == pytest.approx(box.height / (high - low))
+
+
+@pytest.mark.parametrize("size", [*SIZES, (641, 487)])
+def test_a_png_has_exactly_the_pixels_asked_for(tmp_path, size):
+    path = tmp_path / "a.png"
+    for figure in (plot_trajectories(run_of(ROOMS, 3), size=size), plot_cost(curves(1.0), size=size)):
+        save_figure(figure, path)
+        assert pygame.image.load(path).get_size() == size
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
+
+
+class TestTrajectories:
+    def test_the_papers_colours_and_the_records_positions(self):
+        record = run_of(ROOMS, 5)
+        axes = plot_trajectories(record).axes[0]
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        assert {to_rgb(c) for c in lines.get_colors()} == {tone(LIGHT.trajectory)}
+        for robot, segment in enumerate(lines.get_segments()):
+            assert segment == pytest.approx(record.positions[:, robot])
+        (finals,) = [
+            c for c in axes.collections if isinstance(c, PathCollection) and not isinstance(c, LineCollection)
+        ]
+        assert np.asarray(finals.get_offsets()) == pytest.approx(record.positions[-1])
+        assert {to_rgb(c) for c in finals.get_facecolors()} == {tone(LIGHT.final)}
+        starts = next(line for line in axes.lines if line.get_marker() == "o")
+        assert np.asarray(starts.get_xydata()) == pytest.approx(record.positions[0])
+        assert to_rgb(starts.get_markeredgecolor()) == tone(LIGHT.start)
+        assert starts.get_markerfacecolor() == "none"
+
+    def test_cells_and_centroids_are_the_final_ones(self):
+        record = run_of(ROOMS, 5)
+        axes = plot_trajectories(record).axes[0]
+        cells = partition(record.positions[-1], ROOMS.region)
+        (drawn,) = [c for c in axes.collections if isinstance(c, PolyCollection)]
+        assert len(drawn.get_paths()) == 5
+        assert drawn.get_paths()[2].vertices[:-1] == pytest.approx(cells.polygons[2])
+        marks = next(line for line in axes.lines if line.get_marker() == "+")
+        assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroid)
+
+    def test_no_centroid_peeps_out_from_under_a_robot(self):
+        record = run_of(ROOMS, 5)
+        last = partition(record.positions[-1], ROOMS.region).centroid
+        for _ in range(60):
+            last = partition(last, ROOMS.region).centroid
+        positions, goals = (np.concatenate([past, last[None]]) for past in (record.positions, record.goals))
+        arrived = replace(record, positions=positions, goals=goals)
+        axes = plot_trajectories(arrived).axes[0]
+        marks = next(line for line in axes.lines if line.get_marker() == "+")
+        assert len(marks.get_xydata()) == 0
+
+    def test_a_controller_without_goals_has_no_centroids(self):
+        figure = plot_trajectories(run_of(ROOMS, 5, controller="rpf"))
+        assert not any(line.get_marker() == "+" for line in figure.axes[0].lines)
+        (legend,) = figure.legends
+        assert "cell centroid" not in [text.get_text() for text in legend.get_texts()]
+        mixed = plot_comparison([run_of(ROOMS, 5, controller="rpf"), run_of(ROOMS, 5)])
+        (legend,) = mixed.legends
+        words = [text.get_text() for text in legend.get_texts()]
+        assert words[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
+
+    def test_goals_of_another_kind_are_called_goals(self):
+        record = run_of(ROOMS, 5)
+        goals = record.goals.copy()
+        goals[-1] = record.positions[-1] + np.array([0.8, 0.3])
+        axes = plot_trajectories(replace(record, goals=goals)).axes[0]
+        (marks,) = (line for line in axes.lines if line.get_marker() == "x")
+        assert marks.get_xydata() == pytest.approx(goals[-1])
+        assert not any(line.get_marker() == "+" for line in axes.lines)
+        (legend,) = plot_comparison([replace(record, goals=goals), record]).legends
+        words = [text.get_text() for text in legend.get_texts()]
+        assert {"goal", "cell centroid"} < set(words)
+
+    def test_a_crowd_stays_readable(self):
+        record = run_of(ROOMS, 120)
+        last = record.positions[-1].copy()
+        last[:100] = 2.0 + 0.12 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
+        record = replace(
+            record,
+            positions=np.concatenate([record.positions[:-1], last[None]]),
+            team=Team.homogeneous(120, radius=0.03),
+        )
+        axes = plot_trajectories(record, size=(1000, 700)).axes[0]
+        (finals,) = [c for c in axes.collections if type(c) is PathCollection]
+        radius = np.sqrt(finals.get_sizes()) / 2 * axes.figure.dpi / 72
+        pixels = axes.transData.transform(last)
+        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2) + 1e9 * np.eye(120)
+        assert (radius[:, None] + radius[None] <= apart + 1e-6)[:100, :100].all()
+        assert radius[100:].max() > 1.2 * radius[:100].max()
+        numbered = {int(text.get_text()) for text in axes.texts}
+        assert not numbered & set(range(12, 90)) and numbered & set(range(101, 121))
+        few = plot_trajectories(run_of(ROOMS, 6), size=(1000, 700)).axes[0]
+        widths = [
+            next(c for c in a.collections if isinstance(c, LineCollection)).get_linewidths()[0]
+            for a in (axes, few)
+        ]
+        assert widths[0] < 0.7 * widths[1]
+
+    def test_every_robot_has_its_number(self):
+        record = run_of(ROOMS, 12, seed=4)
+        texts = plot_trajectories(record).axes[0].texts
+        assert [text.get_text() for text in texts] == [str(k) for k in range(1, 13)]
+        assert [text.get_position() for text in texts] == [tuple(p) for p in record.positions[-1].tolist()]
+
+    @pytest.mark.parametrize("n", [5, 40])
+    def test_robots_colours(self, n):
+        axes = plot_trajectories(run_of(ROOMS, n), colours="robots", theme=DARK).axes[0]
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        assert len({to_rgb(c) for c in lines.get_colors()}) == (5 if n == 5 else 1)
+        with pytest.raises(ParameterError, match="colours"):
+            plot_trajectories(run_of(ROOMS, 2), colours="rainbow")
+
+    def test_title_and_legend(self):
+        figure = plot_trajectories(run_of(ROOMS, 6), mean_distance=1.23456)
+        words = [text.get_text() for text in figure.texts]
+        assert any("RAPF" in text and "rooms" in text for text in words)
+        assert any("t = 3.9 s" in t and "mean distance 1.235 m" in t and "6 robots" in t for t in words)
+        (legend,) = figure.legends
+        entries = [text.get_text() for text in legend.get_texts()]
+        assert entries[:3] == ["start", "trajectory", "final position"]
+        assert "obstacle (unknown to robots)" in entries
+        (legend,) = plot_trajectories(run_of(CORRIDOR, 3)).legends
+        assert "obstacle (unknown to robots)" not in [text.get_text() for text in legend.get_texts()]
+
+    def test_the_scale_bar_is_as_long_as_it_says(self):
+        figure = plot_trajectories(run_of(ROOMS, 3))
+        box = figure.axes[0].get_window_extent()
+        bars = [artist for artist in figure.artists if isinstance(artist, Line2D)]
+        bar = max(bars, key=lambda line: np.ptp(line.get_xdata()))
+        pixels = np.ptp(bar.get_xdata()) * figure.bbox.width
+        label = next(t.get_text() for t in figure.texts if re.fullmatch(r"[\d.]+ m", t.get_text()))
+        assert pixels / (box.width / 16.0) == pytest.approx(float(label.split()[0]))
+
+    def test_on_axes_of_somebody_else(self):
+        figure = Figure()
+        axes = figure.subplots()
+        assert plot_trajectories(run_of(ROOMS, 3), axes) is figure
+        assert axes.get_xlabel() == "x (m)" and axes.get_ylabel() == "y (m)"
+        assert axes.get_aspect() == 1.0
+        assert not figure.legends
+
+
+class TestText:
+    """Sizes in pixels of what is read: it grows with the page."""
+
+    def heights(self, figure):
+        return [text.get_fontsize() * figure.dpi / 72 for text in figure.findobj(Text) if text.get_text()]
+
+    @pytest.mark.parametrize(
+        "draw", [plot_trajectories, lambda record, size: plot_comparison([record] * 3, size=size)]
+    )
+    def test_it_grows_with_the_page(self, draw):
+        small, large = (draw(run_of(ROOMS, 3), size=size) for size in ((960, 640), (2880, 1920)))
+        assert min(self.heights(large)) == pytest.approx(3 * min(self.heights(small)), rel=0.35)
+
+    def test_a_comparison_is_read_when_it_is_shown_at_half_its_size(self):
+        figure = plot_comparison([run_of(ROOMS, 3)] * 3)
+        assert figure.bbox.width == pytest.approx(1600, abs=0.1)
+        assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
+
+    def test_what_all_runs_share_is_said_once(self):
+        figure = plot_comparison([run_of(ROOMS, 3), run_of(ROOMS, 3, controller="rpf")])
+        words = [text.get_text() for text in figure.texts]
+        assert sum("t = 3.9 s" in text for text in words) == 1
+        different = plot_comparison([run_of(ROOMS, 3, steps=40), run_of(ROOMS, 3, steps=21)])
+        words = " ".join(text.get_text() for text in different.texts)
+        assert "t = 3.9 s" in words and "t = 2.0 s" in words
+
+    @pytest.mark.parametrize(("environment", "rows"), [(ROOMS, 1), (CORRIDOR, 3)])
+    def test_wide_maps_stand_below_each_other(self, environment, rows):
+        figure = plot_comparison([run_of(environment, 3)] * 3)
+        assert len({round(axes.get_position().y0, 6) for axes in figure.axes}) == rows
+
+
+class TestCost:
+    def test_curves_on_each_other_are_all_seen(self):
+        """Each is wider than the next, which lies on it, and has dashes and a mark of its own."""
+        figure = plot_cost(curves(1.0, 1.0, 1.0, 1.0))
+        long = [line for line in figure.axes[0].lines if len(line.get_xdata()) == len(T)]
+        widths = [line.get_linewidth() for line in long]
+        assert (np.diff(widths) < -0.5).all()
+        assert [line.get_zorder() for line in long] == sorted(line.get_zorder() for line in long)
+        dashes = {str(line._dash_pattern) for line in long}
+        marks = {line.get_marker() for line in figure.axes[0].lines if len(line.get_xdata()) == 1}
+        assert len(dashes) == len(marks) == 4
+
+    def test_a_controller_looks_alike_in_every_company(self):
+        time, values = T, 1.0 + np.exp(-T)
+        alone = plot_cost([("LA", "lloyd", time, values)]).axes[0].lines
+        among = plot_cost([("mine", "mine", time, values), ("LA", "lloyd", time, values)]).axes[0].lines
+        assert alone[0].get_color() == among[2].get_color()
+        assert alone[0]._dash_pattern == among[2]._dash_pattern
+        assert alone[1].get_marker() == among[3].get_marker()
+
+    def test_two_controllers_of_ones_own_differ(self):
+        first, _, second, *_ = plot_cost([("a", "a", T, T + 1), ("b", "b", T, T + 2)]).axes[0].lines
+        assert first.get_color() != second.get_color()
+
+    @pytest.mark.parametrize("end", [1.0, 20.0, 60.0, 90.0])
+    def test_times_are_round_numbers(self, end):
+        figure = plot_cost([("A", "rapf", np.linspace(0, end, 9), np.linspace(2, 1, 9))])
+        figure.canvas.draw()
+        words = [text.get_text() for text in figure.axes[0].get_xticklabels()]
+        assert len(words) >= 3
+        assert all(re.fullmatch(r"\d+|0\.\d", word) for word in words)
+
+    def test_values_units_and_the_papers_colours(self):
+        given_curves = curves(1.0, 1.4)
+        figure = plot_cost(given_curves)
+        axes = figure.axes[0]
+        assert "(s)" in axes.get_xlabel() and "(m)" in axes.get_ylabel()
+        long = [line for line in axes.lines if len(line.get_xdata()) == len(T)]
+        for line, (_, name, time, values) in zip(long, given_curves, strict=True):
+            assert np.asarray(line.get_xdata()).tolist() == time.tolist()
+            assert np.asarray(line.get_ydata()).tolist() == values.tolist()
+            assert to_rgb(line.get_color()) == tone(LIGHT.controllers[name])
+        assert len({str(line.get_linestyle()) for line in long}) == 2
+        assert [text.get_text() for text in axes.texts] == ["RAPF  1.005 m", "RPF  1.405 m"]
+
+    @pytest.mark.parametrize("finals", [(1.0,), (1.0, 1.0, 1.0, 1.0), (1.0, 1.01, 3.0), (0.0, 0.001, 0.002)])
+    @pytest.mark.parametrize("size", [(900, 600), (2560, 1440), (500, 320)])
+    def test_labels_stand_apart_in_order_and_on_the_page(self, finals, size):
+        figure = plot_cost(curves(*finals), size=size)
+        figure.canvas.draw()
+        renderer = figure.canvas.get_renderer()
+        axes = figure.axes[0]
+        words = [text.get_window_extent(renderer) for text in axes.texts if isinstance(text, Text)]
+        arena = axes.get_window_extent()
+        for k, box in enumerate(words):
+            assert box.x0 > arena.x1 and box.x1 <= size[0] and box.y0 >= 0 and box.y1 <= size[1]
+            assert not any(overlap(box, other) for other in words[k + 1 :])
+        heights = [box.y0 for box in words]
+        assert np.argsort(heights, kind="stable").tolist() == np.argsort(finals, kind="stable").tolist()
+        for text in [*axes.get_xticklabels(), *axes.get_yticklabels(), axes.xaxis.label, axes.yaxis.label]:
+            if text.get_text():
+                box = text.get_window_extent(renderer)
+                assert box.x0 >= 0 and box.y0 >= 0
+
+    def test_gaps_and_constant_curves(self):
+        values = np.full(len(T), 2.0)
+        values[-3:] = np.nan
+        figure = plot_cost([("A", "rapf", T, values)])
+        assert figure.axes[0].texts[0].get_text() == "A  2.000 m"
+        low, high = figure.axes[0].get_ylim()
+        assert low < 2.0 < high
+
+    @pytest.mark.parametrize(
+        "bad", [[], [("A", "rapf", T, T[:-1])], [("A", "rapf", T, np.full(len(T), np.nan))]]
+    )
+    def test_what_cannot_be_plotted_is_named(self, bad):
+        with pytest.raises(ParameterError, match="curve"):
+            plot_cost(bad)
+
+    @given(st.lists(st.floats(0, 100), min_size=1, max_size=8), st.floats(0.1, 10))
+    def test_spread_keeps_order_gap_and_limits(self, heights, gap):
+        given_heights = np.array(heights)
+        placed = spread(given_heights, gap, 0.0, 100.0)
+        order = np.argsort(given_heights, kind="stable")
+        assert (np.diff(placed[order]) >= gap * (1 - 1e-9)).all()
+        assert placed.min() >= -1e-9 and placed.max() <= 100 + 1e-9
+        if len(heights) == 1 or np.diff(np.sort(given_heights)).min() >= gap:
+            assert placed == pytest.approx(given_heights)
+
+
+_LAZY = """
+import sys
+import robocov_app.figures.runs
+assert "matplotlib" not in sys.modules
+sys.path.insert(0, sys.argv[1])
+from clear_pages import all_clear, boxes, overlap
+from drawn_run import ROOMS, run_of
+robocov_app.figures.runs.plot_trajectories(run_of(ROOMS, 3))
+assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
+"""
+
+
+def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
+    done = subprocess.run(
+        [sys.executable, "-c", _LAZY, str(Path(__file__).parents[1])],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["cost $x^2$ and $y$", "$\\frac$ [/] {", "倉庫 🤖"])
+def test_names_are_words_whatever_is_in_them(name, tmp_path):
+    """No formula, and no warning (an error here) of letters that the font has not."""
+    record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
+    save_figure(plot_trajectories(record), tmp_path / "a.png")
+    figure = plot_trajectories(record)
+    assert any(name in text.get_text() for text in figure.texts)
+    assert not any(text.get_parse_math() for text in figure.texts)
+    save_figure(plot_cost([(name, "mine", record.time, record.time)]), tmp_path / "b.svg")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (12.3456, "m", "RAPF  12.346 m"),
+        (3.14159, "s", "RAPF  3.142 s"),
+        (252.845, "J", "RAPF  252.8 J"),
+        (73.946, "%", "RAPF  73.95 %"),
+        (12345.6, "J", "RAPF  12,346 J"),
+        (2.0, "", "RAPF  2.000"),
+    ],
+)
+def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
+    assert end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words

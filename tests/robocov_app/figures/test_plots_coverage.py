@@ -1,0 +1,140 @@
+import numpy as np
+import pytest
+from clear_pages import overlap
+from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
+from PIL import Image
+
+from robocov.cost import CoverageCost
+from robocov.errors import ParameterError
+from robocov_app.figures.coverage import Moment, plot_coverage
+from robocov_app.figures.curves import DISTANCE, TIME
+from robocov_app.figures.runs import save_figure
+from robocov_app.render.field import Field, FieldLattice
+from robocov_app.render.shading import FARTHEST, palette, round_limit
+from robocov_app.render.theme import DARK, LIGHT
+
+T = np.linspace(0.0, 60.0, 61)
+COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, SHAFT)}
+
+
+def moment_of(environment, n=5, seed=0):
+    cost = COSTS[environment.name]
+    record = run_of(environment, n, seed=seed)
+    positions = environment.start("spread").sample(n, seed)
+    return Moment.last_of(record, Field(FieldLattice(cost.sites), cost(positions)), 1.234)
+
+
+def curves(count):
+    return [(f"Law {k}", "rapf", T, 1.0 + k + np.exp(-T / 9)) for k in range(count)]
+
+
+def written(figure):
+    """Return the extents of all words, whole axes with the words that belong to them, and legends."""
+    renderer = figure.canvas.get_renderer()
+    words = [text for text in figure.texts if text.get_text()]
+    extents = [part.get_window_extent(renderer) for part in (*words, *figure.legends)]
+    for axes in figure.axes:
+        named = axes.axison
+        extents.append(axes.get_tightbbox(renderer) if named else axes.get_window_extent(renderer))
+    return extents
+
+
+@pytest.mark.parametrize(("count", "with_curves"), [(1, True), (2, False), (3, True), (5, True)])
+@pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
+@pytest.mark.parametrize("environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
+    moments = [moment_of(environment, seed=k) for k in range(count)]
+    figure = plot_coverage(curves(count if with_curves else 0), moments, size=size)
+    extents = written(figure)
+    page = figure.bbox
+    for k, box in enumerate(extents):
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= page.x1 + 1 and box.y1 <= page.y1 + 1
+        for other in extents[:k]:
+            assert not overlap(box, other)
+    maps = [axes for axes in figure.axes if not axes.axison]
+    assert len(maps) == count
+    for axes in maps:
+        box = axes.get_window_extent()
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
+@pytest.mark.parametrize("count", [1, 3])
+def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
+    figure = plot_coverage(
+        curves(count), [moment_of(HALL, seed=k) for k in range(count)], size=size, times=curves(count)
+    )
+    labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+    assert labels == [DISTANCE, TIME]
+    extents = written(figure)
+    for k, box in enumerate(extents):
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1
+        for other in extents[:k]:
+            assert not overlap(box, other)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_the_colours_are_those_of_the_scale(theme, tmp_path):
+    moment = moment_of(HALL)
+    figure = plot_coverage([], [moment], theme)
+    save_figure(figure, tmp_path / "a.png")
+    pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
+    (axes,) = [axes for axes in figure.axes if not axes.axison]
+    limit = round_limit(moment.field.largest)
+    geodesics = COSTS["hall"].geodesics
+    hits = 0
+    for place in COSTS["hall"].points[::97]:
+        exact = geodesics.distances(place[None], moment.field.result.positions)[0]
+        column, height = axes.transData.transform(place)
+        row = len(pixels) - 1 - int(height)
+        around = pixels[row - 3 : row + 4, int(column) - 3 : int(column) + 4].reshape(-1, 3)
+        wanted = palette(theme)[int(exact.min() / limit * FARTHEST)].astype(int)
+        first, second = np.sort(exact)[:2]
+        if first > 0.8 and second - first > 0.3:
+            hits += 1
+            assert np.abs(around - wanted).max(axis=1).min() <= 4
+    assert hits > 10
+    (bar,) = [axes for axes in figure.axes if axes.axison]
+    assert bar.get_xlim() == (0.0, limit)
+    assert bar.get_xticklabels()[-1].get_text() == f"{limit:g} m"
+
+
+def test_all_maps_are_in_one_scale_of_colours():
+    near, far = moment_of(ROOMS, n=12), moment_of(ROOMS, n=1)
+    figure = plot_coverage([], [near, far])
+    (bar,) = [axes for axes in figure.axes if axes.axison]
+    assert bar.get_xlim()[1] == round_limit(far.field.largest) > near.field.largest
+
+
+def test_the_words_say_what_is_seen():
+    figure = plot_coverage(curves(1), [moment_of(ROOMS)], title="Coverage cost  ·  rooms")
+    words = [text.get_text() for text in figure.texts]
+    assert "Coverage cost  ·  rooms" in words
+    assert "distance to the nearest robot" in words
+    assert any(text.startswith("mean distance 1.234 m after") for text in words)
+    (legend,) = figure.legends
+    said = [text.get_text() for text in legend.get_texts()]
+    assert said == ["robot", "geodesic cell border", "obstacle", "no robot can come"]
+    (legend,) = plot_coverage(curves(1), [moment_of(SHAFT)]).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["robot", "geodesic cell border"]
+
+
+def test_the_same_plot_gives_the_same_bytes(tmp_path):
+    for name in ("a.svg", "b.svg", "a.png", "b.png"):
+        save_figure(plot_coverage(curves(1), [moment_of(HALL)]), tmp_path / name)
+    for suffix in (".svg", ".png"):
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("size", [(320, 240), (719, 900), (1200, 399)])
+def test_a_small_page_has_the_curves_alone(size):
+    figure = plot_coverage(curves(2), [moment_of(HALL)], size=size)
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "time (s)"
+    assert tuple(figure.canvas.get_width_height()) == size
+
+
+def test_no_moments_are_refused():
+    with pytest.raises(ParameterError, match="moments: none were given"):
+        plot_coverage(curves(1), [])

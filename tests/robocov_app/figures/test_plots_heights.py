@@ -1,0 +1,52 @@
+"""The path of a sensor's best place, by its height."""
+
+import numpy as np
+import pytest
+
+from robocov.observation.region import Region
+from robocov_app.figures.heights import HEIGHTS, PENTAGON, best_at_heights, height_table, plot_heights
+from robocov_app.render.theme import DARK, LIGHT, contrast
+
+
+def test_rows_go_from_one_limit_to_the_other() -> None:
+    rows = best_at_heights(PENTAGON, HEIGHTS)
+    assert [row.height for row in rows] == [0.0, *HEIGHTS, np.inf]
+    away = [row.from_centroid for row in rows]
+    assert away == sorted(away, reverse=True)
+    assert (rows[-1].x, rows[-1].y) == pytest.approx(tuple(Region(np.array(PENTAGON)).centroid))
+    assert away[-1] == 0.0
+    assert rows[0].x == pytest.approx(rows[1].x, abs=1e-6)
+    assert all(0.0 < row.missed < 4e-4 for row in rows[1:-1] if row.height < 10.0)
+    assert np.isnan([rows[0].missed, rows[-1].missed]).all()
+
+
+def test_the_table_says_so_in_words() -> None:
+    head, rows = height_table(best_at_heights(PENTAGON, (1.0,)))
+    assert rows[1] == ("1", "2.0849", "1.6650", "56.09", "0.0284")
+    assert [row[0] for row in rows] == ["→ 0", "1", "→ ∞"]
+    assert {len(row) for row in rows} == {len(head)}
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+@pytest.mark.parametrize("scale", [0.01, 1.0, 30.0])
+def test_the_plot_shows_the_path_in_its_frame(theme, scale) -> None:
+    ring = [(scale * x, scale * y) for x, y in PENTAGON]
+    figure = plot_heights(ring, theme, size=(900, 380))
+    cell, frame, distance = figure.axes
+    path = frame.lines[0]
+    low, high = frame.get_xlim()
+    assert low < min(path.get_xdata()) and max(path.get_xdata()) < high
+    low, high = frame.get_ylim()
+    assert low < min(path.get_ydata()) and max(path.get_ydata()) < high
+    assert distance.get_xscale() == "log"
+    assert cell.get_aspect() == frame.get_aspect() == 1.0
+    words = [each.get_text() for each in frame.texts]
+    assert "h → ∞: the centroid" in words and len(words) >= 5
+    marks = [word for word in words if word.startswith("h = ")]
+    assert all(len(word) <= len("h = 0.001 m") for word in marks)
+    # no word on another one, and all of them in the frame
+    figure.canvas.draw()
+    boxes = [each.get_window_extent() for each in frame.texts]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
+    assert all(frame.bbox.x0 < box.x0 and box.x1 < frame.bbox.x1 for box in boxes)
+    assert contrast(tuple(round(255 * c) for c in frame.texts[0].get_color()), theme.background) > 7

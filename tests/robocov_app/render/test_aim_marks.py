@@ -1,0 +1,80 @@
+"""Crosses where robots head: plus signs for centroids, times signs for goals of another kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_pixels import TWO, changed, drawn, nearest
+from drawn_run import SQUARE, explained
+
+from robocov.observation import Decision, Snapshot
+from robocov.voronoi import partition
+from robocov_app.render.aims import SAME, are_centroids
+from robocov_app.render.scene import Scene
+from robocov_app.render.theme import LIGHT
+
+CENTROIDS = partition(TWO, SQUARE.region).centroid
+UPRIGHT = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
+ACROSS = np.array([[0.0, 0.0], [3.0, 3.0], [-3.0, 3.0]])
+
+
+def test_centroids_are_plus_signs() -> None:
+    frame, painter = drawn(explained(TWO, goals=CENTROIDS), "centroids")
+    for center in painter.camera.to_pixels(CENTROIDS):
+        assert all(nearest(frame, center + arm, LIGHT.ink) < 60 for arm in UPRIGHT)
+
+
+@pytest.mark.parametrize("layer", ["centroids", "goals"])
+def test_goals_of_another_kind_are_times_signs(layer: str) -> None:
+    """A controller that does not head for centroids does not know of them."""
+    goals = CENTROIDS + (0.0, 2.0 * SAME)
+    goals[1] += 1.0
+    frame, painter = drawn(explained(TWO, goals=goals), layer)
+    for center in painter.camera.to_pixels(goals):
+        assert all(nearest(frame, center + arm, LIGHT.final) < 90 for arm in ACROSS)
+
+
+def test_crosses_are_called_what_they_are() -> None:
+    """RPF has no goals: neither crosses nor their entry in the legend."""
+    for goals, words in ((CENTROIDS, ["cell centroid"]), (TWO + 1, ["goal"]), (None, [])):
+        scene = explained(TWO, goals=goals)
+        pixels, painter = changed(scene, "centroids")
+        assert bool(len(pixels)) == bool(words)
+        assert painter.legend(scene) == words
+
+
+def test_who_hears_only_some_still_heads_for_a_centroid() -> None:
+    """That of what it takes for its cell; the word does not change with each message that is lost."""
+    scene = explained(TWO, goals=CENTROIDS)
+    alone = partition(TWO[:1], SQUARE.region)
+    heard = replace(alone, centroid=np.repeat(alone.centroid, 2, axis=0))
+    decision = Decision(np.zeros((2, 2)), heard.centroid, cells=heard)
+    assert scene.snapshot is not None
+    limited = Scene.of(
+        SQUARE, replace(scene.team, communication_range=np.ones(2)), Snapshot(scene.snapshot.seen, decision)
+    )
+    assert not are_centroids(heard.centroid, CENTROIDS)
+    _, painter = changed(limited, "centroids")
+    assert painter.legend(limited) == ["cell centroid"]
+
+
+@pytest.mark.parametrize("goals", [CENTROIDS, TWO + 1])
+def test_no_cross_where_a_robot_has_arrived(goals: np.ndarray) -> None:
+    arrived = goals if goals is not CENTROIDS else partition(CENTROIDS, SQUARE.region).centroid
+    pixels, _ = changed(explained(arrived, goals=arrived), "centroids")
+    assert len(pixels) == 0
+
+
+def test_who_has_no_goal_has_no_cross() -> None:
+    goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
+    for layer in ("centroids", "goals"):
+        scene = explained(TWO, goals=goals)
+        frame, painter = drawn(scene, layer)
+        assert nearest(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 90
+        pixels, _ = changed(scene, layer)
+        assert (painter.camera.to_world(pixels.astype(float))[:, 0] < 4.0).all()
+
+
+def test_are_centroids_looks_at_those_that_are_known() -> None:
+    assert are_centroids(np.array([[1.0, 1.0], [np.nan, np.nan]]), np.array([[1.0, 1.02], [5.0, 5.0]]))
+    assert not are_centroids(np.array([[1.0, 1.0], [5.0, 4.9]]), np.array([[1.0, 1.0], [5.0, 5.0]]))

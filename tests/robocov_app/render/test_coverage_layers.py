@@ -1,0 +1,202 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from drawn_run import HALL, ROOMS, run_of, scene_of
+
+from robocov.cost import CoverageCost
+from robocov.errors import ParameterError
+from robocov_app.render.coverage import Distances, GeodesicCells
+from robocov_app.render.field import Field, FieldLattice, Fields
+from robocov_app.render.picture import Painter, checked_layers
+from robocov_app.render.shading import FARTHEST, palette
+from robocov_app.render.theme import DARK, LIGHT
+
+SIZE = (800, 520)
+
+
+def scene(environment=ROOMS, n=5, seed=0, limit=8.0):
+    record = run_of(environment, n, seed=seed)
+    cost = CoverageCost(environment, 128)
+    positions = environment.start("spread").sample(n, seed + 1000)
+    field = Field(FieldLattice(cost.sites), cost(positions))
+    return cost, replace(scene_of(record), field=field, field_limit=limit)
+
+
+def painted(what, *names, theme=LIGHT, size=SIZE):
+    painter = Painter(what.environment, size, theme)
+    painter.show(names)
+    return painter.frame(what).astype(int), painter
+
+
+def free_pixels(painter, environment, count, seed=0):
+    """Return (count, 2) pixels well inside the free space, and their places."""
+    rng = np.random.default_rng(seed)
+    bounds = environment.region.bounds
+    inside = environment.free.buffer(-0.15)
+    found = []
+    while len(found) < count:
+        pixel = np.rint(painter.camera.to_pixels(rng.uniform(bounds[:2], bounds[2:])))
+        place = painter.camera.to_world(pixel)
+        if shapely.contains_xy(inside, *place):
+            found.append((pixel, place))
+    return np.array([pixel for pixel, _ in found]).astype(int), np.array([place for _, place in found])
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+@pytest.mark.parametrize("environment", [ROOMS, HALL], ids=lambda map_: map_.name)
+def test_colours_are_those_of_the_exact_distances(environment, theme):
+    cost, what = scene(environment)
+    frame, painter = painted(what, "distances", theme=theme)
+    pixels, places = free_pixels(painter, environment, 150)
+    exact = cost.geodesics.distances(places, what.field.result.positions).min(axis=1)
+    reached = np.isfinite(exact)
+    wanted = palette(theme)[np.minimum(exact[reached] / 8.0 * FARTHEST, FARTHEST).astype(int)].astype(int)
+    seen = frame[pixels[reached, 1], pixels[reached, 0]]
+    assert reached.sum() > 100
+    assert np.abs(seen - wanted).max(axis=1).max() <= 6
+    assert np.median(np.abs(seen - wanted).max(axis=1)) <= 1
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_no_colour_leaves_the_free_space(theme):
+    _, what = scene(HALL)
+    frame, painter = painted(what, "distances", "geodesic_cells", "obstacles", theme=theme)
+    rows, columns = np.indices(frame.shape[:2])
+    places = painter.camera.to_world(np.stack([columns, rows], axis=-1).astype(float))
+    outside = ~shapely.contains_xy(HALL.region.polygon.buffer(0.1), places[..., 0], places[..., 1])
+    assert (frame[outside] == theme.background).all()
+    blocked = shapely.contains_xy(HALL.blocked.buffer(-0.1), places[..., 0], places[..., 1])
+    assert blocked.sum() > 1000
+    assert (frame[blocked] == theme.obstacle).all()
+
+
+@pytest.mark.parametrize("n", [4, 14])
+def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
+    cost, what = scene(n=n, seed=2)
+    frame, painter = painted(what, "geodesic_cells")
+    pixels, places = free_pixels(painter, ROOMS, 200)
+    exact = cost.geodesics.distances(places, what.field.result.positions)
+    ordered = np.sort(exact, axis=1)
+    reached = np.isfinite(ordered[:, 0])
+    clear = reached.copy()
+    clear[reached] = ordered[reached, 1] - ordered[reached, 0] > 0.3
+    assert clear.sum() > 80
+    for (x, y), robot in zip(pixels[clear], exact[clear].argmin(axis=1), strict=True):
+        assert tuple(frame[y, x]) == LIGHT.cell(int(painter._hues[robot]))
+
+
+def test_borders_are_drawn_where_owners_change_and_nowhere_else():
+    cost, what = scene(seed=4)
+    frame, painter = painted(what, "geodesic_cells", "distances")
+    plain, _ = painted(what, "distances")
+    line = np.abs(frame - plain).max(axis=2) > 60
+    rows, columns = np.nonzero(line)
+    assert len(rows) > 200
+    chosen = slice(None, None, len(rows) // 60)
+    places = painter.camera.to_world(np.column_stack([columns, rows])[chosen].astype(float))
+    free = shapely.contains_xy(ROOMS.free, *places.T)
+    exact = np.sort(cost.geodesics.distances(places[free], what.field.result.positions), axis=1)
+    assert (exact[:, 1] - exact[:, 0]).max() < 3.0 / painter.camera.zoom
+
+
+def test_cells_below_colours_are_lines_only():
+    _, what = scene()
+    with_cells, _ = painted(what, "distances", "cells")
+    without, _ = painted(what, "distances")
+    differs = np.abs(with_cells - without).max(axis=2) > 0
+    assert 0.001 < differs.mean() < 0.05
+
+
+def test_without_a_field_nothing_is_drawn_or_explained():
+    _, what = scene()
+    frame, painter = painted(replace(what, field=None), "distances", "geodesic_cells", "colour_bar", "legend")
+    assert (frame == LIGHT.background).all()
+    assert painter.legend(replace(what, field=None)) == []
+
+
+def test_the_legend_explains_what_is_shown():
+    _, what = scene()
+    painter = Painter(ROOMS, SIZE)
+    painter.change(["distances", "geodesic_cells"], ["cells"])
+    words = painter.legend(what)
+    assert words[:3] == ["distance to the nearest robot", "no robot can come", "geodesic cell border"]
+    assert "Voronoi cell" not in words
+
+
+@pytest.mark.parametrize("size", [(900, 600), (480, 360), (1920, 1080)])
+@pytest.mark.parametrize("limit", [0.8, 8.0, 15.0, 2500.0])
+def test_the_scale_of_colours_stands_beside_the_map_and_is_whole(size, limit):
+    _, what = scene(limit=limit)
+    frame, painter = painted(what, "distances", "colour_bar", "boundary", "status", size=size)
+    corner = painter.camera.to_pixels(np.array([16.0, 0.0]))
+    beside = frame[:, int(np.ceil(corner[0])) + 3 :]
+    ink = (beside != LIGHT.background).any(axis=2)
+    assert ink.any()
+    # nothing touches the edge of the page
+    assert not ink[:, -1].any()
+    # the farthest colour is above the nearest
+    table = LIGHT.heat_table(256).astype(int)
+    far = np.nonzero(np.abs(beside - table[-1]).max(axis=2) < 4)[0]
+    assert len(far)
+    assert far.mean() < size[1] / 2
+
+
+def test_the_scale_says_when_there_is_more(monkeypatch):
+    from robocov_app.render import canvas
+
+    said = []
+    monkeypatch.setattr(canvas.Canvas, "text", lambda self, text, at, **style: said.append(text) or 0)
+    for limit, last in ((50.0, "50 m"), (2.0, "≥ 2 m"), (2500.0, "2.5 km")):
+        said.clear()
+        _, what = scene(limit=limit)
+        painted(what, "distances", "colour_bar")
+        assert said[-1] == last
+        assert said[0] == "0"
+
+
+@pytest.mark.parametrize("layer", [Distances, GeodesicCells])
+def test_an_unchanged_picture_is_kept(layer, monkeypatch):
+    _, what = scene()
+    made = []
+    real = layer.picture
+    monkeypatch.setattr(layer, "picture", lambda self, *args: made.append(1) or real(self, *args))
+    painter = Painter(ROOMS, SIZE)
+    painter.change([layer.name], [])
+    first = painter.frame(what).copy()
+    np.testing.assert_array_equal(painter.frame(what), first)
+    assert len(made) == 1
+    painter.camera = painter.camera.panned(10, 0)
+    painter.frame(what)
+    _, other = scene(seed=1)
+    painter.frame(other)
+    assert len(made) == 3
+
+
+@pytest.mark.parametrize("zoom", [0.05, 4.0, 300.0])
+def test_any_zoom_shows_the_same_colours(zoom):
+    cost, what = scene()
+    painter = Painter(ROOMS, (300, 200))
+    painter.show(["distances"])
+    place = np.array([9.0, 8.0])
+    painter.camera = replace(painter.camera, center=(9.0, 8.0), zoom=painter.camera.zoom * zoom)
+    frame = painter.frame(what).astype(int)
+    x, y = np.rint(painter.camera.to_pixels(place)).astype(int)
+    exact = cost.geodesics.distances(place[None], what.field.result.positions).min()
+    wanted = palette(LIGHT)[int(exact / 8.0 * FARTHEST)]
+    assert np.abs(frame[y, x] - wanted).max() <= (60 if zoom < 1 else 6)
+
+
+def test_fields_follow_the_robots():
+    cost = CoverageCost(ROOMS, 64)
+    fields = Fields(cost, 7.0)
+    place = np.array([[2.0, 2.0]])
+    assert fields.limit == 7.0
+    np.testing.assert_array_equal(fields.at(place).result.distances, cost(place).distances)
+
+
+def test_names_of_layers_are_checked():
+    assert checked_layers("--show", ["geodesic-cells", "grid"]) == {"geodesic_cells", "grid"}
+    with pytest.raises(ParameterError, match="--show: unknown layer 'distance': did you mean 'distances'"):
+        checked_layers("--show", ["distance"])

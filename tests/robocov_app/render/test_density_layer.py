@@ -1,0 +1,108 @@
+"""The shading of the density in frames and on pages."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from density_cases import GAUSSIANS, POLYGONS
+from matplotlib.figure import Figure
+
+from robocov.controllers import Rapf
+from robocov.cost import CoverageCost
+from robocov.density import Uniform
+from robocov.environment import CircleObstacle, Environment
+from robocov.simulation import Simulation
+from robocov_app.figures.arena import draw_map, map_handles, ticks_in_metres
+from robocov_app.render.field import Field, FieldLattice
+from robocov_app.render.picture import Painter
+from robocov_app.render.scene import Scene
+from robocov_app.render.theme import DARK, LIGHT
+
+RING = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (2.0, 8.0))
+PLAIN = Environment("plain", RING, (CircleObstacle((5.0, 5.0), 0.5),))
+HEAVY = PLAIN.with_density(GAUSSIANS["one"])
+STARTS = np.array([[3.0, 1.0], [6.0, 2.0], [4.0, 6.0]])
+
+
+def scene_of(environment: Environment, **more) -> Scene:
+    simulation = Simulation(environment, Rapf(), STARTS)
+    return replace(Scene.of(environment, simulation.team, simulation.snapshot), **more)
+
+
+def pixel(painter: Painter, frame, x: float, y: float):
+    column, row = np.rint(painter.camera.to_pixels(np.array([x, y]))).astype(int)
+    return frame[row, column].astype(int)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_the_shading_is_where_it_counts(theme):
+    frames = {}
+    for environment in (PLAIN, HEAVY):
+        painter = Painter(environment, (500, 460), theme)
+        painter.show({"density", "obstacles", "boundary"})
+        frames[environment.name, environment is HEAVY] = painter.frame(scene_of(environment))
+    plain, heavy = frames.values()
+    peak, edge = pixel(painter, heavy, 3.0, 3.0), pixel(painter, heavy, 7.8, 7.8)
+    background = np.array(theme.background)
+    assert np.abs(peak - background).max() > 60
+    assert np.abs(edge - background).max() <= 3
+    wanted = background + (np.array(theme.density) - background) * theme.density_strength
+    assert np.abs(peak - wanted).max() < 12
+    # outside the region, and on an obstacle, all is as it was
+    assert (pixel(painter, heavy, 0.2, 7.0) == pixel(painter, plain, 0.2, 7.0)).all()
+    assert (pixel(painter, heavy, 5.0, 5.0) == pixel(painter, plain, 5.0, 5.0)).all()
+
+
+def test_the_legend_tells_of_it():
+    painter = Painter(HEAVY, (500, 460))
+    assert "density φ, 0.1 to 2.1" in painter.legend(scene_of(HEAVY))
+    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN)))
+    assert not any("φ" in words for words in painter.legend(scene_of(PLAIN.with_density(Uniform(2.0)))))
+    painter.visible.discard("density")
+    assert not any("φ" in words for words in painter.legend(scene_of(HEAVY)))
+
+
+def test_colours_of_distances_hide_it():
+    painter = Painter(HEAVY, (400, 380))
+    painter.show({"density", "distances", "obstacles"})
+    cost = CoverageCost(HEAVY, 32)
+    field = Field(FieldLattice(cost.sites), cost(STARTS))
+    with_both = painter.frame(scene_of(HEAVY, field=field, field_limit=5.0))
+    painter.show({"distances", "obstacles"})
+    assert np.array_equal(painter.frame(scene_of(HEAVY, field=field, field_limit=5.0)), with_both)
+    painter.show({"density", "distances", "obstacles"})
+    assert not np.array_equal(painter.frame(scene_of(HEAVY)), with_both)
+
+
+def test_another_density_is_drawn_anew():
+    painter = Painter(PLAIN, (400, 380))
+    first = painter.frame(scene_of(HEAVY))
+    other = PLAIN.with_density(POLYGONS["rooms"])
+    second = painter.frame(scene_of(other))
+    assert not np.array_equal(first, second)
+    assert np.array_equal(painter.frame(scene_of(HEAVY)), first)
+
+
+def test_zoomed_in_it_stays_in_the_view():
+    painter = Painter(HEAVY, (400, 380))
+    painter.frame(scene_of(HEAVY))
+    painter.camera = painter.camera.zoomed(40.0, (200, 200))
+    assert painter.frame(scene_of(HEAVY)).shape == (380, 400, 3)
+
+
+def test_on_a_page():
+    axes = Figure().subplots()
+    ticks_in_metres(axes, HEAVY, LIGHT)
+    draw_map(axes, HEAVY, LIGHT)
+    (image,) = axes.images
+    assert axes.get_xlim() == (0.0, 8.0) and axes.get_ylim() == (0.0, 8.0)
+    alpha = np.asarray(image.get_array())[..., 3]
+    row, column = np.unravel_index(alpha.argmax(), alpha.shape)
+    assert (column + 0.5) / alpha.shape[1] * 8.0 == pytest.approx(3.0, abs=0.15)
+    assert (row + 0.5) / alpha.shape[0] * 8.0 == pytest.approx(3.0, abs=0.15)
+    assert map_handles(HEAVY, LIGHT)[-1].get_label() == "density φ, 0.1 to 2.1"
+    bare = Figure().subplots()
+    draw_map(bare, PLAIN, LIGHT)
+    draw_map(bare, HEAVY, LIGHT, density=False)
+    assert not bare.images
+    assert len(map_handles(HEAVY, LIGHT, density=False)) == len(map_handles(PLAIN, LIGHT))

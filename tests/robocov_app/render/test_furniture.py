@@ -1,0 +1,126 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_pixels import SIZE, TWO, changed, drawn
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+
+from robocov.voronoi import partition
+from robocov_app.render.fonts import label, text_width
+from robocov_app.render.furniture import fitting_status
+from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.theme import LIGHT
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
+@pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
+def test_the_scale_bar_is_as_long_as_it_says(environment, size):
+    from robocov_app.render.camera import round_length
+
+    pixels, painter = changed(scene_of(run_of(environment, 2)), "scale_bar", size=size)
+    rows, counts = np.unique(pixels[:, 1], return_counts=True)
+    bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
+    run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
+    metres = (len(run) - 1) / painter.camera.zoom
+    assert metres == pytest.approx(round_length(metres * 1.02), rel=0.03)
+
+
+def test_the_status_line_says_what_it_is_given():
+    record = run_of(SQUARE, 3)
+    frames = [drawn(scene_of(record, cost=cost), "status")[0] for cost in ("mean 1.23 m", "mean 1.24 m")]
+    rows, columns = np.nonzero((frames[0] != frames[1]).any(axis=2))
+    assert len(rows) > 3
+    assert rows.min() > SIZE[1] - 34
+    assert np.ptp(columns) < 12  # one digit
+
+
+def test_the_status_leaves_out_whole_facts_the_least_important_first():
+    scene = scene_of(run_of(SQUARE, 3), cost="mean distance 1.234 m")
+    size = 14
+    found = []
+    for room in range(600, 0, -5):
+        text = fitting_status(scene, size, room)
+        assert text_width(text, size) <= room
+        if not found or found[-1] != text:
+            found.append(text)
+    lead = "   ·   "
+    assert found[0] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m", "square"])
+    assert found[1] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m"])
+    assert found[2] == lead + "t = 3.9 s"
+
+
+def test_the_width_of_a_text_is_that_of_its_picture():
+    for text in ("", "RAPF", "mean distance 1.234 m · Museum", "…"):
+        for bold in (False, True):
+            assert text_width(text, 17, bold) == label(text, 17, (0, 0, 0), bold).get_width()
+
+
+def test_a_caption_has_what_the_brief_status_leaves_out():
+    """In a pane, controller and cost stand above the arena, and nothing of them below it."""
+    record = run_of(SQUARE, 3)
+    frames = []
+    for cost, label_ in (("1.23 m", "RAPF"), ("9.87 m", "RAPF"), ("1.23 m", "RPF")):
+        scene = replace(scene_of(record, cost=cost), label=label_)
+        frames.append(drawn(scene, "caption", "status", layers=pane_layers())[0])
+    for frame, side in ((frames[1], slice(SIZE[0] // 2, None)), (frames[2], slice(0, SIZE[0] // 2))):
+        rows, columns = np.nonzero((frame != frames[0]).any(axis=2))
+        assert len(rows) > 5 and rows.max() < 34
+        assert set(columns.tolist()) <= set(range(SIZE[0])[side])
+
+
+def test_a_long_status_is_cut_before_the_scale_bar():
+    scene = scene_of(run_of(SQUARE, 3), cost="word " * 60)
+    pixels, _ = changed(scene, "status", "scale_bar")
+    alone, _ = changed(scene, "scale_bar")
+    assert pixels[:, 0].max() < SIZE[0]
+    status = np.array(sorted({tuple(p) for p in pixels.tolist()} - {tuple(p) for p in alone.tolist()}))
+    assert status[:, 0].min() > alone[:, 0].max() + 8
+
+
+def test_the_legend_lists_exactly_what_is_shown():
+    scene = explained(
+        TWO,
+        forces=np.ones((2, 2)),
+        goals=partition(TWO, SQUARE.region).centroid,
+        obstacle_points=TWO - 1,
+        communication_range=5.0,
+    )
+    painter = Painter(SQUARE, SIZE)
+    words = {
+        "cells": "Voronoi cell",
+        "centroids": "cell centroid",
+        "robots": "robot",
+        "goals": "goal",
+        "velocities": "velocity",
+        "links": "neighbours",
+        "sensing": "sensing range",
+        "communication": "communication range",
+        "obstacle_points": "nearest obstacle point",
+        "force_attraction": "attraction",
+        "force_repulsion_robots": "repulsion from robots",
+        "force_repulsion_obstacle": "repulsion from obstacle",
+        "force_viscosity": "viscosity",
+        "force_resultant": "resultant force",
+    }
+    for name, word in words.items():
+        painter.show({name})
+        assert painter.legend(scene) == [word]
+    painter.show({layer.name for layer in standard_layers()})
+    assert sorted(painter.legend(scene)) == sorted(words.values())  # no obstacles, starts or trail here
+    painter.show({"obstacles", "starts", "trajectories"})
+    rooms = scene_of(run_of(ROOMS, 2))
+    assert painter.legend(rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
+
+
+def test_the_legend_stands_above_the_arena_in_as_many_rows_as_it_needs():
+    scene = scene_of(run_of(ROOMS, 6))
+    names = [layer.name for layer in standard_layers()]
+    for size in (SIZE, (1920, 1080)):
+        painter = Painter(ROOMS, size)
+        painter.show(names)
+        painter.frame(scene)
+        top = painter.camera.to_pixels(ROOMS.region.vertices)[:, 1].min()
+        frame = painter.frame(scene).astype(int)
+        strip = (frame[: int(top) - 4] != np.array(LIGHT.background)).any(axis=2)
+        assert strip.any()
+        assert not strip[:, -3:].any()  # nothing is cut at the right

@@ -1,0 +1,355 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+from written_words import check_glyph, glyphs, places
+
+from robocov.environment import Environment, PolygonObstacle, UniformStart
+from robocov_app.render import knowledge
+from robocov_app.render.camera import Camera
+from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
+from robocov_app.render.picture import Painter
+from robocov_app.render.sensed import Sensed
+from robocov_app.render.theme import DARK, LIGHT, contrast, mix
+
+THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+
+
+def scan(place=(4.0, 4.0), rays=120, reach=3.0, wall=5.4):
+    """Return what a sensor measures beside a wall along x = `wall`."""
+    angle = np.arange(rays) * (2 * np.pi / rays)
+    heading = np.column_stack([np.cos(angle), np.sin(angle)])
+    with np.errstate(divide="ignore"):
+        length = np.where(heading[:, 0] > 0, (wall - place[0]) / heading[:, 0], np.inf)
+    return np.array(place), np.array(place) + np.minimum(length, reach)[:, None] * heading
+
+
+def scanned(*scans):
+    return replace(explained(ONE), scans=scans)
+
+
+class TestRayScan:
+    @THEMES
+    def test_what_is_looked_over_is_tinted_a_little_and_nothing_else(self, theme):
+        place, ends = scan()
+        frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
+        area = shapely.Polygon(ends)
+        away = [
+            distance(frame, p, theme.background)
+            for p in painter.camera.to_pixels(inside(area.buffer(-0.1), 300))
+        ]
+        assert min(away) > 8
+        assert max(away) < 90
+        around = inside(SQUARE.boundary_polygon.difference(area.buffer(0.15)), 200)
+        for pixel in painter.camera.to_pixels(around):
+            assert distance(frame, pixel, theme.background) == 0
+
+    @THEMES
+    def test_dots_are_where_rays_hit_and_not_where_they_end_in_the_open(self, theme):
+        place, ends = scan()
+        frame, painter = drawn(scanned((place, ends)), "scan", theme=theme)
+        for pixel, end in zip(painter.camera.to_pixels(ends), ends, strict=True):
+            far = nearest(frame, pixel, theme.final)
+            assert far < 40 if end[0] > 5.39 else far > 60
+
+    def test_rays_are_no_hedgehog(self):
+        """They are seen far out, and near the robot there is no more ink than there."""
+        place, ends = scan(wall=8.0)
+        frame, painter = drawn(scanned((place, ends)), "scan")
+        rows, columns = np.indices(frame.shape[:2])
+        x, y = painter.camera.to_pixels(place)
+        away = np.hypot(columns - x, rows - y) / painter.scale
+        ink = np.abs(frame - np.array(LIGHT.background)).max(axis=2)
+        reach = 3.0 * painter.camera.zoom / painter.scale
+        near, far = ink[(away > 14) & (away < 30)], ink[(away > 0.7 * reach) & (away < 0.9 * reach)]
+        assert near.mean() < 1.3 * far.mean()
+        assert far.max() > np.median(far) + 10
+        rim = ink[(away > 0.8 * reach - 0.5) & (away < 0.8 * reach + 0.5)]
+        assert (rim > np.median(ink[(away > 3) & (away < 10)]) + 5).sum() >= 100
+
+    def test_where_scans_overlap_nothing_gets_darker(self):
+        alone, painter = drawn(scanned(scan(wall=9.0)), "scan")
+        both, _ = drawn(scanned(scan(wall=9.0), scan((4.5, 4.0), wall=9.0)), "scan")
+        fills = []
+        for frame in (alone, both):
+            x, y = np.rint(painter.camera.to_pixels(np.array([4.25, 4.0]))).astype(int)
+            colours, count = np.unique(
+                frame[y - 30 : y + 31, x - 30 : x + 31].reshape(-1, 3), axis=0, return_counts=True
+            )
+            fills.append(colours[count.argmax()].tolist())
+        assert fills[0] == fills[1] != list(LIGHT.background)
+
+    def test_close_up_it_is_drawn_too(self):
+        scene = scanned(scan())
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"scan"})
+        painter.camera = Camera((5.4, 4.0), 2e4, painter.camera.view)
+        frame = painter.frame(scene).astype(int)
+        assert nearest(frame, painter.camera.to_pixels(np.array([5.4, 4.0])), LIGHT.final) < 10
+        assert distance(frame, (SIZE[0] // 2 + 60, SIZE[1] // 2), LIGHT.background) == 0
+        assert distance(frame, (SIZE[0] // 2 - 60, SIZE[1] // 2 - 40), LIGHT.background) > 8
+        painter.camera = Camera((400.0, 4.0), 100.0, painter.camera.view)
+        assert (painter.frame(scene) == 255).all()
+
+    def test_without_scans_there_is_nothing(self):
+        pixels, painter = changed(explained(ONE), "scan")
+        assert len(pixels) == 0
+        assert painter.legend(explained(ONE)) == []
+        assert painter.legend(scanned(scan())) == ["ray scan"]
+
+
+SEEN = np.array([[7.2, 2.8], [11.0, 3.75], [4.0, 5.0]])
+"""Places on the obstacles of `ROOMS`."""
+
+
+def knowing(points=SEEN, numbers=(1, 2, 3), time=0.0, n=4, **more):
+    """Return a scene in which robots have sensed points."""
+    sensed = Sensed()
+    sensed.add(time, numbers, np.asarray(points))
+    return replace(scene_of(run_of(ROOMS, n)), sensed=sensed, **more)
+
+
+def dots(frame, painter, theme=LIGHT, points=SEEN):
+    """Return which points are drawn."""
+    colour = theme.forces["repulsion_obstacle"]
+    return [nearest(frame, pixel, colour) < 25 for pixel in painter.camera.to_pixels(points)]
+
+
+class TestSensedObstacles:
+    @THEMES
+    def test_what_was_sensed_stands_out_against_the_pale_truth(self, theme):
+        frame, painter = drawn(knowing(), "obstacles", "sensed", theme=theme)
+        assert dots(frame, painter, theme) == [True, True, True]
+        pale = mix(theme.background, theme.obstacle, 0.3)
+        solid = inside(ROOMS.blocked.buffer(-0.12), 150)
+        solid = solid[np.linalg.norm(solid[:, None] - SEEN, axis=2).min(axis=1) > 0.15]
+        for pixel in painter.camera.to_pixels(solid):
+            assert distance(frame, pixel, pale) == 0
+        assert contrast(theme.forces["repulsion_obstacle"], pale) > 4
+        for pixel in painter.camera.to_pixels(inside(ROOMS.free.buffer(-0.12), 200)):
+            assert distance(frame, pixel, theme.background) == 0  # that of the courtyard too
+
+    def test_the_truth_keeps_its_outline(self):
+        frame, painter = drawn(knowing(), "obstacles", "sensed")
+        edge = painter.camera.to_pixels(np.array([[4.0, 4.0], [2.5, 7.0], [2.5, 7.6], [10.05, 2.8]]))
+        for pixel in edge:
+            assert nearest(frame, pixel, mix(LIGHT.background, LIGHT.obstacle_edge, 0.6)) < 40
+
+    def test_an_obstacle_in_a_courtyard_pales_too(self):
+        ring = PolygonObstacle(
+            ((0.5, 0.5), (7.5, 0.5), (7.5, 7.5), (0.5, 7.5)), (((1, 1), (7, 1), (7, 7), (1, 7)),)
+        )
+        island = PolygonObstacle(((1.5, 1.5), (6.5, 1.5), (6.5, 6.5), (1.5, 6.5)))
+        yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
+        frame, painter = drawn(replace(scene_of(run_of(yard, 2)), sensed=Sensed()), "obstacles", "sensed")
+        pale = mix(LIGHT.background, LIGHT.obstacle, 0.3)
+        for point, colour in (((0.75, 4.0), pale), ((4.0, 4.0), pale), ((1.25, 4.0), LIGHT.background)):
+            assert distance(frame, painter.camera.to_pixels(np.array(point)), colour) == 0
+
+    def test_the_boundary_stays_as_it_is(self):
+        scene = scene_of(run_of(HALL, 2))  # a third of it lies along what is outside
+        plain, painter = drawn(scene, "obstacles", "boundary")
+        frame, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "boundary", "sensed")
+        corners = HALL.region.vertices
+        for part in np.linspace(0.01, 0.99, 60):
+            for pixel in painter.camera.to_pixels(corners + part * (np.roll(corners, -1, axis=0) - corners)):
+                x, y = np.rint(pixel).astype(int)
+                assert np.abs(frame[y, x] - plain[y, x]).max() < 50
+        pale, _ = drawn(replace(scene, sensed=Sensed()), "obstacles", "sensed")
+        assert (pale != frame).any()
+
+    def test_where_obstacles_are_not_shown_only_points_are(self):
+        pixels, painter = changed(knowing(), "sensed")
+        away = np.linalg.norm(pixels[:, None] - painter.camera.to_pixels(SEEN), axis=2)
+        assert len(pixels) >= 3 * 9
+        assert away.min(axis=1).max() < 2.1 * painter.scale + 1.5
+
+    def test_of_the_robot_that_is_asked_about_only(self):
+        scene = knowing(selected=1, numbers=(1, 7, 3))
+        scene = replace(scene, numbers=(1, 7, 3, 9))
+        frame, painter = drawn(scene, "obstacles", "sensed")
+        assert dots(frame, painter) == [False, True, False]
+        assert painter.legend(scene)[-1] == "sensed of the obstacles"
+        frame = painter.frame(replace(scene, selected=None)).astype(int)
+        assert dots(frame, painter) == [True, True, True]
+        assert painter.legend(replace(scene, selected=None))[-1] == "sensed of the obstacles"
+
+    def test_points_come_and_go_with_time(self):
+        record = run_of(ROOMS, 4)
+        sensed = Sensed()
+        for time, point in zip((0.0, 1.0, 2.0), SEEN, strict=True):
+            sensed.add(time, (1,), point[None])
+        painter = Painter(ROOMS, SIZE)
+        painter.show({"obstacles", "sensed"})
+        for row, known in ((0, 1), (10, 2), (15, 2), (20, 3), (39, 3), (12, 2), (0, 1)):
+            frame = painter.frame(replace(scene_of(record, row), sensed=sensed)).astype(int)
+            assert dots(frame, painter) == [True] * known + [False] * (3 - known)
+
+    def test_another_history_leaves_nothing_of_the_old(self):
+        painter = Painter(ROOMS, SIZE)
+        painter.show({"obstacles", "sensed"})
+        scene = knowing(SEEN[:2], (1, 2))
+        painter.frame(scene)
+        scene.sensed.cut(-1.0)  # the same object, as long as before
+        scene.sensed.add(0.0, (1, 2), SEEN[1:])
+        assert dots(painter.frame(scene).astype(int), painter) == [False, True, True]
+        assert dots(painter.frame(knowing(SEEN[:2], (1, 2))).astype(int), painter) == [True, True, False]
+
+    def test_another_map_or_theme_or_view_is_drawn_anew(self):
+        painter = Painter(ROOMS, SIZE)
+        painter.show({"obstacles", "sensed"})
+        painter.frame(knowing())
+        painter.theme = DARK
+        assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
+        painter.camera = painter.camera.panned(40, -30)
+        assert dots(painter.frame(knowing()).astype(int), painter, DARK) == [True, True, True]
+        scene = knowing(environment=Environment("empty", ROOMS.boundary, (), {"spread": UniformStart()}))
+        frame = painter.frame(scene).astype(int)
+        at = painter.camera.to_pixels(np.array([4.4, 5.5]))
+        assert distance(frame, at, DARK.background) == 0
+
+    def test_nothing_is_drawn_anew_where_nothing_is_new(self, monkeypatch):
+        counts, dots_of = [], knowledge._dots
+
+        def watched(canvas, centers, *style):
+            counts.append(len(centers))
+            dots_of(canvas, centers, *style)
+
+        monkeypatch.setattr(knowledge, "_dots", watched)
+        sensed = Sensed()
+        layer = SensedObstacles()
+        painter = Painter(ROOMS, SIZE, layers=[layer])
+        painter.show({"sensed"})
+        record = run_of(ROOMS, 4)
+        pages = set()
+        for row in range(9):
+            if row in (0, 5):
+                sensed.add(0.1 * row, (1, 2), SEEN[:2] + 0.1 * row)
+            painter.frame(replace(scene_of(record, row), sensed=sensed))
+            pages.add(id(layer._page))
+        assert counts == [2, 2]
+        assert len(pages) == 1
+
+    def test_without_knowledge_there_is_nothing(self):
+        scene = scene_of(run_of(ROOMS, 4))
+        assert len(changed(scene, "sensed")[0]) == 0
+        assert SensedObstacles().legend(scene) == []
+
+
+WAY = np.array([[1.0, 1.0], [4.0, 2.0], [6.0, 6.0]])
+
+
+def pathed(*corners, positions=TWO):
+    return replace(explained(positions), path=np.array(corners or WAY, dtype=float))
+
+
+def tags(frame, painter, words, theme=LIGHT):
+    return places(frame, words, round(theme.text * painter.scale), theme, theme.final)
+
+
+class TestCursorPath:
+    @THEMES
+    def test_leads_along_its_corners(self, theme):
+        frame, painter = drawn(pathed(), "path", theme=theme)
+        for start, end in pairwise(WAY):
+            for part in np.linspace(0.15, 0.95, 9):
+                pixel = painter.camera.to_pixels(start + part * (end - start))
+                assert nearest(frame, pixel, theme.final) < 50
+        assert nearest(frame, painter.camera.to_pixels(WAY[0]), theme.final) < 5  # a dot at the cursor
+
+    def test_draws_nothing_else(self):
+        pixels, painter = changed(pathed(), "path")
+        line = shapely.LineString(painter.camera.to_pixels(WAY)).buffer(3 * painter.scale)
+        begin = shapely.Point(painter.camera.to_pixels(WAY[0])).buffer(75 * painter.scale)
+        assert shapely.contains_xy(line.union(begin), pixels).all()
+
+    @THEMES
+    def test_has_a_light_around_it_that_parts_it_from_what_it_crosses(self, theme):
+        scene = pathed((1.0, 4.0), (7.0, 4.0))
+        frame, painter = drawn(scene, "cells", "path", theme=theme)
+        pixel = painter.camera.to_pixels(np.array([5.5, 4.0]))
+        column = frame[int(pixel[1]) - 5 : int(pixel[1]) + 6, int(pixel[0])]
+        away = np.abs(column - np.array(theme.background)).max(axis=1)
+        assert away[:5].min() < 12
+        assert away[6:].min() < 12
+
+    @THEMES
+    @pytest.mark.parametrize(
+        ("corners", "words"),
+        [
+            (WAY, f"{np.hypot(3, 1) + np.hypot(2, 4):.2f} m"),
+            ([[4.0, 1.0], [4.0, 1.5]], "0.50 m"),
+            ([[1.0, 7.0], [1.0, 6.96]], "0.04 m"),
+        ],
+    )
+    def test_its_length_is_written_at_the_cursor(self, theme, corners, words):
+        frame, painter = drawn(pathed(*corners), "path", theme=theme)
+        found = tags(frame, painter, words, theme)
+        assert len(found) == 1
+        away = found[0] - painter.camera.to_pixels(np.array(corners[0]))
+        assert np.abs(away).max() < 45 * painter.scale
+        assert len(tags(frame, painter, "9.87 m", theme)) == 0
+
+    def test_long_ways_are_told_in_whole_metres(self):
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"path"})
+        painter.camera = Camera((4.0, 4.0), 0.5, painter.camera.view)
+        frame = painter.frame(pathed((4.0, 4.0), (4.0, 240.5))).astype(int)
+        assert len(tags(frame, painter, "236 m")) == 1
+
+    @pytest.mark.parametrize("corner", [(0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)])
+    @pytest.mark.parametrize("zoom", [50.0, 90.0])
+    def test_the_tag_stays_in_the_picture(self, corner, zoom):
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"path"})
+        painter.camera = Camera((4.0, 4.0), zoom, painter.camera.view)
+        frame = painter.frame(pathed(corner, (4.0, 4.0))).astype(int)
+        assert len(tags(frame, painter, "5.66 m")) == 1
+
+    @pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
+    def test_the_tag_does_not_hide_the_way_nor_the_robot(self, angle):
+        heading = np.array([np.cos(angle), np.sin(angle)])
+        end = 4.0 + 0.6 * heading
+        scene = pathed((4.0, 4.0), end, positions=np.array([end]))
+        frame, painter = drawn(scene, "path")
+        assert len(tags(frame, painter, "0.60 m")) == 1
+        for part in (0.3, 0.45, 0.6, 0.8):
+            assert nearest(frame, painter.camera.to_pixels(4.0 + 0.6 * part * heading), LIGHT.final) < 50
+        both, _ = drawn(scene, "path", "robots")
+        alone, _ = drawn(scene, "robots")
+        disc = (alone != 255).any(axis=2)
+        free = (frame == 255).all(axis=2)
+        assert (both[disc & free] == alone[disc & free]).all()
+        assert tags(both, painter, "0.60 m").tolist() == tags(frame, painter, "0.60 m").tolist()
+
+    @pytest.mark.parametrize("side", [(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    def test_the_tag_hides_no_other_robot(self, side):
+        positions = 4.0 + np.array([[0.4 * side[0], 0.35 * side[1]], [0.0, -2.0]])
+        scene = pathed((4.0, 4.0), (4.0, 2.0), positions=positions)
+        frame, painter = drawn(scene, "path")
+        assert len(tags(frame, painter, "2.00 m")) == 1
+        x, y = np.rint(painter.camera.to_pixels(positions[0])).astype(int)
+        assert (frame[y - 4 : y + 5, x - 4 : x + 5] == 255).all()
+
+    @pytest.mark.parametrize("path", [None, np.empty((0, 2)), np.array([[1.0, 1.0]])])
+    def test_without_a_way_there_is_nothing(self, path):
+        scene = replace(explained(TWO), path=path)
+        pixels, painter = changed(scene, "path")
+        assert len(pixels) == 0
+        assert painter.legend(scene) == []
+
+
+@THEMES
+def test_glyphs_of_the_legend(theme):
+    for layer, scene, colour in (
+        (RayScan(), scanned(scan()), theme.final),
+        (SensedObstacles(), knowing(), theme.forces["repulsion_obstacle"]),
+        (CursorPath(), pathed(), theme.final),
+    ):
+        pictures = glyphs(layer, scene, theme)
+        assert len(pictures) == 1
+        check_glyph(pictures[0], theme, colour)

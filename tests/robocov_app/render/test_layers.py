@@ -1,0 +1,411 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pygame
+import pytest
+import shapely
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
+from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
+
+from robocov.environment import Environment, PolygonObstacle, UniformStart
+from robocov.observation import Snapshot
+from robocov.robots import Team
+from robocov.voronoi import partition
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.layers import drawn_radii
+from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.scene import Scene
+from robocov_app.render.theme import DARK, LIGHT, readable_on, robot_hues
+from robocov_app.render.trajectories import Trajectories
+
+
+def test_every_layer_has_a_name_of_its_own_and_words():
+    layers = standard_layers()
+    assert len({layer.name for layer in layers}) == len(layers)
+    assert all(layer.title for layer in layers)
+
+
+def test_nothing_is_drawn_when_nothing_is_shown():
+    pixels, _ = changed(scene_of(run_of(ROOMS, 6)))
+    assert len(pixels) == 0
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+@pytest.mark.parametrize("n", [6, 30])
+def test_a_cell_has_the_tint_of_the_nearest_robot(n, theme):
+    record = run_of(SQUARE, n)
+    scene = scene_of(record)
+    frame, painter = drawn(scene, "cells", theme=theme)
+    points = inside(SQUARE.boundary_polygon.buffer(-0.1), 400)
+    distances = np.linalg.norm(points[:, None] - record.positions[-1][None], axis=2)
+    two = np.sort(distances, axis=1)[:, :2]
+    clear = two[:, 1] - two[:, 0] > 0.12  # away from edges
+    assert clear.sum() > 100
+    pixels = painter.camera.to_pixels(points[clear])
+    for pixel, robot in zip(pixels, distances[clear].argmin(axis=1), strict=True):
+        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_cells_by_time_have_the_tint_of_who_is_there_first(theme):
+    """Slow robots' cells are holes in those of fast ones, with arcs for borders."""
+    record = run_of(SQUARE, 6)
+    speeds = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
+    team = replace(record.team, max_speed=speeds)
+    record = replace(record, team=team, gains={"cells": "time"})
+    scene = scene_of(record)
+    assert scene.cell_owners is not None
+    assert scene.cell_owners[0] in (0, 1), "the fast ones come first"
+    frame, painter = drawn(scene, "cells", theme=theme)
+    points = inside(SQUARE.boundary_polygon.buffer(-0.1), 400)
+    times = np.linalg.norm(points[:, None] - record.positions[-1][None], axis=2) / speeds
+    two = np.sort(times, axis=1)[:, :2]
+    clear = two[:, 1] - two[:, 0] > 0.4  # away from edges
+    assert clear.sum() > 100
+    assert set(times[clear].argmin(axis=1)) > {0, 1}
+    pixels = painter.camera.to_pixels(points[clear])
+    for pixel, robot in zip(pixels, times[clear].argmin(axis=1), strict=True):
+        assert distance(frame, pixel, theme.cell(painter._hues[robot])) == 0
+
+
+def test_robots_of_different_size_are_drawn_to_scale():
+    record = run_of(SQUARE, 3)
+    record = replace(record, team=replace(record.team, radius=np.array([0.3, 0.6, 0.9])))
+    scene = scene_of(record)
+    _, painter = drawn(scene, "robots")
+    canvas = Canvas(pygame.Surface(SIZE), painter.camera, LIGHT, 1.0, robot_hues(3))
+    expected = record.team.radius * painter.camera.zoom
+    np.testing.assert_allclose(drawn_radii(canvas, scene), expected, atol=0.26)
+
+
+def test_edges_of_cells_are_drawn_between_robots():
+    scene = explained(TWO)
+    frame, painter = drawn(scene, "cells")
+    for point in ((4.0, 4.0), (3.0, 5.0), (6.0, 2.0)):
+        assert nearest(frame, painter.camera.to_pixels(np.array(point)), LIGHT.cell_edge) < 70
+
+
+@pytest.mark.parametrize("n", [100, 1000])
+def test_narrow_cells_have_plain_edges(n):
+    frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
+    colours = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
+    assert (set(map(tuple, frame.reshape(-1, 3).tolist())) <= colours) == (n == 1000)
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
+def test_obstacles_are_where_the_robots_cannot_be(environment):
+    frame, painter = drawn(scene_of(run_of(environment, 4)), "obstacles")
+    solid = inside(environment.blocked.buffer(-0.08), 150)
+    free = inside(environment.free.buffer(-0.08), 300)
+    assert len(solid) > 50
+    for pixel in painter.camera.to_pixels(solid):
+        assert distance(frame, pixel, LIGHT.obstacle) == 0
+    for pixel in painter.camera.to_pixels(free):  # the courtyard of ROOMS is free
+        assert distance(frame, pixel, LIGHT.background) == 0
+
+
+def test_an_obstacle_in_the_courtyard_of_a_thin_one_is_drawn():
+    ring = PolygonObstacle(
+        ((0.5, 0.5), (7.5, 0.5), (7.5, 7.5), (0.5, 7.5)), (((1, 1), (7, 1), (7, 7), (1, 7)),)
+    )
+    island = PolygonObstacle(((1.5, 1.5), (6.5, 1.5), (6.5, 6.5), (1.5, 6.5)))
+    yard = Environment("yard", SQUARE.boundary, (ring, island), {"spread": UniformStart()})
+    frame, painter = drawn(scene_of(run_of(yard, 2)), "obstacles")
+    points = np.array([[0.75, 4.0], [4.0, 4.0], [1.25, 4.0], [0.25, 4.0]])
+    colours = [LIGHT.obstacle, LIGHT.obstacle, LIGHT.background, LIGHT.background]
+    for pixel, colour in zip(painter.camera.to_pixels(points), colours, strict=True):
+        assert distance(frame, pixel, colour) == 0
+
+
+def test_the_boundary_is_the_convex_hull():
+    frame, painter = drawn(scene_of(run_of(HALL, 4)), "boundary")
+    corners = HALL.region.vertices
+    for middle in (corners + np.roll(corners, -1, axis=0)) / 2:
+        assert nearest(frame, painter.camera.to_pixels(middle), LIGHT.boundary) < 40
+    assert distance(frame, painter.camera.to_pixels(np.array([6.0, 7.0])), LIGHT.background) == 0
+
+
+def test_the_grid_has_lines_at_round_metres_inside_the_region_only():
+    pixels, painter = changed(scene_of(run_of(HALL, 4)), "grid")
+    points = painter.camera.to_world(pixels.astype(float))
+    off = np.abs(points - np.rint(points)).min(axis=1)
+    assert off.max() * painter.camera.zoom < 1.1
+    assert shapely.contains_xy(HALL.region.polygon.buffer(1.5 / painter.camera.zoom), points).all()
+    assert len({round(x) for x in points[:, 0]}) > 10
+
+
+def test_starts_are_green_rings():
+    record = run_of(SQUARE, 5)
+    frame, painter = drawn(scene_of(record), "starts")
+    for center in painter.camera.to_pixels(record.positions[0]):
+        for side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            on_ring = center + 4.5 * painter.scale * np.array(side)
+            assert nearest(frame, on_ring, LIGHT.start) < 60
+        assert distance(frame, center, LIGHT.background) == 0
+
+
+@pytest.mark.parametrize("size", [SIZE, (1279, 961), (1920, 1440), (1366, 1000)])
+def test_the_boundary_has_clean_corners(size):
+    """Nothing sticks out there: the corners reach as far as the sides between them."""
+    frame, painter = drawn(explained(TWO), "boundary", size=size)
+    ink = np.abs(frame - np.array(LIGHT.background)).max(axis=2) > 50
+    for picture in (ink, ink.T):
+        whole = np.nonzero(picture.any(axis=0))[0]
+        middle = np.nonzero(picture[picture.shape[0] // 2])[0]
+        assert (whole.min(), whole.max()) == (middle.min(), middle.max())
+    for x, y in painter.camera.to_pixels(SQUARE.region.vertices).round().astype(int):
+        assert ink[y, x]
+
+
+class TestCrowds:
+    def radii(self, positions, size=SIZE, radius=0.1):
+        scene = replace(explained(positions), team=Team.homogeneous(len(positions), radius=radius))
+        painter = Painter(SQUARE, size)
+        painter.frame(scene)
+        canvas = Canvas(pygame.Surface(size), painter.camera, LIGHT, painter.scale, robot_hues(0))
+        return np.array(drawn_radii(canvas, scene)), painter
+
+    def test_discs_keep_apart_where_the_smallest_ones_can(self):
+        positions = 4.0 + np.random.default_rng(0).normal(size=(150, 2)) * 0.9
+        radii, painter = self.radii(positions)
+        pixels = painter.camera.to_pixels(positions)
+        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2)
+        least = np.maximum(0.1 * painter.camera.zoom, 2.4 * painter.scale)
+        crowded = np.maximum(radii[:, None], radii[None]) > least + 0.5
+        np.fill_diagonal(crowded, False)
+        assert crowded.sum() > 1000
+        assert (apart - radii[:, None] - radii[None])[crowded].min() > -0.5 - 0.5 * least
+
+    def test_a_few_far_apart_are_readable_whatever_the_others_do(self):
+        positions = np.vstack([4.0 + 0.01 * np.arange(8).reshape(4, 2), [[1.0, 1.0]]])
+        radii, painter = self.radii(positions, radius=0.004)
+        assert radii[-1] == pytest.approx(9.0 * painter.scale, abs=0.25)
+        assert radii[:4].max() <= 2.4 * painter.scale + 0.5
+
+    def test_numbers_only_where_they_have_room(self, monkeypatch):
+        from robocov_app.render import sprites
+
+        seen = {}
+        disc = sprites.disc
+
+        def watched(radius, fill, ring, width, edge, text, shift):
+            seen[text] = radius - width
+            return disc(radius, fill, ring, width, edge, text, shift)
+
+        monkeypatch.setattr(sprites, "disc", watched)
+        positions = np.vstack([4.0 + 0.06 * np.arange(16).reshape(8, 2), [[1.0, 1.0], [7.0, 1.0]]])
+        scene = explained(positions)
+        scene = replace(scene, team=Team.homogeneous(10, radius=0.01))
+        _, painter = drawn(scene, "robots")
+        assert set(seen) == {"", "9", "10"}
+        assert seen["9"] > 5 * painter.scale > seen[""]
+
+    def test_marks_shrink_in_a_crowd(self):
+        near = replace(explained(TWO), starts=4.0 + 0.02 * np.arange(20).reshape(10, 2))
+        far = replace(explained(TWO), starts=np.array([[2.0, 2.0], [6.0, 6.0]]))
+        sizes = []
+        for scene in (near, far):
+            pixels, painter = changed(scene, "starts", size=(800, 800))
+            first = painter.camera.to_pixels(scene.starts)[0]
+            sizes.append((first[0] - pixels[:, 0].min()) / painter.scale)
+        assert sizes[0] < 4.0 < 4.5 < sizes[1]
+
+
+class TestRobots:
+    def ink_of_numbers(self, frame, painter, scene):
+        """Return how many pixels within each disc are nearly of its number's colour."""
+        counts = []
+        for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
+            x, y = np.rint(pixel).astype(int)
+            patch = frame[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3)
+            colour = np.array(readable_on(LIGHT.robots[hue]))
+            counts.append(int((np.abs(patch - colour).max(axis=1) < 70).sum()))
+        return counts
+
+    def test_each_has_a_disc_of_its_hue_and_a_number(self):
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        for pixel, hue in zip(painter.camera.to_pixels(scene.snapshot.positions), painter._hues, strict=True):
+            rim = pixel + np.array([0.0, -5.0])
+            assert nearest(frame, rim, LIGHT.robots[hue]) < 30
+        assert min(self.ink_of_numbers(frame, painter, scene)) >= 4
+
+    def test_the_test_for_numbers_sees_their_absence(self, monkeypatch):
+        from robocov_app.render import sprites
+
+        with_numbers = sprites.disc
+        monkeypatch.setattr(sprites, "disc", lambda *given: with_numbers(*given[:5], "", given[6]))
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        assert max(self.ink_of_numbers(frame, painter, scene)) == 0
+
+    def test_numbers_are_those_of_the_robots(self):
+        """Of all nine numbers drawn in a robot's place, its own looks most like the picture."""
+        from robocov_app.render import sprites
+
+        scene = scene_of(run_of(SQUARE, 9, seed=3))
+        frame, painter = drawn(scene, "robots")
+        for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
+            quarters = np.rint((pixel + 0.5) * sprites.FINE).astype(int)
+            (x, y), shift = quarters // sprites.FINE, tuple((quarters % sprites.FINE).tolist())
+            fill = LIGHT.robots[painter._hues[robot]]
+            misses = []
+            for number in range(1, 10):
+                radius = round(9.0 * painter.scale * 2) / 2
+                sprite = sprites.disc(
+                    radius, fill, (255,) * 3, 1.6 * painter.scale, (0,) * 3, str(number), shift
+                )
+                pixels = np.frombuffer(pygame.image.tobytes(sprite, "RGB"), np.uint8)
+                pixels = pixels.reshape(sprite.get_height(), sprite.get_width(), 3).astype(int)
+                half = sprite.get_width() // 2
+                middle = pixels[half - 4 : half + 5, half - 4 : half + 5]
+                misses.append(np.abs(frame[y - 4 : y + 5, x - 4 : x + 5] - middle).sum())
+            assert int(np.argmin(misses)) == robot
+
+    def test_numbers_differ(self):
+        """Robots 1 and 7 at one place look different, in the middle of the disc."""
+        one, painter = drawn(explained(np.array([[4.0, 4.0]])), "robots")
+        several = np.column_stack([np.full(7, 1.0), np.arange(7.0) + 0.5])
+        several[6] = 4.0
+        seven, _ = drawn(explained(several), "robots")
+        x, y = np.rint(painter.camera.to_pixels(np.array([4.0, 4.0]))).astype(int)
+        light = [frame[y - 5 : y + 6, x - 5 : x + 6].min(axis=2) for frame in (one, seven)]
+        assert (np.abs(light[0] - light[1]) > 60).sum() > 5
+
+    def test_a_large_robot_is_drawn_in_true_size(self):
+        scene = replace(explained(ONE), team=Team.homogeneous(1, radius=1.5))
+        pixels, painter = changed(scene, "robots")
+        width, height = np.ptp(pixels, axis=0) + 1
+        assert width == pytest.approx(3.0 * painter.camera.zoom, abs=4)
+        assert height == pytest.approx(width, abs=1)
+
+    def test_slow_robots_glide(self):
+        """A shift by a quarter of a pixel changes the picture."""
+        _, painter = drawn(explained(ONE), "robots")
+        frames = [
+            drawn(explained(ONE + np.array([[k / 4 / painter.camera.zoom, 0.0]])), "robots")[0]
+            for k in range(5)
+        ]
+        for first, second in pairwise(frames):
+            assert (first != second).any()
+        assert np.roll(frames[0], 1, axis=1).tolist() == frames[4].tolist()
+
+
+class TestNumbers:
+    def patch(self, frame, painter, place, reach=9):
+        x, y = np.rint(painter.camera.to_pixels(np.array(place))).astype(int)
+        return frame[y - reach : y + reach + 1, x - reach : x + reach + 1]
+
+    def test_robots_are_called_by_theirs(self):
+        """What is called 7 looks as the seventh of seven does, number and colour."""
+        several = np.column_stack([np.full(7, 1.0), np.arange(7.0) + 0.5])
+        several[6] = 4.0
+        expected, painter = drawn(explained(several), "robots")
+        named = replace(explained(np.array([[4.0, 4.0], [6.0, 6.0]])), numbers=(7, 2))
+        frame, _ = drawn(named, "robots")
+        assert (self.patch(frame, painter, (4.0, 4.0)) == self.patch(expected, painter, (4.0, 4.0))).all()
+        unnamed, _ = drawn(replace(named, numbers=None), "robots")
+        assert (self.patch(unnamed, painter, (4.0, 4.0)) != self.patch(expected, painter, (4.0, 4.0))).any()
+        assert [named.number(row) for row in (0, 1)] == [7, 2]
+        assert [explained(TWO).number(row) for row in (0, 1)] == [1, 2]
+
+    @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+    def test_in_a_small_team_colours_stay_with_them(self, theme):
+        places = np.array([[1.0, 1.0], [4.0, 4.0], [7.0, 7.0]])
+        painter = Painter(SQUARE, SIZE, theme)
+        painter.show({"robots", "cells"})
+        for numbers in ((1, 2, 3), (1, 3), (3,), (2, 9)):
+            rows = [3 if number == 9 else number for number in numbers]
+            positions = places[np.array(rows) - 1]
+            frame = painter.frame(replace(explained(positions), numbers=numbers)).astype(int)
+            for number, place in zip(numbers, positions, strict=True):
+                pixel = painter.camera.to_pixels(place)
+                assert nearest(frame, pixel - np.array([0.0, 5.0]), theme.robots[number - 1]) < 30
+                assert distance(frame, pixel + np.array([0.0, 30.0]), theme.cell(number - 1)) == 0
+
+    def test_numbers_beyond_the_hues_do_not_matter(self):
+        scene = replace(explained(TWO), numbers=(4, 10))
+        _, painter = drawn(scene, "robots")
+        assert painter._hues.tolist() == [0, 1]
+
+
+class TestCells:
+    def scene(self, reach, used):
+        scene = explained(TWO, communication_range=reach)
+        decision = replace(scene.snapshot.decision, cells=used)
+        snapshot = Snapshot(scene.snapshot.seen, decision)
+        return Scene.of(SQUARE, scene.team, snapshot)
+
+    def test_those_of_the_law_are_taken_where_all_hear_all(self):
+        used = partition(TWO, SQUARE.region)
+        scene = self.scene(np.inf, used)
+        assert scene.cells is used.polygons
+        assert scene.centroids is used.centroid
+
+    @pytest.mark.parametrize("reach", [np.inf, 3.0])
+    @pytest.mark.parametrize(
+        "used",
+        [
+            partition(np.array([[1.0, 4.0], [3.0, 4.0]]), SQUARE.region),
+            partition(np.array([[1.0, 4.0]]), SQUARE.region),
+            "none",
+            None,
+        ],
+    )
+    def test_where_the_law_has_others_those_of_all_robots_are_drawn(self, reach, used):
+        scene = self.scene(reach, used)
+        frame, painter = drawn(scene, "cells")
+        assert nearest(frame, painter.camera.to_pixels(np.array([3.0, 5.0])), LIGHT.cell_edge) < 70
+        assert distance(frame, painter.camera.to_pixels(np.array([5.0, 1.0])), LIGHT.cell(0)) == 0
+
+
+class TestTrajectories:
+    @pytest.mark.parametrize("colours", ["robots", "paper"])
+    def test_run_along_the_positions(self, colours):
+        record = run_of(SQUARE, 4)
+        frame, painter = drawn(
+            scene_of(record), "trajectories", layers=[Trajectories(colours)], size=(800, 800)
+        )
+        for robot in range(4):
+            colour = LIGHT.trajectory if colours == "paper" else LIGHT.robots[robot]
+            for pixel in painter.camera.to_pixels(record.positions[5:35:4, robot]):
+                assert nearest(frame, pixel, colour) < 110
+
+    def test_frame_by_frame_looks_like_all_at_once(self):
+        record = run_of(SQUARE, 5, steps=60)
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"trajectories"})
+        for row in range(60):
+            stepwise = painter.frame(scene_of(record, row)).astype(int)
+        at_once, _ = drawn(scene_of(record), "trajectories")
+        drawn_pixels = (at_once != 255).any(axis=2)
+        assert drawn_pixels.sum() > 500
+        assert np.abs(stepwise - at_once)[drawn_pixels].mean() < 12
+        far = ~shapely.contains_xy(
+            shapely.union_all(
+                [
+                    shapely.LineString(painter.camera.to_pixels(path))
+                    for path in record.positions.swapaxes(0, 1)
+                ]
+            ).buffer(3.0),
+            *np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1])),
+        )
+        assert (stepwise[far] == 255).all()
+
+    def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
+        first, second = run_of(SQUARE, 5, seed=1), run_of(SQUARE, 5, seed=2)
+        painter = Painter(SQUARE, SIZE)
+        painter.show({"trajectories"})
+        painter.frame(scene_of(first))
+        for scene in (scene_of(second), scene_of(second, 20), scene_of(first, 3)):
+            fresh, _ = drawn(scene, "trajectories")
+            assert (painter.frame(scene) == fresh).all()
+
+    def test_fading_forgets_the_past(self):
+        record = run_of(SQUARE, 1, steps=80)
+        frame, painter = drawn(scene_of(record), "trajectories", layers=[Trajectories(fade=1.0)])
+        old, new = painter.camera.to_pixels(record.positions[[20, 78], 0])
+        assert nearest(frame, old, LIGHT.background, reach=2) == 0
+        assert (frame[int(old[1]) - 2 : int(old[1]) + 3, int(old[0]) - 2 : int(old[0]) + 3] == 255).all()
+        assert nearest(frame, new, LIGHT.robots[0]) < 110

@@ -1,0 +1,178 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, nearest
+from drawn_run import SQUARE, explained
+from written_words import check_glyph, glyphs, places
+
+from robocov.robots import Team
+from robocov_app.render.marks import Failed
+from robocov_app.render.picture import Painter
+from robocov_app.render.theme import DARK, LIGHT, contrast, mix
+
+THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+
+
+def broken(failed, positions=TWO, **more):
+    return replace(explained(positions), failed=failed, **more)
+
+
+def numbers(frame, painter, text, theme=LIGHT):
+    return places(frame, text, round(theme.small_text * painter.scale), theme, theme.ink)
+
+
+def around(frame, painter, place, radius):
+    """Return the pixels within so many px at scale 1 of a place."""
+    rows, columns = np.indices(frame.shape[:2])
+    x, y = painter.camera.to_pixels(np.array(place))
+    return frame[np.hypot(columns - x, rows - y) <= radius * painter.scale]
+
+
+class TestFailed:
+    @THEMES
+    def test_is_grey_and_crossed_out_where_it_stands(self, theme):
+        frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
+        center = painter.camera.to_pixels(np.array([4.0, 5.0]))
+        assert distance(frame, center, theme.ink) < 8
+        for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            assert nearest(frame, center + 3.0 * painter.scale * np.array(side), theme.ink) < 40
+        for side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            at = center + 5.0 * painter.scale * np.array(side)
+            assert nearest(frame, at, mix(theme.background, theme.ink, 0.3)) < 12
+
+    @THEMES
+    def test_does_not_look_like_a_robot_that_works(self, theme):
+        frame, painter = drawn(broken({3: (4.0, 5.0)}), "failed", theme=theme)
+        disc = around(frame, painter, (4.0, 5.0), 9)
+        assert np.ptp(disc, axis=1).max() < 32  # no hue
+        for robot in theme.robots:
+            assert np.abs(disc - np.array(robot)).max(axis=1).min() > 20
+        assert contrast(mix(theme.background, theme.ink, 0.3), theme.ink) > 4
+
+    @THEMES
+    def test_has_its_number_beside_it(self, theme):
+        failed = {12: (2.0, 6.0), 3: (6.0, 2.0)}
+        frame, painter = drawn(broken(failed), "failed", theme=theme)
+        for number, place in failed.items():
+            found = numbers(frame, painter, str(number), theme)
+            assert len(found) == 1
+            right, down = found[0] - painter.camera.to_pixels(np.array(place))
+            assert 8 * painter.scale < right < 30 * painter.scale
+            assert abs(down) < 4 * painter.scale
+        assert len(numbers(frame, painter, "7", theme)) == 0
+
+    @pytest.mark.parametrize(
+        ("robots", "side"),
+        [
+            ([], (1, 0)),
+            ([(1, 0)], (-1, 0)),
+            ([(1, 0), (-1, 0)], (0, -1)),
+            ([(1, 0), (-1, 0), (0, 1)], (0, 1)),
+        ],
+    )
+    def test_its_number_is_where_no_robot_is(self, robots, side):
+        """Robots at the right, left and above (y up) push it left, above and below (y down)."""
+        near = 4.0 + 0.4 * np.array(robots).reshape(-1, 2)
+        positions = np.vstack([near, [[1.0, 1.0]]])
+        frame, painter = drawn(broken({8: (4.0, 4.0)}, positions), "failed", "robots")
+        found = numbers(frame, painter, "8")
+        assert len(found) == 1
+        away = found[0] - painter.camera.to_pixels(np.array([4.0, 4.0]))
+        assert away @ np.array(side) / np.linalg.norm(away) > 0.9
+
+    def test_numbers_of_two_that_failed_side_by_side_can_both_be_read(self):
+        scene = broken({4: (4.0, 4.0), 5: (4.3, 4.0)})
+        frame, painter = drawn(scene, "failed")
+        assert len(numbers(frame, painter, "4")) == 1
+        assert len(numbers(frame, painter, "5")) == 1
+
+    def test_in_a_crowd_it_is_no_larger_than_there_is_room(self):
+        sizes = []
+        for apart in (0.15, 2.0):
+            scene = broken({4: (4.0, 4.0)}, np.array([[4.0 + apart, 4.0], [1.0, 1.0]]))
+            scene = replace(scene, team=Team.homogeneous(2, radius=0.02))
+            pixels, painter = changed(scene, "failed")
+            away = painter.camera.to_pixels(np.array([4.0, 4.0])) - pixels
+            sizes.append(away[:, 1].max() / painter.scale)
+        assert sizes[0] < 6 < 7 < sizes[1] < 10
+
+    def test_a_large_one_is_drawn_in_true_size(self):
+        scene = replace(broken({4: (4.0, 4.0)}), team=Team.homogeneous(2, radius=1.0))
+        frame, painter = drawn(scene, "failed")
+        center = painter.camera.to_pixels(np.array([4.0, 4.0]))
+        fill = mix(LIGHT.background, LIGHT.ink, 0.3)
+        assert distance(frame, center + np.array([0.9 * painter.camera.zoom, 0.0]), fill) == 0
+        assert nearest(frame, center + np.array([0.0, 1.2 * painter.camera.zoom]), LIGHT.background) == 0
+
+    def test_working_robots_are_above_it(self):
+        scene = broken({3: (4.05, 4.0)}, ONE)
+        frame, painter = drawn(scene, "failed", "robots")
+        alone, _ = drawn(explained(ONE), "robots")
+        disc = (around(alone, painter, (4.0, 4.0), 7), around(frame, painter, (4.0, 4.0), 7))
+        assert (disc[0] == disc[1]).all()
+
+    def test_where_none_failed_there_is_nothing(self):
+        pixels, painter = changed(broken({}), "failed")
+        assert len(pixels) == 0
+        assert painter.legend(broken({})) == []
+        assert painter.legend(broken({3: (4.0, 5.0)})) == ["failed robot"]
+
+    def test_it_is_there_too_before_anything_moves(self):
+        frame, painter = drawn(replace(broken({3: (4.0, 5.0)}), snapshot=None), "failed")
+        assert len(numbers(frame, painter, "3")) == 1
+
+    @THEMES
+    def test_its_glyph_in_the_legend(self, theme):
+        (picture,) = glyphs(Failed(), broken({3: (4.0, 5.0)}), theme)
+        check_glyph(picture, theme, theme.ink)
+        check_glyph(picture, theme, mix(theme.background, theme.ink, 0.3))
+
+
+class TestSelection:
+    @THEMES
+    @pytest.mark.parametrize("selected", [0, 1])
+    def test_is_a_ring_around_the_robot_and_no_other(self, theme, selected):
+        scene = replace(explained(TWO), selected=selected)
+        frame, painter = drawn(scene, "selection", theme=theme)
+        rows, columns = np.nonzero((frame != np.array(theme.background)).any(axis=2))
+        away = np.hypot(*(np.column_stack([columns, rows]) - painter.camera.to_pixels(TWO[selected])).T)
+        away /= painter.scale
+        assert len(away) > 60
+        assert 10.5 < away.min() < away.max() < 16  # discs have a radius of 9 and a hair line
+        for angle in np.arange(12) * np.pi / 6:
+            at = painter.camera.to_pixels(TWO[selected])
+            at = at + 13 * painter.scale * np.array([np.cos(angle), np.sin(angle)])
+            assert nearest(frame, at, theme.ink) < 30
+
+    def test_leaves_the_robot_and_its_number_as_they_are(self):
+        frame, painter = drawn(replace(explained(TWO), selected=1), "selection", "robots")
+        alone, _ = drawn(explained(TWO), "robots")
+        assert (around(frame, painter, TWO[1], 9) == around(alone, painter, TWO[1], 9)).all()
+        assert (around(frame, painter, TWO[0], 20) == around(alone, painter, TWO[0], 20)).all()
+        assert (around(frame, painter, TWO[1], 15) != around(alone, painter, TWO[1], 15)).any()
+
+    def test_fits_a_large_robot(self):
+        team = Team.homogeneous(2)
+        scene = replace(explained(TWO), selected=1, team=replace(team, radius=np.array([0.1, 1.0])))
+        pixels, painter = changed(scene, "selection")
+        away = np.hypot(*(pixels - painter.camera.to_pixels(TWO[1])).T)
+        assert painter.camera.zoom < away.min() < away.max() < 1.15 * painter.camera.zoom
+
+    def test_where_nobody_is_asked_about_there_is_nothing(self):
+        assert len(changed(explained(TWO), "selection")[0]) == 0
+        assert len(changed(replace(explained(TWO), selected=0, snapshot=None), "selection")[0]) == 0
+
+
+def test_marks_stay_inside_the_picture_of_the_map():
+    """What is out of sight below is not drawn over the status line."""
+    scene = replace(broken({3: (1.0, 0.0)}, np.array([[4.0, 0.0], [1.0, 1.0]])), selected=0)
+    painter = Painter(SQUARE, SIZE)
+    painter.show({"failed", "selection", "status"})
+    painter.camera = painter.camera.panned(0, 4)
+    frame = painter.frame(scene).astype(int)
+    alone, _ = drawn(explained(TWO), "status")
+    strip = int(painter.camera.view[1] + painter.camera.view[3]) + 1
+    assert SIZE[1] - strip > 20
+    assert (frame[strip:] == alone[strip:]).all()
+    assert (frame[:strip] != alone[:strip]).any()

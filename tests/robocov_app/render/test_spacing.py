@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from robocov_app.render.spacing import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
+
+points = arrays(np.float64, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(0, 100, width=32))
+
+
+def all_distances(centers):
+    apart = np.linalg.norm(centers[:, None] - centers[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return apart
+
+
+@settings(deadline=None, max_examples=60)
+@given(points)
+def test_the_nearest_is_the_nearest_of_all(centers):
+    assert nearest_distance(centers) == pytest.approx(all_distances(centers).min(axis=1), abs=1e-9)
+
+
+@settings(deadline=None, max_examples=100)
+@given(points, st.floats(0, 2), st.floats(0.1, 3))
+def test_discs_overlap_only_where_they_cannot_be_smaller(centers, true, least):
+    radii = fitted_radii(centers, np.full(len(centers), true), least, 9.0)
+    smallest = max(true, least)
+    assert (radii >= smallest).all() and (radii <= max(9.0, true)).all()
+    free = radii > smallest
+    overlaps = radii[:, None] + radii[None] > all_distances(centers) + 1e-9
+    assert not overlaps[free][:, free].any()
+
+
+def test_one_alone_is_as_large_as_can_be():
+    assert fitted_radii(np.zeros((1, 2)), np.ones(1), 2.0, 9.0).tolist() == [9.0]
+    assert mark_size(np.zeros((1, 2)), 2.0, 9.0) == mark_size(np.empty((0, 2)), 2.0, 9.0) == 9.0
+
+
+def test_lines_become_thinner_with_many_but_not_invisible():
+    widths = [line_crowding(n) for n in (1, 6, 20, 40, 80, 200, 10000)]
+    assert widths[:3] == [1.0, 1.0, 1.0]
+    assert 1.0 > widths[3] > widths[4] == widths[-1] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("count", "aspect", "columns"),
+    [(1, 1.0, 1), (2, 1.0, 2), (2, 3.0, 1), (3, 1.4, 3), (3, 4.0, 1), (4, 1.5, 2), (4, 0.2, 4), (6, 1.2, 3)],
+)
+def test_panels_are_as_large_as_can_be(count, aspect, columns):
+    assert columns_for(count, aspect, (1920, 1080)) == columns

@@ -1,0 +1,366 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from drawn_pixels import SIZE, distance, drawn, nearest
+from drawn_run import SQUARE, explained, run_of, scene_of
+
+from robocov_app.render.picture import Painter
+from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.render.trajectories import FADE_STEPS, Trajectories
+
+THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+FADES = pytest.mark.parametrize("fade", [None, 2.0], ids=["stays", "fades"])
+RATE = 20.0
+"""Rows for each second."""
+
+
+def walks(rows, n=3, seed=0):
+    """Return (rows, n, 2) m of smooth walks in the square."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(rows)[:, None] / RATE
+    speed, phase = rng.uniform(0.2, 0.7, size=(2, n)), rng.uniform(0, 6, size=(2, n))
+    return 4.0 + 3.0 * np.stack(
+        [np.sin(time * speed[0] + phase[0]), np.cos(time * speed[1] + phase[1])], axis=2
+    )
+
+
+def straight(rows, n=1):
+    """Return walks to the right at 2 m/s below each other."""
+    path = np.empty((rows, n, 2))
+    path[..., 0] = 0.5 + 2.0 * np.arange(rows)[:, None] / RATE
+    path[..., 1] = 1.0 + np.arange(n)
+    return path
+
+
+def walked(trail, time=None, **more):
+    time = np.arange(len(trail)) / RATE if time is None else time
+    known = np.nan_to_num(trail[-1], nan=1.0)
+    return replace(explained(known), trail=trail, trail_time=time, **more)
+
+
+def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
+    """Return a painter of trajectories, and their layer."""
+    painter = Painter(SQUARE, size, theme)
+    painter.show({"trajectories", *also})
+    layer = next(layer for layer in painter.layers if isinstance(layer, Trajectories))
+    layer.fade = fade
+    return painter, layer
+
+
+def frame_of(painter, *scene, **more):
+    return painter.frame(walked(*scene, **more)).astype(int)
+
+
+def ink(frame, theme=LIGHT):
+    return np.abs(frame - np.array(theme.background)).max(axis=2)
+
+
+def off_the_paths(painter, trail, frame, theme=LIGHT, reach=3.0):
+    """Return what is drawn farther than a few px from the paths, robot by robot, rows without nan only."""
+    lines = []
+    for path in painter.camera.to_pixels(trail.swapaxes(0, 1)):
+        there = np.isfinite(path[:, 0])
+        pieces = np.split(path, np.flatnonzero(np.diff(there)) + 1)
+        pieces = [piece for piece in pieces if np.isfinite(piece[0, 0])]
+        lines += [shapely.LineString(p) if len(p) > 1 else shapely.Point(p[0]) for p in pieces]
+    near = shapely.union_all(lines).buffer(reach)
+    rows, columns = np.nonzero(ink(frame, theme))
+    return int((~shapely.contains_xy(near, columns, rows)).sum())
+
+
+class TestThinning:
+    """A long run's trail loses every second of its older rows."""
+
+    rows, at = 120, 80
+
+    def thinned(self, trail):
+        keep = np.concatenate([np.arange(0, self.at // 2, 2), np.arange(self.at // 2, len(trail))])
+        return trail[keep], keep / RATE
+
+    @FADES
+    @pytest.mark.parametrize("together", [0, 3])
+    def test_gives_the_same_picture_and_redraws_nothing(self, fade, together):
+        """Also where rows were added before the next frame."""
+        trail = walks(self.rows)
+        whole, _ = painter_of(fade)
+        thin, layer = painter_of(fade)
+        for count in range(1, self.at + 1):
+            frame_of(whole, trail[:count])
+            frame_of(thin, trail[:count])
+        page, before = layer._page, layer._key
+        for count in range(self.at + together, self.rows + 1):
+            expected = frame_of(whole, trail[:count])
+            seen = frame_of(thin, *self.thinned(trail[:count]))
+            assert (expected == seen).all()
+            if layer._key == before:  # no step of fading since
+                assert layer._page is page
+        assert fade is not None or layer._page is page
+
+    def test_where_nothing_is_kept_the_picture_is_nearly_the_same(self):
+        trail = walks(self.rows)
+        expected = frame_of(painter_of()[0], trail)
+        seen = frame_of(painter_of()[0], *self.thinned(trail))
+        drawn_pixels = ink(expected) > 0
+        assert drawn_pixels.sum() > 800
+        assert np.abs(expected - seen)[drawn_pixels].mean() < 12
+
+    def test_another_trail_of_the_same_length_is_drawn_anew(self):
+        painter, _ = painter_of()
+        for seed in (0, 1, 0):
+            seen = frame_of(painter, walks(60, seed=seed))
+            assert (seen == frame_of(painter_of()[0], walks(60, seed=seed))).all()
+
+
+class TestGaps:
+    """Rows have nan for robots that are not there then."""
+
+    def late(self, rows=80, begin=40):
+        trail = straight(rows, 2)
+        trail[:begin, 1] = np.nan
+        return trail
+
+    @FADES
+    @THEMES
+    def test_robots_that_join_later_are_drawn_from_there(self, fade, theme):
+        trail = self.late()
+        painter, _ = painter_of(fade, theme)
+        for count in range(1, 81):
+            frame = frame_of(painter, trail[:count])
+            assert off_the_paths(painter, trail[:count], frame, theme) == 0
+        at_once = frame_of(painter_of(fade, theme)[0], trail)
+        for each in (frame, at_once):
+            assert off_the_paths(painter, trail, each, theme) == 0
+            for row in (60, 70, 78):
+                pixel = painter.camera.to_pixels(trail[row, 1])
+                assert nearest(each, pixel, theme.trail(1)) < 120
+            first = painter.camera.to_pixels(trail[40, 1])
+            assert ink(each, theme)[:, : int(first[0]) - 3][int(first[1]) - 4 : int(first[1]) + 5].max() == 0
+
+    @FADES
+    def test_robots_that_come_back_elsewhere_leave_no_line_between(self, fade):
+        trail = straight(60, 2)
+        trail[30:40, 1] = np.nan
+        trail[40:, 1, 1] = 6.0
+        painter, _ = painter_of(fade)
+        for count in range(1, 61):
+            frame = frame_of(painter, trail[:count])
+            assert off_the_paths(painter, trail[:count], frame) == 0
+        at_once = frame_of(painter_of(fade)[0], trail)
+        assert off_the_paths(painter, trail, at_once) == 0
+        for each in (frame, at_once):
+            for row in (26, 44, 55):
+                pixel = painter.camera.to_pixels(trail[row, 1])
+                assert nearest(each, pixel, LIGHT.trail(1)) < 150
+
+    @FADES
+    def test_slow_ones_leave_none_either(self, fade):
+        trail = straight(30, 2) * np.array([0.05, 1.0]) + np.array([2.0, 0.0])
+        trail[14:17, 1] = np.nan
+        trail[17:, 1, 1] = 5.0
+        frame = frame_of(painter_of(fade and 20.0)[0], trail)
+        assert off_the_paths(painter_of()[0], trail, frame) == 0
+        assert (ink(frame) > 0).any()
+
+    @FADES
+    def test_robots_that_go_leave_their_path_and_nothing_else(self, fade):
+        trail = straight(50, 2)
+        trail[35:, 1] = np.nan
+        painter, _ = painter_of(fade)
+        for count in range(1, 51):
+            frame = frame_of(painter, trail[:count])
+        assert off_the_paths(painter, trail, frame) == 0
+        assert nearest(frame, painter.camera.to_pixels(trail[30, 1]), LIGHT.trail(1)) < 200
+
+    @FADES
+    def test_a_robot_that_never_was_there_draws_nothing(self, fade):
+        trail = straight(40, 2)
+        trail[:, 1] = np.nan
+        alone = frame_of(painter_of(fade)[0], trail)
+        painter, _ = painter_of(fade)
+        assert off_the_paths(painter, trail, alone) == 0
+        nowhere = np.full((5, 2, 2), np.nan)
+        assert (frame_of(painter, nowhere) == 255).all()
+        assert (frame_of(painter, nowhere[:1]) == 255).all()
+
+    def test_gaps_do_not_hinder_thinning(self):
+        trail = self.late()
+        painter, layer = painter_of()
+        frame_of(painter, trail[:60])
+        page = layer._page
+        keep = np.r_[0:30:2, 30:80]
+        frame_of(painter, trail[keep], keep / RATE)
+        assert layer._page is page
+
+
+class TestFading:
+    def strengths(self, frame, painter, trail, rows, theme):
+        """Return how far the picture is from the background at rows of the first robot."""
+        pixels = painter.camera.to_pixels(trail[rows, 0])
+        return [int(ink(frame, theme)[int(y) - 1 : int(y) + 3, int(x)].max()) for x, y in np.rint(pixels)]
+
+    @THEMES
+    def test_older_pieces_are_fainter(self, theme):
+        trail = straight(70)
+        painter, _ = painter_of(3.0, theme)
+        frame = frame_of(painter, trail)
+        rows = np.arange(68, 2, -6)
+        seen = self.strengths(frame, painter, trail, rows, theme)
+        age = (69 - rows) / RATE
+        full = max(abs(a - b) for a, b in zip(theme.trail(0), theme.background, strict=True))
+        assert seen[0] > 0.85 * full
+        assert all(new > old for new, old in pairwise(seen) if new)
+        assert 0.35 * full < np.interp(1.5, age, seen) < 0.75 * full
+        assert np.interp(2.7, age, seen) < 0.3 * full
+        assert self.strengths(frame, painter, trail, [5], theme) == [0]  # 3.2 s ago
+
+    @THEMES
+    def test_frame_by_frame_too(self, theme):
+        """The newest is strong at any time, and nothing is missing up to now."""
+        trail = straight(70)
+        painter, _ = painter_of(3.0, theme)
+        full = max(abs(a - b) for a, b in zip(theme.trail(0), theme.background, strict=True))
+        for count in range(1, 71):
+            frame = frame_of(painter, trail[:count])
+            if count % 12 not in (0, 4):
+                continue  # drawn is every frame; to look at all of them takes a while
+            rows = np.arange(count - 2, max(count - 50, 0), -1)
+            seen = self.strengths(frame, painter, trail, rows, theme)
+            assert all(strength > 0.2 * full for strength in seen)
+            assert all(strength > 0.75 * full for strength in seen[:8])
+        assert self.strengths(frame, painter, trail, [5], theme) == [0]
+
+    @THEMES
+    def test_it_fades_into_what_lies_below(self, theme):
+        """On a cell it is neither paler nor darker than the cell and the colour of its robot."""
+        trail = straight(70)
+        painter, _ = painter_of(3.0, theme, also={"cells"})
+        frame = frame_of(painter, trail)
+        low = np.minimum(theme.cell(0), theme.trail(0)) - 4
+        high = np.maximum(theme.cell(0), theme.trail(0)) + 4
+        for x, y in np.rint(painter.camera.to_pixels(trail[8:68, 0])).astype(int):
+            column = frame[y - 3 : y + 4, x]
+            assert (column >= low).all()
+            assert (column <= high).all()
+        x, y = np.rint(painter.camera.to_pixels(trail[14, 0])).astype(int)
+        assert 0 < nearest(frame, (x, y), theme.cell(0), reach=0) < 60
+
+    def test_where_paths_cross_the_newer_is_on_top(self):
+        rows = 61
+        trail = np.empty((rows, 2, 2))
+        part = np.arange(rows) / RATE
+        trail[:, 0] = np.column_stack([np.full(rows, 4.0), 6.5 - 2.0 * part])  # crosses late, at 1.25 s
+        trail[:, 1] = np.column_stack([3.5 + 2.0 * part, np.full(rows, 4.0)])  # crosses early, at 0.25 s
+        painter, _ = painter_of(3.0)
+        pixel = painter.camera.to_pixels(np.array([4.0, 4.0]))
+        frame = frame_of(painter, trail)
+        assert nearest(frame, pixel, LIGHT.trail(0), reach=0) < nearest(frame, pixel, LIGHT.trail(1), reach=0)
+        swapped = frame_of(painter, trail[:, ::-1])
+        assert nearest(swapped, pixel, LIGHT.trail(1), reach=0) < 110
+
+    def test_slow_robots_have_trails_without_gaps(self):
+        trail = np.empty((400, 2, 2))
+        trail[:, 0] = walks(400, 1)[:, 0]
+        trail[:, 1] = np.column_stack([2.0 + 0.0009 * np.arange(400), np.full(400, 1.0)])
+        painter, _ = painter_of(20.0)
+        frame = frame_of(painter, trail)
+        first, last = np.rint(painter.camera.to_pixels(trail[[200, -1], 1])).astype(int)
+        band = ink(frame)[first[1] - 2 : first[1] + 4, first[0] : last[0]]
+        assert band.shape[1] > 7
+        assert band.max(axis=0).min() > 60
+
+    def test_rows_as_old_as_it_goes_are_no_trouble(self):
+        """Rounding may find them a little older."""
+        painter, layer = painter_of(0.3)
+        trail = straight(40)
+        older = 0
+        for rate in (7.0, 10.0, 30.0):
+            time = np.arange(40) / rate
+            for count in range(5, 40):
+                layer.fade = 3 / rate
+                older += (time[count - 1] - time[count - 4]) / layer.fade > 1.0
+                frame = frame_of(painter, trail[:count], time[:count])
+                assert (ink(frame) > 0).any()
+        assert older > 0
+
+    def test_its_page_is_kept_between_steps(self):
+        trail = walks(200)
+        painter, layer = painter_of(6.0)
+        pages = []
+        for count in range(100, 200):
+            frame_of(painter, trail[:count])
+            if not pages or layer._page is not pages[-1]:
+                pages.append(layer._page)
+        assert len(pages) == pytest.approx(100 / RATE / (6.0 / FADE_STEPS), abs=2)
+
+    def test_another_run_or_a_step_back_leaves_nothing_of_the_old(self):
+        painter, _ = painter_of(4.0)
+        frame_of(painter, walks(43))
+        for trail in (walks(43, seed=1), walks(41, seed=1), walks(42), walks(20), walks(3)):
+            assert (frame_of(painter, trail) == frame_of(painter_of(4.0)[0], trail)).all()
+
+    def test_other_colours_are_drawn_anew(self):
+        trail = straight(40, 2)
+        for fade in (None, 4.0):
+            painter, _ = painter_of(fade)
+            for numbers in ((1, 2), (3, 4)):
+                frame = frame_of(painter, trail, numbers=numbers)
+                assert (frame == frame_of(painter_of(fade)[0], trail, numbers=numbers)).all()
+                for row, number in enumerate(numbers):
+                    for place in painter.camera.to_pixels(trail[[30, 36], row]):
+                        assert nearest(frame, place, LIGHT.trail(number - 1)) < 90
+
+    def test_it_may_be_switched_on_and_off(self):
+        trail = walks(90)
+        painter, layer = painter_of()
+        stays = frame_of(painter, trail)
+        layer.fade = 1.5
+        fades = frame_of(painter, trail)
+        assert (fades == frame_of(painter_of(1.5)[0], trail)).all()
+        layer.fade = None
+        assert (frame_of(painter, trail) == stays).all()
+        assert (ink(fades) > 0).sum() < 0.7 * (ink(stays) > 0).sum()
+        layer.fade = 1.5
+        scene = replace(walked(trail), trail_time=None)  # it cannot, without times
+        assert (painter.frame(scene) == stays).all()
+
+    def test_a_single_row_or_robots_at_rest_draw_nothing_far_off(self):
+        still = np.repeat(walks(1), 30, axis=0)
+        for trail in (still, still[:1]):
+            frame = frame_of(painter_of(1.0)[0], trail)
+            assert (ink(frame) > 0).sum() <= 3 * 9
+
+    @FADES
+    def test_close_up_it_is_drawn_too(self, fade):
+        painter, _ = painter_of(fade)
+        trail = walks(60)
+        x, y = trail[-5, 0]
+        painter.camera = replace(painter.camera, center=(x, y), zoom=2e4)
+        frame = frame_of(painter, trail)
+        assert nearest(frame, painter.camera.to_pixels(trail[-5, 0]), LIGHT.trail(0), reach=3) < 110
+
+    def test_large_teams_are_in_one_quiet_colour(self):
+        trail = straight(40, 12) * np.array([1.0, 0.55])
+        frame = frame_of(painter_of(4.0)[0], trail)
+        painter, _ = painter_of(4.0)
+        red = [nearest(frame, painter.camera.to_pixels(trail[37, k]), LIGHT.trajectory) for k in range(12)]
+        assert max(red) < 150
+
+
+@pytest.mark.parametrize("size", [(640, 480), (1600, 1200)])
+def test_pieces_on_the_page_and_new_ones_are_alike(size):
+    """Where a section begins or ends, the line is neither thicker nor broken."""
+    record = run_of(SQUARE, 3, steps=80)
+    painter, _ = painter_of(size=size)
+    for row in range(1, 80):
+        frame = painter.frame(scene_of(record, row)).astype(int)
+    at_once, _ = drawn(scene_of(record), "trajectories", size=size)
+    for row in range(4, 74, 2):
+        for pixel in painter.camera.to_pixels(record.positions[row]):
+            assert nearest(frame, pixel, LIGHT.background, reach=0) > 0
+            assert (
+                abs(distance(frame, pixel, LIGHT.background) - distance(at_once, pixel, LIGHT.background))
+                < 130
+            )

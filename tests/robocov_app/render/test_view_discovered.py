@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_pixels import ONE, distance, drawn
+from drawn_run import SQUARE, explained
+
+from robocov.controllers.atlas import Atlas
+from robocov.planning.discovered import FREE, PRESUMED, WALL, DiscoveredMap, Raster
+from robocov.robots import Team
+from robocov_app.render.discovered import discovered_map
+from robocov_app.render.sensed import Sensed
+from robocov_app.render.theme import DARK, LIGHT, mix
+
+
+def scene(selected: int | None = 0):
+    """A scene in which the first robot knows a wall, a presumed one, and free cells on the left."""
+    raster = Raster(SQUARE.region, 0.1)
+    state = np.zeros(raster.shape, dtype=np.uint8)
+    columns = raster.shape[1]
+    state[:, : columns // 2] = FREE
+    state[20:25, 10:20] = WALL
+    state[30:35, 10:20] = PRESUMED
+    known = DiscoveredMap(raster, state)
+    plain = explained(ONE)
+    memory = Atlas().begin(SQUARE.region, Team.homogeneous(len(plain.team)))
+    memory = replace(memory, states=(replace(memory.states[0], known=known), *memory.states[1:]))
+    snapshot = replace(plain.snapshot, decision=replace(plain.snapshot.decision, memory=memory))
+    return known, replace(plain, snapshot=snapshot, sensed=Sensed(), selected=selected)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_walls_and_what_is_unknown_are_seen(theme):
+    known, shown = scene()
+    assert discovered_map(shown) is known
+    frame, painter = drawn(shown, "sensed", theme=theme)
+    at = {
+        name: painter.camera.to_pixels(known.raster.middles(np.array(row), np.array(column)))
+        for name, (row, column) in {
+            "wall": (22, 15),
+            "presumed": (32, 15),
+            "free": (40, 15),
+            "unknown": (40, known.raster.shape[1] - 6),
+        }.items()
+    }
+    colour = theme.forces["repulsion_obstacle"]
+    assert distance(frame, at["free"], theme.background) == 0
+    assert distance(frame, at["wall"], mix(theme.background, colour, 0.85)) < 6
+    assert distance(frame, at["presumed"], mix(theme.background, colour, 0.45)) < 6
+    assert distance(frame, at["unknown"], mix(theme.background, theme.obstacle, 0.28)) < 6
+
+
+def test_without_a_robot_or_a_map_nothing_is_drawn():
+    _, shown = scene(selected=None)
+    assert discovered_map(shown) is None
+    assert discovered_map(replace(explained(ONE), selected=0)) is None
+    assert discovered_map(replace(shown, snapshot=None, selected=0)) is None

@@ -1,0 +1,337 @@
+"""Each claim on made-up outcomes whose truth is known: it holds, partly, not at all, or cannot be told."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov_app.figures.statistics import Interval
+from robocov_app.replication import claims
+from robocov_app.replication.gain_claims import gains_choice, gains_result, regrets
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes, Scenario
+from robocov_app.replication.placements import matched_distance, spread_of_placements
+from robocov_app.replication.verdicts import Claim, Criterion, amount
+
+pytestmark = pytest.mark.usefixtures("few_resamples")
+
+STARTS = ("corner", "centre", "uniform")
+FEW, MANY = 3, 12
+
+
+def scenarios(maps: int, seeds: int = 2) -> tuple[Scenario, ...]:
+    return tuple(
+        Scenario(f"map {m}", start, seed) for m in range(maps) for start in STARTS for seed in range(seeds)
+    )
+
+
+def outcomes(maps: int = MANY, measure: str = "final", **levels: float | list[float]) -> Outcomes:
+    """Outcomes in which each law reaches its level (by start, where there are three), by a map's size."""
+    where = scenarios(maps)
+    rng = np.random.default_rng(5)
+    size = np.array([1.0 + int(s.map.split()[1]) for s in where])
+    values = {}
+    for law, level in levels.items():
+        by_start = np.broadcast_to(np.asarray(level, dtype=float), 3)
+        of_start = np.array([by_start[STARTS.index(s.start)] for s in where])
+        noise = 1.0 + 0.001 * rng.standard_normal(len(where))
+        values[law.replace("_", "-"), measure] = of_start * noise * size
+    return Outcomes(where, values)
+
+
+class TestVerdicts:
+    @pytest.mark.parametrize(
+        ("bounds", "interval", "met"),
+        [
+            ((0.0, 1.0), (0.2, 0.8), True),
+            ((0.0, 1.0), (0.0, 1.0), True),
+            ((0.0, 1.0), (1.1, 1.2), False),
+            ((0.0, 1.0), (-2.0, -0.1), False),
+            ((0.0, 1.0), (0.9, 1.1), None),
+            ((0.0, 1.0), (np.nan, np.nan), None),
+            ((-np.inf, 1.0), (-9.0, 0.5), True),
+        ],
+    )
+    def test_a_criterion(self, bounds, interval, met):
+        low, high = interval
+        assert Criterion("x", Interval((low + high) / 2, low, high), *bounds).met is met
+
+    @pytest.mark.parametrize(
+        ("outcomes", "verdict"),
+        [
+            ("yes yes", "holds"),
+            ("yes", "holds"),
+            ("yes no", "holds partly"),
+            ("open yes", "holds partly"),
+            ("no no", "does not hold"),
+            ("open no", "does not hold"),
+            ("open open", "undecided"),
+            ("", "undecided"),
+        ],
+    )
+    def test_what_the_criteria_say_together(self, outcomes, verdict):
+        interval = {"yes": (0.1, 0.2), "no": (2.0, 3.0), "open": (0.5, 1.5)}
+        criteria = tuple(
+            Criterion("x", Interval(1.0, *interval[word]), 0.0, 1.0) for word in outcomes.split()
+        )
+        assert Claim("k", 1, "c", criteria, runs=50, maps=20).verdict == verdict
+        assert Claim("k", 1, "c", criteria, runs=50, maps=4).verdict == "undecided"
+
+    def test_json_has_what_was_promised(self):
+        criterion = Criterion("ratio", Interval(0.9, 0.8, 0.95), high=1.0)
+        found = Claim("k", 2, "It is lower.", (criterion,), 40, 10, "Why.").to_json()
+        assert found["claim"] == "It is lower."
+        assert (found["verdict"], found["estimate"], found["interval"]) == ("holds", 0.9, [0.8, 0.95])
+        assert (found["runs"], found["key"], found["criteria"][0]["met"]) == (40, "k", True)
+
+    @pytest.mark.parametrize(
+        ("value", "unit", "text"),
+        [
+            (0.643, "", "0.643"),
+            (0.5, "%", "50 %"),
+            (0.052, "%", "5.2 %"),
+            (0.9999, "%", "100 %"),
+            (-0.031, "%", "−3.1 %"),
+            (1.234, "m", "1.23 m"),
+            (np.inf, "m", "–"),
+        ],
+    )
+    def test_amounts(self, value, unit, text):
+        assert amount(value, unit) == text
+
+    @pytest.mark.parametrize(
+        ("low", "high", "text"),
+        [(-np.inf, 0.05, "at most 5 %"), (0.9, np.inf, "at least 90 %"), (0.1, 0.2, "between 10 % and 20 %")],
+    )
+    def test_what_is_wanted_in_words(self, low, high, text):
+        assert Criterion("x", Interval(0.0, 0.0, 0.0), low, high, "%").wanted == text
+
+
+class TestConvex:
+    @pytest.mark.parametrize(
+        ("level", "verdict"), [(1.004, "holds"), (0.97, "holds partly"), (1.2, "does not hold")]
+    )
+    def test_final_cost(self, level, verdict):
+        assert claims.convex_final(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
+
+    @pytest.mark.parametrize(
+        ("level", "verdict"), [(0.9, "holds"), (1.02, "does not hold"), (1.0, "undecided")]
+    )
+    def test_spreading(self, level, verdict):
+        found = outcomes(measure="early", rapf_shared=level, lloyd=1.0)
+        if verdict == "undecided":  # wins on half of the maps, by as much as it loses on the others
+            values = dict(found.values)
+            odd = np.array([int(map_.split()[1]) % 2 for map_ in found.maps])
+            values["rapf-shared", "early"] = values["lloyd", "early"] * np.where(odd, 1.1, 1 / 1.1)
+            found = Outcomes(found.scenarios, values)
+        assert claims.convex_spreading(found, ("corner", "centre")).verdict == verdict
+
+    def test_only_starts_close_together_count(self):
+        found = outcomes(measure="early", rapf_shared=[0.9, 0.9, 5.0], lloyd=1.0)
+        claim = claims.convex_spreading(found, ("corner", "centre"))
+        assert claim.verdict == "holds"
+        assert claim.runs == 2 * MANY * 2 * 2
+
+
+class TestNonConvex:
+    @pytest.mark.parametrize("gains", ["shared", "best"])
+    @pytest.mark.parametrize(("moment", "measure"), [("final", "final"), ("motion", "first_minute")])
+    @pytest.mark.parametrize(
+        ("level", "verdict"),
+        [(0.7, "holds"), (0.97, "holds partly"), (1.1, "does not hold"), ([0.6, 0.6, 1.2], "holds partly")],
+    )
+    def test_against_rpf(self, gains, moment, measure, level, verdict):
+        laws = {f"rapf_{gains}": level, f"rpf_{gains}": 1.0}
+        claim = claims.nonconvex(outcomes(measure=measure, **laws), gains, moment)
+        assert claim.verdict == verdict
+        assert claim.key == f"nonconvex-{moment}-{gains}"
+
+    def test_where_it_loses_is_told(self):
+        claim = claims.nonconvex(outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final")
+        assert "corner 0.6, centre 0.7, uniform 1.2" in claim.explanation
+        assert f"RAPF loses {MANY * 2} of {MANY * 6}" in claim.explanation
+        assert "start uniform" in claim.explanation
+
+    @pytest.mark.parametrize(
+        ("level", "verdict"), [(0.8, "holds"), (0.99, "holds partly"), (1.1, "does not hold")]
+    )
+    def test_against_lloyd(self, level, verdict):
+        assert claims.outperforms_lloyd(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
+
+    def test_few_maps_decide_nothing(self):
+        claim = claims.nonconvex(outcomes(FEW, rapf_shared=0.5, rpf_shared=1.0), "shared", "final")
+        assert (claim.verdict, claim.maps) == ("undecided", FEW)
+
+    def test_runs_that_failed_drop_out_in_pairs(self):
+        whole = outcomes(rapf_shared=0.5, rpf_shared=1.0)
+        whole.values["rapf-shared", "final"][3] = np.nan
+        whole.values["rpf-shared", "final"][[3, 7]] = np.nan
+        claim = claims.nonconvex(whole, "shared", "final")
+        assert claim.runs == 2 * (MANY * 6 - 2)
+        assert claim.criteria[0].interval.estimate == pytest.approx(0.5, rel=0.01)
+
+
+class TestStarts:
+    @pytest.mark.parametrize(
+        ("rapf", "rpf", "verdict"),
+        [
+            ([1.0, 1.02, 0.98], [1.0, 1.5, 2.0], "holds"),
+            ([1.0, 1.02, 0.98], [1.0, 1.02, 0.98], "holds partly"),
+            ([1.0, 1.5, 2.0], [1.0, 1.5, 2.0], "holds partly"),
+            ([1.0, 1.5, 2.0], [1.0, 1.01, 1.0], "does not hold"),
+        ],
+    )
+    def test_cost(self, rapf, rpf, verdict):
+        assert claims.starts_cost(outcomes(rapf_shared=rapf, rpf_shared=rpf)).verdict == verdict
+
+    @pytest.mark.parametrize(
+        ("ours", "theirs", "verdict"),
+        [(0.1, 3.0, "holds"), (2.0, 3.5, "holds partly"), (3.5, 2.0, "does not hold")],
+    )
+    def test_placement(self, ours, theirs, verdict):
+        found = outcomes(rapf_shared=1.0, rpf_shared=1.0)
+        rng = np.random.default_rng(1)
+        shift = np.array([STARTS.index(start) for start in found.starts], dtype=float)
+        base = np.stack([4.0 * np.arange(6.0), np.zeros(6)], axis=1)
+        places = {
+            law: base[None]
+            + (reach * shift)[:, None, None] * [0.0, 1.0]
+            + 0.01 * rng.random((len(shift), 6, 2))
+            for law, reach in (("rapf-shared", ours), ("rpf-shared", theirs))
+        }
+        shares = dict.fromkeys(found.maps, 4.0)
+        claim = claims.starts_placement(Outcomes(found.scenarios, found.values, places, shares))
+        assert claim.verdict == verdict
+        assert claim.criteria[0].interval.estimate == pytest.approx(ours / 4.0, rel=0.1)
+
+
+class TestStuckAndGap:
+    @pytest.mark.parametrize(
+        ("share", "gap", "verdict"),
+        [(1.0, 0.5, "holds"), (1.0, 0.05, "holds partly"), (0.1, 0.05, "does not hold")],
+    )
+    def test_stuck(self, share, gap, verdict):
+        where = scenarios(MANY, 4)
+        count = (np.arange(len(where)) % 10 < 10 * share) * 2.0
+        values = {("lloyd", "stuck"): count, ("lloyd", "gap"): np.full(len(where), gap)}
+        claim = claims.stuck(Outcomes(where, values))
+        assert claim.verdict == verdict
+        assert f"{amount(float(count.mean()))} robots" in claim.explanation
+
+    @pytest.mark.parametrize(
+        ("law", "gap", "verdict"),
+        [
+            ("rapf-shared", 0.05, "holds"),
+            ("rapf-shared", 0.2, "does not hold"),
+            ("rpf-shared", 0.7, "holds"),
+            ("rpf-shared", 0.1, "does not hold"),
+            ("lloyd", 0.08, "holds"),
+        ],
+    )
+    def test_gap(self, law, gap, verdict):
+        where = scenarios(MANY)
+        rng = np.random.default_rng(0)
+        values = {(law, "gap"): gap + 0.01 * rng.standard_normal(len(where))}
+        assert claims.gap_to_reference(Outcomes(where, values), law).verdict == verdict
+
+
+def grid(spread: float, maps: int = MANY, own_best: bool = False) -> GainOutcomes:
+    """Nine sets of gains; the fifth is best everywhere, or another one on each map."""
+    where = scenarios(maps, 1)
+    gains = tuple({"k_rep": a, "k_att": b} for a in (0.1, 1.0, 10.0) for b in (1.0, 3.0, 30.0))
+    rng = np.random.default_rng(2)
+    best = [int(s.map.split()[1]) % 9 if own_best else 4 for s in where]
+    worse = np.abs(np.arange(9)[:, None] - np.array(best)[None]) / 8.0
+    return GainOutcomes(where, gains, 1.0 + spread * worse + 1e-4 * rng.random((9, len(where))))
+
+
+class TestGains:
+    @pytest.mark.parametrize(
+        ("rapf", "rpf", "verdict"),
+        [
+            (0.02, 0.9, "holds"),
+            (0.02, 0.05, "holds partly"),
+            (0.5, 0.9, "holds partly"),
+            (0.9, 0.05, "does not hold"),
+        ],
+    )
+    def test_result(self, rapf, rpf, verdict):
+        claim = gains_result(grid(rapf), grid(rpf))
+        assert claim.verdict == verdict
+        assert claim.runs == 2 * 9 * MANY * 3
+
+    @pytest.mark.parametrize(
+        ("rapf", "rpf", "verdict"),
+        [(False, True, "holds"), (False, False, "holds partly"), (True, False, "does not hold")],
+    )
+    def test_choice(self, rapf, rpf, verdict):
+        claim = gains_choice(grid(0.9, own_best=rapf), grid(0.9, own_best=rpf))
+        assert claim.verdict == verdict
+
+    def test_regret_is_nothing_where_one_set_is_best_everywhere(self):
+        found, maps = regrets(grid(0.9))
+        assert found == pytest.approx(np.zeros(MANY * 3))
+        assert len(set(maps)) == MANY
+
+    def test_regret_does_not_favour_what_was_chosen_by_chance(self):
+        """Where gains make no difference, knowing the map is worth nothing: the mean regret is zero."""
+        where = scenarios(40, 1)
+        noise = 1.0 + 0.05 * np.random.default_rng(4).standard_normal((9, len(where)))
+        found, _ = regrets(GainOutcomes(where, tuple({"k": float(k)} for k in range(9)), noise))
+        assert abs(found.mean()) < 3 * found.std() / np.sqrt(len(found))
+
+    def test_scenarios_with_a_failed_run_do_not_count(self):
+        broken = grid(0.02)
+        broken.excess[2, 5] = np.nan
+        claim = gains_result(broken, grid(0.9))
+        assert claim.runs == 2 * 9 * (MANY * 3 - 1)
+        assert broken.best() == 4
+
+
+@pytest.mark.parametrize(
+    "claim",
+    [
+        claims.convex_final,
+        lambda o: claims.convex_spreading(o, STARTS),
+        lambda o: claims.nonconvex(o, "best", "motion"),
+        claims.outperforms_lloyd,
+        claims.starts_cost,
+        claims.starts_placement,
+        claims.stuck,
+        lambda o: claims.gap_to_reference(o, "lloyd"),
+    ],
+)
+def test_nothing_to_go_by_is_undecided(claim):
+    found = claim(Outcomes((), {}))
+    assert (found.verdict, found.runs, found.to_json()["estimate"]) == ("undecided", 0, None)
+    nothing = GainOutcomes((), ({"k_rep": 1.0},), np.empty((1, 0)))
+    assert gains_result(nothing, nothing).verdict == gains_choice(nothing, nothing).verdict == "undecided"
+
+
+places = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=1, max_size=5)
+
+
+class TestMatchedDistance:
+    @given(st.data())
+    def test_is_the_least_over_all_ways_to_match(self, data):
+        first = np.array(data.draw(places))
+        second = np.array(
+            data.draw(st.lists(st.tuples(*[st.floats(-9, 9)] * 2), min_size=len(first), max_size=len(first)))
+        )
+        least = min(
+            np.hypot(*(first - second[list(order)]).T).mean() for order in permutations(range(len(first)))
+        )
+        assert matched_distance(first, second) == pytest.approx(least, abs=1e-9)
+
+    @given(places, st.randoms())
+    def test_it_does_not_matter_who_is_where(self, positions, random):
+        first = np.array(positions)
+        second = first.copy().tolist()
+        random.shuffle(second)
+        assert matched_distance(first, np.array(second)) == pytest.approx(0.0, abs=1e-9)
+
+    def test_only_pairs_of_different_starts_count(self):
+        ends = np.array([[[0.0, 0.0]], [[9.0, 0.0]], [[1.0, 0.0]], [[np.nan, 0.0]]])
+        assert spread_of_placements(ends, ["a", "a", "b", "b"]) == pytest.approx(4.5)
+        assert np.isnan(spread_of_placements(ends[:2], ["a", "a"]))

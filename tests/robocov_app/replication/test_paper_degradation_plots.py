@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from robocov.errors import ParameterError
+from robocov_app.figures.statistics import Interval
+from robocov_app.replication.degradation import Degradation
+from robocov_app.replication.degradation_plots import plot_degradations
+
+
+def found() -> list[Degradation]:
+    rows = []
+    for axis, values in (
+        ("loss", (0.0, 0.5)),
+        ("communication_range", (None, 2.0)),
+        ("failure_rate", (0.0, 0.1)),
+    ):
+        for k, value in enumerate(values):
+            for name, label in (("rapf", "RAPF"), ("lloyd", "LA")):
+                ratio = Interval(1.0 + 0.2 * k, 1.0, 1.0 + 0.4 * k)
+                rows.append(Degradation(axis, value, name, label, ratio, 6, 0))
+    return rows
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_panel_for_each_thing_and_a_curve_for_each_controller(theme: str) -> None:
+    figure = plot_degradations(found(), theme=theme)
+    panels = figure.axes
+    assert [axes.get_title(loc="left") for axes in panels] == [
+        "Messages lost",
+        "Communication range (m)",
+        "Failures of each robot (1/s)",
+    ]
+    assert [text.get_text() for text in panels[1].get_xticklabels()] == ["no limit", "2"]
+    assert {text.get_text() for text in figure.legends[0].get_texts()} == {"RAPF", "LA"}
+    for axes in panels:
+        marked = [line for line in axes.lines if line.get_marker() in ("o", "^")]
+        assert len(marked) == 2
+        np.testing.assert_allclose(marked[0].get_ydata(), [1.0, 1.2])
+        low, high = axes.get_ylim()
+        assert low < 1.0
+        assert high > 1.4
+    # nothing is written over anything else
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    boxes = [axes.get_tightbbox(renderer) for axes in panels]
+    for k, one in enumerate(boxes):
+        assert not any(one.overlaps(other) for other in boxes[k + 1 :])
+        assert one.x0 >= 0 and one.x1 <= figure.bbox.x1
+
+
+def test_what_has_no_ratio_is_left_out() -> None:
+    nothing = Interval(float("nan"), float("nan"), float("nan"))
+    rows = [each._replace(ratio=nothing) if each.value == 0.1 else each for each in found()]
+    figure = plot_degradations(rows)
+    assert figure.axes[2].get_ylim() == figure.axes[0].get_ylim()
+    with pytest.raises(ParameterError, match="none with a ratio"):
+        plot_degradations([each._replace(ratio=nothing) for each in found()])

@@ -1,0 +1,130 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from clear_pages import all_clear
+from drawn_run import HALL, ROOMS, SQUARE, run_of
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.colors import to_rgb
+
+from robocov.errors import ParameterError
+from robocov.metrics import CostHistory
+from robocov.voronoi import partition
+from robocov_app.figures.figure_files import save_figure
+from robocov_app.figures.page import tone
+from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.replication.figures import NUMBERS, TEXTS, WIDE, Shown, draw_figure
+
+
+def shown(environment, controller: str, final: float, seed: int = 0) -> Shown:
+    time = np.linspace(0.0, 60.0, 121)
+    cost = final + 3.0 * np.exp(-time / 8)
+    record = replace(run_of(environment, 6, seed=seed, controller=controller), label=controller.upper())
+    return Shown(record, CostHistory(time, cost, 80.0 * cost, np.zeros_like(time)))
+
+
+RUNS = {
+    "convex/rapf": shown(SQUARE, "rapf", 1.3),
+    "convex/lloyd": shown(SQUARE, "lloyd", 1.31, 1),
+    "a/rapf": shown(ROOMS, "rapf", 1.8),
+    "a/rpf": shown(ROOMS, "rpf", 3.5, 1),
+    "b/rapf": shown(HALL, "rapf", 2.2),
+    "b/rpf": shown(HALL, "rpf", 3.9, 1),
+    "other/rapf": shown(HALL, "rapf", 2.0, 2),
+    "other/rpf": shown(HALL, "rpf", 4.3, 3),
+}
+PARTITION = run_of(SQUARE, 6)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_covers_or_cuts_anything(number, theme):
+    figure = draw_figure(number, RUNS, PARTITION, theme)
+    if number not in (3, 5, 7):
+        all_clear(figure)
+    assert to_rgb(figure.get_facecolor()) == tone((LIGHT if theme == "light" else DARK).background)
+
+
+def test_there_is_something_to_say_of_each():
+    assert tuple(text.number for text in TEXTS) == NUMBERS
+    with pytest.raises(ParameterError, match="figure: 9, but a number from 1 to 8"):
+        draw_figure(9, RUNS, PARTITION, "light")
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number, tmp_path):
+    figure = draw_figure(number, RUNS, PARTITION, "light")
+    width = figure.get_size_inches()[0]
+    assert width == pytest.approx(3.5 if number == 1 else 7.16, abs=0.01)
+    assert figure.dpi == 300
+    save_figure(figure, tmp_path / "a.pdf")
+    save_figure(draw_figure(number, RUNS, PARTITION, "light"), tmp_path / "b.pdf")
+    content = (tmp_path / "a.pdf").read_bytes()
+    assert content == (tmp_path / "b.pdf").read_bytes()
+    assert b"/FontFile2" in content and b"/Type3" not in content
+
+
+def test_a_partition_with_centres_of_mass():
+    axes = draw_figure(1, RUNS, PARTITION, "light").axes[0]
+    centres = partition(PARTITION.positions[0], SQUARE.region).centroid
+    (dots,) = [line for line in axes.lines if len(line.get_xdata()) == 6]
+    assert np.asarray(dots.get_xydata()) == pytest.approx(centres)
+    (robots,) = [c for c in axes.collections if type(c) is PathCollection]
+    assert np.asarray(robots.get_offsets()) == pytest.approx(PARTITION.positions[0])
+    assert {to_rgb(c) for c in robots.get_facecolors()} == {tone(LIGHT.final)}
+
+
+@pytest.mark.parametrize(
+    ("number", "left", "right"),
+    [
+        (2, "convex/rapf", "convex/lloyd"),
+        (4, "a/rapf", "a/rpf"),
+        (6, "b/rapf", "b/rpf"),
+        (8, "other/rapf", "other/rpf"),
+    ],
+)
+def test_panels_show_their_runs_in_the_papers_colours(number, left, right):
+    figure = draw_figure(number, RUNS, PARTITION, "light")
+    for axes, name in zip(figure.axes, (left, right), strict=True):
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        assert lines.get_segments()[2] == pytest.approx(RUNS[name].record.positions[:, 2])
+        assert {to_rgb(c) for c in lines.get_colors()} == {tone(LIGHT.trajectory)}
+    words = [text.get_text() for text in figure.texts]
+    assert f"(a)  {RUNS[left].record.label}" in words and f"(b)  {RUNS[right].record.label}" in words
+    for name in (left, right):
+        assert f"mean distance {RUNS[name].history.mean_distance[-1]:.3f} m" in words
+    assert len({axes.get_position().height for axes in figure.axes}) == 1
+
+
+@pytest.mark.parametrize(
+    ("number", "case", "other"), [(3, "convex", "lloyd"), (5, "a", "rpf"), (7, "b", "rpf")]
+)
+def test_cost_curves(number, case, other):
+    figure = draw_figure(number, RUNS, PARTITION, "light")
+    (axes,) = figure.axes
+    long = [line for line in axes.lines if len(line.get_xdata()) == 121]
+    for line, law in zip(long, ("rapf", other), strict=True):
+        assert np.asarray(line.get_ydata()) == pytest.approx(RUNS[f"{case}/{law}"].history.mean_distance)
+        assert to_rgb(line.get_color()) == tone(LIGHT.controllers[law])
+    figure.canvas.draw()
+    for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label):
+        box = text.get_window_extent()
+        assert box.x0 >= 0 and box.x1 <= WIDE and box.y0 >= 0 and box.y1 <= 1050
+
+
+def test_the_legend_names_centroids_only_where_some_are_seen():
+    def words(runs):
+        (legend,) = draw_figure(2, runs, PARTITION, "light").legends
+        return [text.get_text() for text in legend.get_texts()]
+
+    def ending(goals):
+        return {
+            name: Shown(replace(shown.record, goals=goals(shown.record)), shown.history)
+            for name, shown in RUNS.items()
+        }
+
+    assert "cell centroid" in words(RUNS)
+    arrived = words(ending(lambda record: record.positions))
+    assert not {"cell centroid", "goal"} & set(arrived)
+    runs = ending(lambda record: record.positions + 1.0)
+    assert "goal" in words(runs)  # which is no centroid

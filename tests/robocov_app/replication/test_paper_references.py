@@ -1,0 +1,76 @@
+import json
+import threading
+
+import pytest
+from drawn_run import SQUARE
+
+from robocov.cost import CoverageCost
+from robocov.environment import Environment, UniformStart
+from robocov.errors import OutputError
+from robocov.mapfile import to_json
+from robocov_app.replication.references import Question, Reference, references
+from robocov_app.sweep.study import StudyMap
+from robocov_app.terminal.interruption import Interruption
+
+HALL = Environment("hall", ((0, 0), (9, 0), (9, 3), (0, 3)), (), {"spread": UniformStart()})
+MAPS = (StudyMap("square", SQUARE), StudyMap("hall", HALL))
+
+
+def found(folder, maps=MAPS, restarts=2, stop=None, **other):
+    options = {"robots": 3, "radius": 0.1, "lattice": 16, "workers": 2, "quiet": True, **other}
+    return references(maps, folder, restarts=restarts, stop=stop or Interruption(), **options)
+
+
+def test_each_map_has_its_reference_and_its_file(tmp_path):
+    answers = found(tmp_path / "references")
+    assert set(answers) == {"square", "hall"}
+    for each in MAPS:
+        answer = answers[each.name]
+        cost = CoverageCost(each.environment, 16)(list(answer.positions))
+        assert cost.mean_distance == pytest.approx(answer.mean_distance)
+        content = json.loads((tmp_path / "references" / f"{each.name}.json").read_text())
+        assert content["mean_distance_m"] == answer.mean_distance
+        assert (content["restarts"], content["robots"], len(content["positions_m"])) == (2, 3, 3)
+    # about one robot in each third of the hall
+    assert sorted(x for x, _ in answers["hall"].positions) == pytest.approx([1.5, 4.5, 7.5], abs=0.4)
+
+
+def test_what_is_there_is_not_searched_for_again(tmp_path):
+    first = found(tmp_path)
+    path = tmp_path / "hall.json"
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"mean_distance_m": 0.125}))
+    assert found(tmp_path)["hall"].mean_distance == 0.125
+    # another search is another question, and so is a file that cannot be read
+    assert found(tmp_path, restarts=3)["hall"].mean_distance == pytest.approx(first["hall"].mean_distance)
+    path.write_text("{")
+    assert found(tmp_path)["hall"] == first["hall"]
+
+
+def test_starts_are_no_part_of_the_question():
+    def question(starts):
+        shape = Environment(HALL.name, HALL.boundary, (), starts)
+        return Question(to_json(shape), 3, 0.1, 16, 2).digest
+
+    assert question({"spread": UniformStart()}) == question({})
+    assert question({}) != Question(to_json(SQUARE), 3, 0.1, 16, 2).digest
+
+
+def test_a_map_without_room_is_named(tmp_path):
+    tight = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)), ())
+    with pytest.raises(OutputError, match=r"reference of map 'closet': robots: 3 of radius 0\.6 m"):
+        found(tmp_path, maps=(StudyMap("closet", tight),), radius=0.6)
+
+
+def test_whoever_stops_need_not_wait(tmp_path):
+    stop = Interruption()
+    timer = threading.Timer(0.5, lambda: setattr(stop, "requested", True))
+    timer.start()
+    answers = found(tmp_path, maps=MAPS[:1], restarts=5000, robots=40, lattice=64, stop=stop)
+    timer.join()
+    assert answers == {}
+    assert not list(tmp_path.iterdir())
+
+
+def test_answers_are_values():
+    assert Reference(1.0, ((0.0, 1.0),), 0.5) == Reference(1.0, ((0.0, 1.0),), 0.5)

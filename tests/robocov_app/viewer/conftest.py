@@ -1,0 +1,25 @@
+"""What several tests of the window share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from driven_window import Driver, opened
+
+from robocov_app.viewer.session import history, timeline
+
+
+@pytest.fixture
+def driver(tmp_path: Path) -> Iterator[Driver]:
+    """A window with a session, as a user has it in front of them."""
+    with opened(tmp_path) as driver:
+        yield driver
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the past be thinned soon."""
+    monkeypatch.setattr(history, "_FEWEST", 20)
+    monkeypatch.setattr(timeline, "History", lambda dt: history.History(dt, 60_000))

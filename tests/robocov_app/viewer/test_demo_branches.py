@@ -1,0 +1,174 @@
+"""The timeline: what is tried from a moment of the past, and what it remembers having happened."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, positions_of, stepped, with_curves
+
+from robocov.environment import CircleObstacle
+from robocov.errors import StartError
+from robocov_app.viewer.session import timeline as module
+from robocov_app.viewer.session.curves import Event
+from robocov_app.viewer.session.scenario import Limits
+
+# branches
+
+
+@pytest.mark.parametrize("laws", [(RAPF,), (RPF, LLOYD)])
+def test_a_branch_that_nobody_touches_goes_the_same_way(laws):
+    session = stepped(begun(*laws, robots=4), 100)
+    end = positions_of(session)
+    session.look_at(0.5)
+    assert session.branch()
+    assert session.live
+    assert session.end == pytest.approx(0.5)
+    assert session.history.steps[-1] == 30
+    stepped(session, 70)
+    for now, before in zip(positions_of(session), end, strict=True):
+        # bit for bit
+        np.testing.assert_array_equal(now, before)
+
+
+def test_so_it_does_from_a_thinned_past_after_touches(short):
+    session = stepped(begun(RAPF, LLOYD, robots=4), 100)
+    session.edit(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle((3.2, 2.2), 0.3))), "circle drawn")
+    session.fail_robot(3)
+    stepped(session, 400)
+    end = positions_of(session)
+    assert session.history.thinned > 0
+    session.look_at(2.5)
+    assert session.branch()
+    while session.end < 500 / 60 - 1e-9:
+        session.step()
+    for now, before in zip(positions_of(session), end, strict=True):
+        np.testing.assert_allclose(now, before, rtol=0.0, atol=1e-9)
+
+
+def test_a_branch_leaves_a_ghost():
+    session = begun(RAPF, LLOYD)
+    with_curves(session, 60)
+    serial = session.serial
+    session.look_at(0.5)
+    assert session.branch()
+    assert session.serial == serial + 1
+    assert [ghost.law for ghost in session.ghosts] == ["rapf", "lloyd"]
+    assert [ghost.words for ghost in session.ghosts] == ["RAPF", "LA"]
+    for ghost in session.ghosts:
+        assert ghost.time[0] == pytest.approx(0.5)
+        assert ghost.time[-1] == pytest.approx(59 / 60)
+    for lane in session.lanes:
+        assert lane.curve.last_time == pytest.approx(0.5)
+        assert lane.time == pytest.approx(0.5)
+        assert lane.trail.time[-1] == pytest.approx(0.5)
+    assert session.summary() == {0: pytest.approx(2.5), 1: pytest.approx(2.5)}
+
+
+def test_ghosts_are_few():
+    session = begun()
+    for _ in range(module.MOST_GHOSTS + 3):
+        with_curves(session, 12)
+        session.look_at(0.1)
+        session.branch()
+    assert len(session.ghosts) == module.MOST_GHOSTS
+
+
+def test_the_present_is_no_branch():
+    session = stepped(begun(), 10)
+    before = all_told(session)
+    assert not session.branch()
+    session.look_at(99.0)
+    assert not session.branch()
+    assert all_told(session) == before
+
+
+def test_a_branch_takes_back_what_was_chosen_later():
+    session = stepped(begun(RAPF, RPF), 20)
+    session.set_law(session.lanes[0], LLOYD)
+    session.set_limits(Limits(max_speed=0.5))
+    session.edit(replace(HALL, obstacles=()), "emptied")
+    session.add_robot((1.0, 3.0))
+    stepped(session, 20)
+    session.look_at(10 / 60)
+    assert session.environment is HALL
+    assert session.numbers == (1, 2, 3)
+    session.branch()
+    assert [lane.law for lane in session.lanes] == [RAPF, RPF]
+    assert session.scenario.laws == (RAPF, RPF)
+    assert session.scenario.limits == Limits()
+    assert session.scenario.environment is HALL
+    assert session.lanes[0].starts.shape == (3, 2)
+    assert list(session.events) == []
+    assert not session.undo.can_undo
+    stepped(session, 5)
+
+
+def test_events_up_to_the_branch_stay():
+    session = stepped(begun(), 10)
+    session.fail_robot(2)
+    stepped(session, 10)
+    session.fail_robot(3)
+    stepped(session, 10)
+    session.look_at(10 / 60)
+    session.branch()
+    assert [event.text for event in session.events] == ["robot 2 failed"]
+    assert session.numbers == (1, 3)
+
+
+def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
+    session = begun(RAPF, RPF)
+    with_curves(session, 40)
+    session.look_at(0.3)
+    before = all_told(session)
+
+    def no_room(state, dt, time):
+        if state.circumstances.law == RPF:
+            raise StartError("no room")
+        return real(state, dt, time)
+
+    real = module.resumed
+    monkeypatch.setattr(module, "resumed", no_room)
+    for touch in (
+        session.branch,
+        lambda: session.set_law(session.lanes[0], LLOYD),
+        lambda: session.fail_robot(1),
+    ):
+        with pytest.raises(StartError, match="no room"):
+            touch()
+        assert all_told(session) == before
+
+
+# events
+
+
+def test_events_are_few(monkeypatch):
+    session = begun()
+    for k in range(module.MOST_EVENTS + 5):
+        session.events.append(Event(0.0, "law", str(k)))
+    assert len(session.events) == module.MOST_EVENTS
+
+
+def test_a_slider_that_is_dragged_is_one_event():
+    session = stepped(begun(RAPF, RPF), 3)
+    for k in range(1, 20):
+        session.set_law(session.lanes[0], RAPF.with_gain("k_rep", k / 10))
+        session.step()
+    for k in range(1, 20):
+        session.set_law(session.lanes[0], session.lanes[0].law.with_gain("k_att", k / 10))
+        session.step()
+    for k in range(1, 20):
+        session.set_limits(Limits(max_speed=k / 10))
+        session.step()
+    assert [event.text for event in session.events] == [
+        "RAPF: k_rep = 1.9",
+        "RAPF: k_att = 1.9",
+        "limits changed",
+    ]
+    # later it is another one
+    stepped(session, 70)
+    session.set_limits(Limits(max_speed=3.0))
+    session.set_law(session.lanes[0], LLOYD)
+    session.set_law(session.lanes[1], LLOYD)
+    assert [event.text for event in session.events][3:] == ["limits changed", "LA takes over"]

@@ -1,0 +1,227 @@
+"""The brush: strokes that raise and lower the density while the run goes on, and their way back."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from driven_window import opened
+from touched_run import HALL, LLOYD, RAPF, all_told, begun, stepped
+
+from robocov.cost import CoverageCost
+from robocov.density import Gaussian, Gaussians, Raster, Uniform
+from robocov.environment import CircleObstacle
+from robocov.mapfile import load_map
+from robocov_app.live.cost_worker import CostWorker
+from robocov_app.live.messages import Answer
+from robocov_app.render.phi import density_range
+from robocov_app.viewer.brush import CELLS, LEAST, MOST, Brush, painted_raster
+from robocov_app.viewer.costs import DirectCosts
+
+REACH = 0.1
+
+
+def stroke(brush, session, *points, lowers=False) -> str | None:
+    brush.lowers = lowers
+    brush.press(session, points[0], REACH, None)
+    for point in points[1:]:
+        brush.move(session, point)
+    return brush.release(session, points[-1])
+
+
+def value_at(session, point) -> float:
+    density = session.environment.density
+    return 1.0 if density is None else float(density.value(np.array([point]))[0])
+
+
+def test_left_raises_and_right_lowers():
+    brush, session = Brush(radius=0.8), begun()
+    assert stroke(brush, session, (1.0, 1.0), (2.0, 1.0)) == "density raised"
+    raised = value_at(session, (1.5, 1.0))
+    assert raised > 1.3 and value_at(session, (1.5, 1.5)) > 1.0
+    assert value_at(session, (5.0, 3.0)) == 1.0
+    assert stroke(brush, session, (1.0, 1.0), (2.0, 1.0), lowers=True) == "density lowered"
+    assert value_at(session, (1.5, 1.0)) == pytest.approx(1.0, abs=0.01)
+    for _ in range(60):
+        stroke(brush, session, (5.0, 3.0), (5.2, 3.0), lowers=True)
+    low, _ = density_range(session.environment)
+    assert low == pytest.approx(LEAST, abs=0.02)
+    for _ in range(90):
+        stroke(brush, session, (5.0, 3.0), (5.2, 3.0))
+    assert density_range(session.environment)[1] == pytest.approx(MOST, rel=0.1)
+
+
+def test_a_stroke_is_undone_as_a_whole_and_done_again():
+    brush, session = Brush(radius=0.5), stepped(begun(), 5)
+    before = session.environment
+    stroke(brush, session, (1.0, 1.0), (2.0, 1.0), (3.0, 2.0))
+    painted = session.environment
+    stroke(brush, session, (4.0, 3.0), (4.5, 3.0))
+    assert session.undo.undo() == "density raised"
+    assert session.environment == painted
+    session.undo.undo()
+    assert session.environment is before and session.environment.density is None
+    assert not session.undo.can_undo
+    session.undo.redo()
+    assert session.environment == painted
+    assert [event.kind for event in session.events][:2] == ["density", "density"]
+
+
+def test_robots_know_of_it_while_it_is_painted():
+    now = [0.0]
+    brush, session = Brush(radius=1.0, clock=lambda: now[0]), begun(RAPF, LLOYD)
+    brush.press(session, (5.0, 3.0), REACH, None)
+    for k in range(20):
+        now[0] += 0.1
+        brush.move(session, (5.0 - 0.02 * k, 3.0))
+        stepped(session, 1)
+        for lane in session.lanes:
+            assert lane.simulation.snapshot.seen.density is session.environment.density
+    assert session.environment.density is not None and not session.undo.can_undo
+    assert brush.painting
+    brush.release(session, (4.6, 3.0))
+    assert not brush.painting and session.undo.can_undo
+
+
+def test_it_does_not_tell_the_robots_more_often_than_is_seen():
+    now, told = [0.0], []
+    brush, session = Brush(radius=1.0, clock=lambda: now[0]), begun()
+    brush.press(session, (1.0, 1.0), REACH, None)
+    for k in range(200):
+        now[0] += 0.01
+        brush.move(session, (1.0 + 0.02 * k, 1.0))
+        told.append(session.environment.density)
+    assert 15 <= len(set(map(id, told))) <= 30
+
+
+def test_escape_gives_the_stroke_up():
+    brush, session = Brush(radius=1.0), begun()
+    before = session.environment
+    brush.press(session, (1.0, 1.0), REACH, None)
+    assert session.environment != before
+    assert brush.cancel(session)
+    assert session.environment == before and not session.undo.can_undo
+    assert brush.release(session, (1.0, 1.0)) is None
+    assert brush.preview(session) is None
+
+
+def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
+    """Only the density changes: nobody is pushed, and an obstacle of in between stays."""
+    brush, session = Brush(radius=0.5), stepped(begun(), 3)
+    places = session.lanes[0].simulation.positions.copy()
+    stroke(brush, session, (1.0, 1.0), (2.0, 1.0))
+    assert np.array_equal(session.lanes[0].simulation.positions, places)
+    pillar = CircleObstacle((5.0, 2.5), 0.2)
+    with_pillar = replace(session.environment, obstacles=(*HALL.obstacles, pillar))
+    session.edit(with_pillar, "circle drawn")
+    stroke(brush, session, (3.0, 1.0), (3.5, 1.0))
+    assert session.environment.obstacles == with_pillar.obstacles
+    for _ in range(3):
+        session.undo.undo()
+    assert session.environment.obstacles == HALL.obstacles and session.environment.density is None
+
+
+def test_another_map_in_the_midst_of_a_stroke_ends_it():
+    brush, session = Brush(radius=0.5), begun()
+    brush.press(session, (1.0, 1.0), REACH, None)
+    session.restart(environment=load_map("square"))
+    brush.move(session, (2.0, 1.0))
+    assert brush.release(session, (2.0, 1.0)) is None
+    assert session.environment == load_map("square")
+
+
+def test_what_is_painted_on():
+    peak = Gaussians((Gaussian((2.0, 2.0), 3.0, sigma=0.5),), 0.5)
+    raster = painted_raster(HALL.with_density(peak))
+    assert raster.values.shape == (round(CELLS * 4 / 6), CELLS) and raster.extent == (0.0, 0.0, 6.0, 4.0)
+    assert painted_raster(HALL.with_density(raster)) is raster
+    assert painted_raster(HALL.with_density(Uniform(2.0))).values.max() == 2.0
+    cells = Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cells")
+    assert painted_raster(HALL.with_density(cells)).interpolation == "bilinear"
+
+
+def test_its_size():
+    brush, session = Brush(), begun()
+    first = brush.size(session)
+    assert first == pytest.approx(0.1 * HALL.region.diameter, rel=0.05)
+    assert brush.widen(session, 2.0).startswith("the brush has a radius of ")
+    assert brush.size(session) == pytest.approx(2.0 * first, rel=0.01)
+    for factor, most in ((100.0, 0.5), (1e-4, 0.005)):
+        brush.widen(session, factor)
+        assert brush.size(session) == pytest.approx(most * HALL.region.diameter, rel=0.01)
+    brush.move(session, (1.0, 1.0))
+    shown = brush.preview(session)
+    assert shown is not None and shown.words == "φ 1" and not shown.marks
+
+
+def test_nothing_is_touched_before_a_press():
+    brush, session = Brush(), begun()
+    before = all_told(session)
+    brush.move(session, (1.0, 1.0))
+    assert brush.release(session, (1.0, 1.0)) is None and not brush.cancel(session)
+    assert all_told(session) == before
+
+
+def test_in_the_window(tmp_path):
+    """G takes it; buttons, wheel and keys; the map that is saved has what was painted."""
+    with opened(tmp_path, RAPF, LLOYD) as driver:
+        plain = driver.picture()
+        driver.key("g")
+        brush = driver.desk.tool
+        driver.wheel(*driver.pixel((3.0, 2.0)), 2)
+        larger = brush.radius
+        driver.key("[")
+        assert brush.radius < larger and "radius" in driver.desk.message
+        driver.drag(*(driver.pixel((1.0 + 0.3 * k, 3.0)) for k in range(5)))
+        assert driver.desk.message == "density raised"
+        high = value_at(driver.session, (1.6, 3.0))
+        driver.drag(*(driver.pixel((4.5 + 0.2 * k, 3.2)) for k in range(4)), button=3)
+        assert driver.desk.message == "density lowered"
+        assert high > 1.1 and value_at(driver.session, (4.8, 3.2)) < 0.9
+        assert not driver.same(plain)
+        assert {lane.circumstances.environment for lane in driver.session.lanes} == {
+            driver.session.environment
+        }
+        driver.key("ctrl+s")
+        assert load_map(driver.desk.map_name) == driver.session.environment
+        driver.key("ctrl+z", 2)
+        assert driver.session.environment.density is None
+        assert "φ" not in driver.window.arena._scenes[0].cost
+        driver.key("ctrl+y")
+        driver.frames(3)
+        assert "mean distance by φ" in driver.window.arena._scenes[0].cost
+
+
+def test_the_process_for_the_cost_weighs_anew_what_it_has():
+    """A density alone needs no preparation of the map; the answers are those of the cost."""
+    peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
+    places = np.array([[1.0, 1.0], [5.0, 3.2]])
+    with CostWorker() as worker:
+        for environment in (HALL, HALL.with_density(peak), HALL):
+            generation = worker.environment(environment, 24)
+            end, answer = time.monotonic() + 60.0, None
+            while answer is None and time.monotonic() < end:
+                worker.ask(0.0, places)
+                found = [each for each in worker.poll() if isinstance(each, Answer)]
+                answer = next((each for each in found if each.generation == generation), None)
+                time.sleep(0.01)
+            assert answer is not None
+            wanted = CoverageCost(environment, 24)(places)
+            assert answer.result.mean_distance == wanted.mean_distance
+            assert answer.result.value == wanted.value
+            assert np.array_equal(answer.result.gradient, wanted.gradient)
+
+
+def test_at_once_it_is_weighed_anew_too():
+    peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
+    places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), DirectCosts(24)
+    found = []
+    for environment in (HALL, HALL.with_density(peak), HALL):
+        costs.environment(environment)
+        costs.ask(0, 0.0, places)
+        ((_, known),) = costs.poll()
+        found.append(known.result.mean_distance)
+        assert found[-1] == CoverageCost(environment, 24)(places).mean_distance
+    assert found[0] == found[2] != found[1]

@@ -1,0 +1,119 @@
+"""The plot of the costs, and where time is on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_window import Driver, opened
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov_app.viewer.chart import curve_colour, spread, time_axis, value_axis
+from robocov_app.viewer.film import pixels
+from robocov_app.viewer.session.curves import compared
+from robocov_app.viewer.session.scenario import Law
+
+
+@pytest.fixture
+def driver(tmp_path: Path) -> Iterator[Driver]:
+    with opened(tmp_path, Law("rapf"), Law("rpf")) as opened_driver:
+        yield opened_driver
+
+
+def played(driver: Driver, frames: int = 60) -> None:
+    driver.session.playing = True
+    driver.frames(frames)
+    driver.session.playing = False
+    driver.frames(8)
+
+
+@given(st.floats(0.0, 1e5))
+def test_the_axis_of_time_has_room_for_now_but_not_much_more(end: float) -> None:
+    axis = time_axis(end)
+    assert end < axis <= max(10.0, 2.0 * end)
+
+
+@given(st.floats(1e-3, 1e3), st.floats(0.0, 1e3))
+def test_the_axis_of_values_holds_all_of_them(low: float, more: float) -> None:
+    begin, end, step = value_axis(low, low + more)
+    assert 0.0 <= begin <= low
+    assert end >= low + more
+    assert 1 <= (end - begin) / step <= 12
+
+
+def test_an_axis_without_values_is_no_trouble() -> None:
+    assert value_axis(float("nan"), float("nan")) == (0.0, 1.0, 0.5)
+
+
+@given(st.lists(st.floats(0, 200), min_size=1, max_size=4))
+def test_words_at_the_right_keep_apart_and_in_the_chart(wanted: list[float]) -> None:
+    rows = spread(np.sort(wanted), 15.0, 200.0)
+    assert all(below - above >= 15.0 - 1e-9 for above, below in pairwise(rows))
+    assert max(rows) <= 200.0 + 1e-9
+
+
+def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
+    played(driver)
+    chart = driver.window.chart
+    for time in (0.0, 0.3, driver.session.end):
+        assert chart.time_at(chart.column(time)) == pytest.approx(time, abs=1e-9)
+    assert chart.time_at(-100.0) == 0.0
+    assert chart.time_at(1e5) == driver.session.end
+
+
+def test_curves_are_drawn_in_the_colours_of_their_controllers(driver: Driver) -> None:
+    played(driver)
+    window = driver.window
+    left, top, width, height = window.layout.chart
+    picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
+    for lane in driver.session.lanes:
+        colour = np.array(curve_colour(driver.desk, window.theme, lane))
+        assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, lane.law.name
+
+
+def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
+    with opened(tmp_path, Law("rapf"), Law("rapf", {"k_rep": 1.0}), Law("rpf"), Law("rpf")) as driver:
+        colours = {curve_colour(driver.desk, driver.window.theme, lane) for lane in driver.session.lanes}
+        assert len(colours) == 4
+
+
+def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
+    played(driver)
+    window = driver.window
+    before = pixels(window.screen).copy()
+    driver.desk.attempt(lambda: driver.session.fail_robot(1))
+    driver.frames(8)
+    after = pixels(window.screen)
+    column = round(window.chart.column(driver.session.end))
+    _, top, _, height = window.layout.chart
+    middle = top + height // 2
+    changed = np.abs(after[middle].astype(int) - before[middle]).max(axis=1)
+    assert changed[column - 2 : column + 3].max() > 20
+    assert changed[: column - 60].max() == 0
+
+
+def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> None:
+    played(driver)
+    first, second = driver.session.lanes
+    last = first.curve.last_time
+    values = {lane.number: lane.curve.value[-1] for lane in (first, second)}
+    second.curve.add(last + 0.01, 99.0)
+    driver.session._step += 60
+    time, known = compared(driver.session)
+    assert time == last
+    assert known == pytest.approx(values)
+
+
+def test_what_is_of_the_past_is_shown_at_once_also_at_one_second(driver: Driver) -> None:
+    played(driver, 100)
+    _, top, width, height = driver.window.layout.chart
+    live = pixels(driver.window.screen)[top : top + height, width - 150 : width].copy()
+    # one second exactly is as true as true is
+    driver.session.look_at(1.0)
+    assert driver.session.time == 1.0 and not driver.session.live
+    driver.frames(1)
+    assert not np.array_equal(pixels(driver.window.screen)[top : top + height, width - 150 : width], live)

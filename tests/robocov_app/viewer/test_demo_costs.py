@@ -1,0 +1,412 @@
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from touched_run import HALL
+
+from robocov.cost import CoverageCost
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
+from robocov_app.live.messages import Answer, Building, Failed, Ready
+from robocov_app.render.field import Field
+from robocov_app.viewer import costs as module
+from robocov_app.viewer.costs import DirectCosts, WorkerCosts
+
+PLACES = np.array([[1.0, 1.0], [5.0, 3.0]])
+OTHERS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
+CROSSED = replace(
+    HALL,
+    obstacles=(*HALL.obstacles, CircleObstacle((1.0, 2.0), 0.4, path=ObstaclePath(((1, 2), (5, 2)), 0.5))),
+)
+"""A hall through which something goes."""
+INSIDE = np.array([[4.2, 1.2]])
+"""Of the pillar."""
+FULL = Environment("full", ((0, 0), (1, 0), (1, 1), (0, 1)), (CircleObstacle((0.5, 0.5), 0.3),))
+PATIENCE = 60.0
+"""Seconds after which nothing will come any more."""
+
+
+def answered(costs, wanted=1) -> dict[int, module.Known]:
+    """Poll until so many panes have been answered."""
+    answers, end = {}, time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        answers |= dict(costs.poll())
+        if len(answers) >= wanted:
+            return answers
+        time.sleep(0.005)
+    raise AssertionError(costs.state)
+
+
+@pytest.fixture
+def worker_costs():
+    costs = WorkerCosts(32)
+    yield costs
+    costs.close()
+
+
+class StubWorker:
+    """Answers when it is told to."""
+
+    def __init__(self) -> None:
+        self.generation, self.asked, self.events, self.closed = 0, [], [], False
+
+    def environment(self, environment, lattice) -> int:
+        self.generation += 1
+        self.cost = CoverageCost(environment, lattice)
+        self.events.append(Building(self.generation, 0.0, 3.0))
+        return self.generation
+
+    def ready(self) -> None:
+        self.events.append(Ready(self.generation, self.cost.sites, self.cost.corners, 0.1))
+
+    def ask(self, when, positions, topic=0, point=None, speeds=None) -> None:
+        self.asked.append((when, positions, topic, point))
+
+    def answer(self, generation=None) -> None:
+        when, positions, topic, _ = self.asked[-1]
+        generation = self.generation if generation is None else generation
+        self.events.append(Answer(generation, when, self.cost(positions), 0.01, topic, None))
+
+    def poll(self):
+        events, self.events = self.events, []
+        return events
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def stubbed(monkeypatch):
+    """Give costs whose worker does what the test says, with a clock that stands still."""
+    now = [100.0]
+    monkeypatch.setattr(module, "CostWorker", StubWorker)
+    monkeypatch.setattr(module, "perf_counter", lambda: now[0])
+    costs = WorkerCosts(16)
+    return costs, costs._worker, now
+
+
+# at once
+
+
+def test_answers_are_those_of_the_cost():
+    costs = DirectCosts(32)
+    costs.environment(HALL)
+    costs.ask(0, 1.5, PLACES)
+    costs.ask(3, 1.5, OTHERS, np.array([3.5, 0.5]))
+    assert costs.known == {}
+    answers = dict(costs.poll())
+    assert answers == costs.known
+    cost = CoverageCost(HALL, 32)
+    assert answers[0].result.mean_distance == cost(PLACES).mean_distance
+    assert (answers[0].time, answers[0].path) == (1.5, None)
+    np.testing.assert_array_equal(answers[3].path, cost.path(OTHERS, np.array([3.5, 0.5])))
+    assert isinstance(answers[3].field, Field)
+    assert answers[3].field is answers[3].field
+    assert costs.poll() == []
+    costs.close()
+
+
+def test_only_the_newest_question_of_a_pane_counts():
+    costs = DirectCosts(32)
+    costs.environment(HALL)
+    for when in (1.0, 2.0, 3.0):
+        costs.ask(0, when, PLACES)
+    assert [known.time for _, known in costs.poll()] == [3.0]
+
+
+def test_positions_are_those_when_it_was_asked():
+    costs, places = DirectCosts(32), PLACES.copy()
+    costs.environment(HALL)
+    costs.ask(0, 1.0, places)
+    places += 0.5
+    ((_, known),) = costs.poll()
+    np.testing.assert_array_equal(known.result.positions, PLACES)
+
+
+def test_what_cannot_be_computed_is_left_out():
+    costs = DirectCosts(32)
+    costs.environment(HALL)
+    costs.ask(0, 1.0, INSIDE)
+    costs.ask(1, 1.0, PLACES, INSIDE[0])
+    assert [(pane, known.path) for pane, known in costs.poll()] == [(1, None)]
+    assert costs.state == ""
+
+
+def test_another_map():
+    costs = DirectCosts(16)
+    costs.environment(HALL)
+    costs.ask(0, 1.0, PLACES)
+    costs.poll()
+    costs.ask(0, 2.0, PLACES)
+    costs.environment(replace(HALL, obstacles=()))
+    assert costs.known == {}
+    # what was asked was asked of the map before
+    assert costs.poll() == []
+    costs.ask(0, 2.0, INSIDE)
+    assert len(costs.poll()) == 1
+    costs = DirectCosts(1)
+    costs.environment(FULL)
+    costs.ask(0, 1.0, PLACES)
+    assert costs.poll() == []
+    assert costs.state.startswith("no cost: ")
+    costs.environment(HALL)
+    assert costs.state == ""
+
+
+def test_what_was_of_another_run_is_forgotten():
+    costs = DirectCosts(16)
+    costs.environment(HALL)
+    costs.ask(0, 1.0, PLACES)
+    costs.poll()
+    costs.ask(0, 2.0, PLACES)
+    costs.forget()
+    assert costs.known == {}
+    assert costs.poll() == []
+
+
+def test_obstacles_that_move_stand_where_they_are_at_the_time():
+    costs = DirectCosts(32)
+    costs.environment(CROSSED)
+    assert costs.state == ""
+    values = []
+    for when in (0.0, 2.5, 5.0):
+        costs.ask(0, when, PLACES)
+        ((_, known),) = costs.poll()
+        assert known.result.mean_distance == CoverageCost(CROSSED.at(when), 32)(PLACES).mean_distance
+        assert known.field.largest == known.result.distances.max()
+        values.append(known.result.mean_distance)
+    assert len(set(values)) == 3
+
+
+def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
+    costs = DirectCosts(32)
+    costs.environment(CROSSED)
+    over = np.array([[1.0, 2.0], [5.0, 3.0]])
+    costs.ask(0, 0.0, over, np.array([5.5, 3.5]))
+    ((_, known),) = costs.poll()
+    np.testing.assert_array_equal(known.result.positions, over)
+    assert set(known.result.owner.tolist()) == {1}
+    assert known.result.mean_distance == CoverageCost(CROSSED.at(0.0), 32)(over[1:]).mean_distance
+    np.testing.assert_array_equal(known.path[-1], over[1])
+    # nobody is left
+    costs.ask(0, 0.0, over[:1])
+    assert costs.poll() == []
+
+
+def test_the_time_until_the_first_robot_comes():
+    speeds = np.array([0.2, 1.0])
+    costs = DirectCosts(32)
+    costs.environment(HALL)
+    costs.ask(0, 1.0, PLACES)
+    costs.ask(1, 1.0, PLACES, speeds=speeds)
+    without, timed = (known for _, known in costs.poll())
+    assert without.travel_time is None
+    assert timed.travel_time == CoverageCost(HALL, 32)(PLACES, speeds).mean_time
+    # the distance is that of the nearest one all the same
+    assert timed.result.mean_distance == without.result.mean_distance
+
+
+# in turn
+
+
+def test_nothing_is_asked_before_the_map_is_ready(stubbed):
+    costs, worker, _ = stubbed
+    costs.environment(HALL)
+    assert costs.state == "cost: preparing the map"
+    costs.ask(0, 1.0, PLACES)
+    assert costs.poll() == []
+    assert costs.state == "cost: preparing the map, 0%, 3 s left"
+    worker.events.append(Building(1, 0.5, 0.3))
+    costs.poll()
+    assert costs.state == "cost: preparing the map, 50%"
+    assert worker.asked == []
+    worker.ready()
+    costs.poll()
+    assert costs.state == ""
+    assert len(worker.asked) == 1
+
+
+def test_every_pane_has_its_turn(stubbed):
+    costs, worker, now = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    turns = []
+    for frame in range(40):
+        now[0] += 1 / 60
+        for pane in range(3):
+            costs.ask(pane, float(frame), PLACES)
+        worker.answer()
+        turns += [pane for pane, _ in costs.poll()]
+    assert {turns.count(pane) for pane in range(3)} <= {13, 14}
+    # each answer is of the newest question
+    assert min(known.time for known in costs.known.values()) >= 36.0
+
+
+def test_one_question_at_a_time(stubbed):
+    costs, worker, now = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    for pane in range(3):
+        costs.ask(pane, 1.0, PLACES)
+    assert len(worker.asked) == 1
+    now[0] += 0.3
+    costs.poll()
+    assert len(worker.asked) == 1
+    # what does not come is not waited for for ever
+    now[0] += 0.3
+    costs.poll()
+    assert len(worker.asked) == 2
+
+
+def test_answers_to_another_run_are_passed_over(stubbed):
+    costs, worker, _ = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    costs.ask(0, 7.0, PLACES)
+    costs.forget()
+    costs.ask(0, 0.0, OTHERS)
+    worker.answer()
+    assert costs.poll() == []
+    assert costs.known == {}
+    worker.answer()
+    assert [(pane, known.time) for pane, known in costs.poll()] == [(0, 0.0)]
+
+
+def test_so_are_those_of_another_map(stubbed):
+    costs, worker, _ = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    costs.ask(2, 7.0, PLACES)
+    worker.answer()
+    assert len(costs.poll()) == 1
+    costs.ask(2, 8.0, PLACES)
+    costs.environment(replace(HALL, obstacles=()))
+    assert costs.known == {}
+    worker.answer(generation=1)
+    assert costs.poll() == []
+    costs.ask(2, 8.0, INSIDE)
+    worker.ready()
+    costs.poll()
+    worker.answer()
+    assert [pane for pane, _ in costs.poll()] == [2]
+
+
+def test_a_robot_in_an_obstacle_stops_nothing(stubbed):
+    costs, worker, _ = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    costs.ask(0, 1.0, INSIDE)
+    costs.ask(1, 1.0, PLACES)
+    worker.events.append(Failed(1, "robot 1 is outside the free space"))
+    assert costs.poll() == []
+    assert costs.state == ""
+    worker.answer()
+    assert [pane for pane, _ in costs.poll()] == [1]
+
+
+def test_a_process_that_ends_again_and_again_is_said(stubbed):
+    costs, worker, now = stubbed
+    costs.environment(HALL)
+    worker.ready()
+    costs.poll()
+    costs.ask(0, 1.0, PLACES)
+    worker.events.append(Failed(1, "the process that computes the cost has ended"))
+    costs.poll()
+    # asked again, it is started again, and prepares the map
+    costs.ask(0, 2.0, PLACES)
+    worker.events.append(Building(1, 0.1, 9.0))
+    costs.poll()
+    assert costs.state == "cost: preparing the map, 10%, 9 s left"
+    asked = len(worker.asked)
+    now[0] += 1.0
+    costs.ask(0, 3.0, PLACES)
+    assert len(worker.asked) == asked
+    worker.events.append(Failed(1, "the process that computes the cost has ended"))
+    costs.poll()
+    assert costs.state == "no cost: the process that computes the cost has ended"
+    costs.close()
+    assert worker.closed
+
+
+# by another process
+
+
+def test_another_process_says_the_same(worker_costs):
+    worker_costs.environment(HALL)
+    point = np.array([3.5, 0.5])
+    worker_costs.ask(0, 1.5, PLACES)
+    worker_costs.ask(5, 1.5, OTHERS, point)
+    answers = answered(worker_costs, 2)
+    cost = CoverageCost(HALL, 32)
+    for pane, places in ((0, PLACES), (5, OTHERS)):
+        assert answers[pane].time == 1.5
+        assert answers[pane].result.mean_distance == cost(places).mean_distance
+        np.testing.assert_array_equal(answers[pane].result.distances, cost(places).distances)
+    assert answers[0].path is None
+    np.testing.assert_array_equal(answers[5].path, cost.path(OTHERS, point))
+    assert answers[5].field.largest > 0.0
+    assert worker_costs.state == ""
+    assert worker_costs.known == answers
+    # no way from the pillar's middle
+    worker_costs.ask(0, 2.0, PLACES, INSIDE[0])
+    assert answered(worker_costs)[0].path is None
+    worker_costs.forget()
+    assert worker_costs.known == {}
+    # another map, on which robots are where there was an obstacle
+    worker_costs.environment(replace(HALL, obstacles=()))
+    worker_costs.ask(0, 3.0, INSIDE)
+    assert answered(worker_costs)[0].time == 3.0
+
+
+def test_another_process_knows_where_obstacles_are(worker_costs):
+    worker_costs.environment(CROSSED)
+    speeds = np.array([0.5, 1.0])
+    for when in (0.0, 2.5):
+        worker_costs.ask(0, when, PLACES, speeds=speeds)
+        known = answered(worker_costs)[0]
+        cost = CoverageCost(CROSSED.at(when), 32)
+        assert known.time == when
+        assert known.result.mean_distance == cost(PLACES).mean_distance
+        assert known.travel_time == cost(PLACES, speeds).mean_time
+        # of the sites as they are then
+        np.testing.assert_array_equal(known.result.points, cost.points)
+        assert known.field.largest == known.result.distances.max()
+
+
+def test_a_map_without_a_cost_is_said():
+    costs = WorkerCosts(1)
+    try:
+        costs.environment(FULL)
+        end = time.monotonic() + PATIENCE
+        while not costs.state.startswith("no cost") and time.monotonic() < end:
+            costs.poll()
+            time.sleep(0.005)
+        assert "none of its sites is free" in costs.state
+    finally:
+        costs.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
+def test_a_process_that_dies_is_replaced(worker_costs):
+    worker_costs.environment(HALL)
+    worker_costs.ask(0, 1.0, PLACES)
+    answered(worker_costs)
+    os.kill(worker_costs._worker._talk._process.pid, signal.SIGKILL)
+    end = time.monotonic() + PATIENCE
+    answers = []
+    while not answers and time.monotonic() < end:
+        worker_costs.ask(0, 2.0, PLACES)
+        answers = worker_costs.poll()
+        time.sleep(0.005)
+    assert answers[0][1].time == 2.0
+    assert worker_costs.state == ""

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov_app.viewer.session import curves as module
+from robocov_app.viewer.session.curves import MOST_SAMPLES, Curve, Event, Ghost
+
+
+def drawn(*samples: tuple[float, float]) -> Curve:
+    curve = Curve()
+    for time, value in samples:
+        curve.add(time, value)
+    return curve
+
+
+def test_samples_come_back():
+    curve = drawn((0.0, 3.0), (0.5, 2.0), (1.0, 1.5))
+    assert len(curve) == 3
+    assert curve.time.tolist() == [0.0, 0.5, 1.0]
+    assert curve.value.tolist() == [3.0, 2.0, 1.5]
+    assert curve.last_time == 1.0
+
+
+def test_an_empty_curve():
+    curve = Curve()
+    assert len(curve) == 0
+    assert curve.last_time == -math.inf
+    assert math.isnan(curve.at(1.0))
+    assert curve.time.shape == curve.value.shape == (0,)
+    assert len(curve.cut(1.0)) == 0
+
+
+def test_what_comes_late_is_left_out():
+    curve = drawn((0.0, 3.0), (1.0, 2.0), (0.5, 9.0))
+    assert curve.time.tolist() == [0.0, 1.0]
+
+
+def test_the_newest_of_one_time_counts():
+    """While the run is paused, robots that are dragged have another cost at the same time."""
+    curve = drawn((0.0, 3.0), (1.0, 2.0), (1.0, 1.8), (1.0 + 1e-12, 1.7))
+    assert curve.time.tolist() == [0.0, 1.0]
+    assert curve.at(1.0) == 1.7
+
+
+@pytest.mark.parametrize(("time", "value"), [(1.0, math.nan), (1.0, math.inf), (math.nan, 1.0)])
+def test_what_is_no_number_is_left_out(time, value):
+    curve = drawn((0.0, 3.0), (time, value))
+    assert len(curve) == 1
+    assert curve.last_time == 0.0
+
+
+def test_between_samples_it_is_straight():
+    curve = drawn((1.0, 3.0), (2.0, 1.0))
+    assert curve.at(1.5) == 2.0
+    assert curve.at(1.0) == 3.0
+    assert curve.at(99.0) == 1.0
+    assert math.isnan(curve.at(0.5))
+
+
+def test_of_the_older_half_every_second_sample_goes():
+    curve = drawn(*((float(k), float(-k)) for k in range(MOST_SAMPLES + 1)))
+    assert len(curve) == MOST_SAMPLES - MOST_SAMPLES // 4 + 1
+    assert curve.time[:3].tolist() == [0.0, 2.0, 4.0]
+    assert (np.diff(curve.time[MOST_SAMPLES // 4 :]) == 1.0).all()
+
+
+@given(st.lists(st.floats(-1.0, 3.0), max_size=200), st.integers(4, 40))
+@settings(max_examples=150)
+def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "MOST_SAMPLES", most)
+        curve, time = Curve(), 0.0
+        for step in steps:
+            time += step
+            curve.add(time, time)
+            assert len(curve) <= most
+        assert (np.diff(curve.time) > 0).all()
+        assert curve.value == pytest.approx(curve.time, abs=1e-9)
+
+
+@given(st.lists(st.floats(0.01, 1.0), max_size=30), st.floats(-1.0, 20.0))
+def test_what_is_cut_off_begins_where_it_was_cut(steps, time):
+    times = np.cumsum(steps).tolist()
+    curve = drawn(*((at, 2 * at) for at in times))
+    rest = curve.cut(time)
+    assert curve.time.tolist() == [at for at in times if at <= time + 1e-6]
+    assert rest.time.tolist() == times[max(len(curve) - 1, 0) :]
+    assert rest.value.tolist() == [2 * at for at in rest.time.tolist()]
+    # on their own from now on
+    rest.add(1e3, 1.0)
+    curve.add(1e2, 1.0)
+    assert curve.last_time == 1e2
+
+
+def test_a_copy_is_on_its_own():
+    curve = drawn((0.0, 3.0), (1.0, 2.0))
+    twin = curve.copy()
+    twin.add(2.0, 1.0)
+    twin.cut(0.0)
+    assert curve.time.tolist() == [0.0, 1.0]
+    assert curve.value.tolist() == [3.0, 2.0]
+
+
+def test_events_and_ghosts_say_what_they_are():
+    assert Event(1.0, "law", "LA takes over") == Event(1.0, "law", "LA takes over")
+    ghost = Ghost("rapf", "RAPF", np.zeros(2), np.ones(2))
+    assert (ghost.law, ghost.words, len(ghost.time)) == ("rapf", "RAPF", 2)

@@ -1,0 +1,200 @@
+"""Opening the window from the command line, with a display or without."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pygame
+import pytest
+from called import COMMAND, complaint
+from PIL import Image
+from touched_run import begun
+
+from robocov_app.cli import main
+from robocov_app.commands.demo import Arguments, session_of
+from robocov_app.viewer.opening import NO_DISPLAY, Opening, display, fitting, screen_scale
+from robocov_app.viewer.settings import FOLDER
+
+SHORT = ("--lattice", "8", "--size", "900x600")
+
+
+@pytest.fixture(autouse=True)
+def _no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER, "")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # so that it is as before afterwards
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a display can be missing on Linux only")
+def test_without_a_display_it_says_so_in_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    assert complaint(capsys, "demo", "square") == NO_DISPLAY
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="X11")
+def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
+    kept = {
+        key: value for key, value in os.environ.items() if key not in ("WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    }
+    done = subprocess.run(
+        [*COMMAND, "demo", "square"],
+        env={**kept, "DISPLAY": ":987654", FOLDER: "", "XDG_RUNTIME_DIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.splitlines() == [f"robocov: error: {NO_DISPLAY}"]
+
+
+def frames_of(folder: Path, *words: str) -> list[np.ndarray]:
+    assert main(["demo", "square", *SHORT, "--frames", "3", "--out", str(folder), *words]) == 0
+    paths = sorted(folder.glob("[!.]*"))
+    assert [path.name for path in paths] == ["000000.png", "000001.png", "000002.png"]
+    return [np.asarray(Image.open(path).convert("RGB")) for path in paths]
+
+
+def test_frames_without_a_display(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frames = frames_of(tmp_path / "frames", "--robots", "2")
+    assert capsys.readouterr().out.splitlines() == [f"saved {tmp_path / 'frames'}"]
+    assert all(frame.shape == (600, 900, 3) for frame in frames)
+    assert not np.array_equal(frames[0], frames[2])
+
+
+def test_the_same_words_give_the_same_frames_bit_for_bit(tmp_path: Path) -> None:
+    words = ("--controllers", "rapf", "rpf", "--robots", "3", "--show", "scan", "distances", "--seed", "4")
+    first = frames_of(tmp_path / "first", *words)
+    second = frames_of(tmp_path / "second", *words)
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one, other)
+    other = frames_of(tmp_path / "other", *words[:-1], "5")
+    assert not np.array_equal(first[0], other[0])
+
+
+def test_a_video_has_all_frames_and_the_size_that_was_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "window.mp4"
+    words = ["demo", "square", *SHORT, "--frames", "8", "--video", str(path), "--theme", "dark"]
+    assert main([*words, "--robots", "1", "--speed", "4"]) == 0
+    assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 8
+    assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
+
+
+def test_frames_neither_read_nor_write_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "settings"
+    folder.mkdir()
+    (folder / "window.json").write_text('{"theme": "dark", "width": 1000}')
+    before = (folder / "window.json").read_text()
+    monkeypatch.setenv(FOLDER, str(folder))
+    (first, *_) = frames_of(tmp_path / "frames", "--robots", "1")
+    assert first.mean() > 190
+    assert [path.name for path in folder.iterdir()] == ["window.json"]
+    assert (folder / "window.json").read_text() == before
+
+
+def test_a_folder_that_has_frames_already_is_not_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "000000.png").write_text("mine")
+    said = complaint(capsys, "demo", "square", *SHORT, "--frames", "2", "--out", str(tmp_path))
+    assert str(tmp_path) in said
+    assert (tmp_path / "000000.png").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (("nowhere",), "nowhere"),
+        (("square", "--robots", "0"), "--robots"),
+        (("square", "--robots", "1001"), "--robots"),
+        (("square", "--start", "nowhere"), "nowhere"),
+        (("square", "--seed", "-1"), "--seed"),
+        (("square", "--controllers", "nobody"), "nobody"),
+        (("square", "--controllers", *("rapf",) * 5), "--controllers: 5"),
+        (("square", "--controllers", "mine.py:Mine"), "mine.py"),
+        (("square", "--set", "k_rep=much"), "k_rep"),
+        (("square", "--set", "k_none=1"), "k_none"),
+        (("square", "--size", "100x100"), "--size"),
+        (("square", "--size", "wide"), "--size"),
+        (("square", "--scale", "0.1"), "--scale"),
+        (("square", "--speed", "0"), "--speed"),
+        (("square", "--lattice", "1"), "--lattice"),
+        (("square", "--dt", "0"), "dt"),
+        (("square", "--radius", "-1"), "radius"),
+        (("square", "--show", "ghosts"), "ghosts"),
+        (("square", "--hide", "ghosts"), "ghosts"),
+        (("square", "--frames", "3"), "--out"),
+        (("square", "--frames", "0", "--out", "x"), "--frames"),
+        (("square", "--out", "x"), "--frames"),
+        (("square", "--video", "x.mp4"), "--frames"),
+        (("square", "--frames", "2", "--video", "x.gif"), ".mp4"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(
+    words: tuple[str, ...], wanted: str, capsys: pytest.CaptureFixture[str], monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SDL_VIDEODRIVER")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.setenv(name, ":987654")  # were it opened all the same, that would fail
+    assert wanted in complaint(capsys, "demo", *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_options_are_what_the_session_begins_with() -> None:
+    options = Arguments(
+        "rooms", ("rpf", "lloyd"), ("k_rep=2",), 4, "kitchen", 7, dt=0.05, radius=0.15, speed=2.0, paused=True
+    )
+    session = session_of(options)
+    assert [lane.law.name for lane in session.lanes] == ["rpf", "lloyd"]
+    assert session.lanes[0].law.value("k_rep") == 2.0
+    scenario = session.scenario
+    assert (scenario.robots, scenario.start_name, scenario.seed, scenario.dt) == (4, "kitchen", 7, 0.05)
+    assert scenario.limits.radius == 0.15 and session.clock.speed == 2.0 and not session.playing
+
+
+def test_the_display_ends_also_when_something_fails() -> None:
+    with pytest.raises(ZeroDivisionError), display(headless=True):
+        assert pygame.display.get_init()
+        1 / 0
+    assert not pygame.display.get_init()
+
+
+@pytest.mark.parametrize(
+    ("height", "scale"), [(768, 1.0), (1080, 1.0), (1440, 1.25), (2160, 2.0), (4320, 3.0)]
+)
+def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeypatch) -> None:
+    monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(height * 16 // 9, height)])
+    assert screen_scale() == scale
+    assert fitting((3000, 500)) == (min(3000, height * 16 // 9), 500)
+
+
+def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    (tmp_path / "window.json").write_text("{ nonsense")
+    with Opening(begun(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
+        assert "default settings" in window.desk.message
+        window.close()
+    assert '"theme": "light"' in (tmp_path / "window.json").read_text()
+
+
+def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
+    asked = Opening(
+        begun(),
+        "hall",
+        tmp_path,
+        headless=True,
+        lattice=4,
+        also=frozenset({"scan"}),
+        without=frozenset({"cells"}),
+    )
+    with asked.window() as window:
+        assert "scan" in window.desk.shown and "cells" not in window.desk.shown
+        window.close()

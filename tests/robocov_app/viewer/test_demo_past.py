@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from touched_run import LLOYD, RAPF, RPF, begun, stepped
+
+from robocov_app.viewer.session import past as module
+from robocov_app.viewer.session.past import Past
+from robocov_app.viewer.session.scenario import Law
+
+MINE = """
+from dataclasses import dataclass
+import numpy as np
+from robocov.observation import Decision
+
+@dataclass(frozen=True)
+class Counting:
+    def begin(self, region, team):
+        return [0]
+
+    def decide(self, seen, memory):
+        memory[0] += 1
+        return Decision(np.full_like(seen.positions, float(memory[0])), memory=memory)
+
+@dataclass(frozen=True)
+class Late:
+    way: float = 0.0
+
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        if seen.time < 0.1:
+            return Decision(np.ones_like(seen.positions))
+        if self.way == 0.0:
+            raise SystemExit
+        if self.way == 1.0:
+            return None
+        if self.way == 2.0:
+            return Decision(np.ones(3))
+        if self.way == 3.0:
+            return Decision(np.full_like(seen.positions, np.nan))
+        return Decision(np.ones_like(seen.positions), goals=np.ones(3))
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("own") / "mine.py"
+    path.write_text(MINE)
+    return path
+
+
+@pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
+def test_the_past_is_explained_as_it_was(law):
+    session = begun(law)
+    lane = session.lanes[0]
+    seen = []
+    for _ in range(20):
+        seen.append(lane.simulation.snapshot)
+        session.step()
+    past = Past()
+    for k in (13, 2, 19, 0):
+        told = past.snapshot(session.history[k].states[0], session.history.time(k))
+        assert told.time == pytest.approx(seen[k].time)
+        for name in ("positions", "velocities", "obstacle_points"):
+            np.testing.assert_array_equal(getattr(told.seen, name), getattr(seen[k].seen, name))
+        assert told.decision.forces == pytest.approx(seen[k].decision.forces, abs=1e-9)
+        assert set(told.decision.terms) == set(seen[k].decision.terms)
+
+
+def test_a_controller_may_remember_what_it_did(file):
+    session = stepped(begun(Law(f"{file}:Counting")), 10)
+    past = Past()
+    for k in (3, 8):
+        for _ in range(3):
+            told = past.snapshot(session.history[k].states[0], session.history.time(k))
+            assert told.decision.forces[0, 0] == k + 1.0
+
+
+@pytest.mark.parametrize("way", range(5))
+def test_a_controller_that_fails_decided_nothing(file, way):
+    session = stepped(begun(Law(f"{file}:Late", {"way": float(way)})), 3)
+    past = Past()
+    state = session.history[2].states[0]
+    assert past.snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
+    told = past.snapshot(state, 1.0)
+    assert told.decision.forces.tolist() == np.zeros((3, 2)).tolist()
+    assert told.decision.goals is None
+    np.testing.assert_array_equal(told.positions, state.positions)
+
+
+def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
+    session = stepped(begun(RAPF, RPF, LLOYD, RAPF), 3)
+    made = []
+    real = module.RangeSensor
+    monkeypatch.setattr(module, "RangeSensor", lambda pieces, movers=(): made.append(1) or real(pieces))
+    module._sensor_in.cache_clear()
+    session.look_at(0.0)
+    for _ in range(5):
+        for lane in session.lanes:
+            session.snapshot(lane)
+    assert len(made) == 1
+    module._sensor_in.cache_clear()

@@ -1,0 +1,431 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_run import run_of
+from kept_run import COUNTING, record_of, records_of, same_arrays
+from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
+
+from robocov.errors import InputError, ParameterError
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov.robots import Team
+from robocov.voronoi.weighted_cells import WeightedCells
+from robocov_app.runs.saved import Saved, roster_of
+from robocov_app.viewer.opening import Opening
+from robocov_app.viewer.session.replayed import LostLaw, control_dt, replayed_session
+from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.session import Session
+
+STEPS = 60
+
+
+def saved(record: Record, history: CostHistory | None = None, name: str = "saved") -> Saved:
+    return Saved(Path(name), record, history)
+
+
+def replayed(*records: Record, controllers: tuple[str, ...] = ()) -> Session:
+    """Return a session of records, paused at their beginning."""
+    runs = [saved(record, name=f"saved/{k}") for k, record in enumerate(records)]
+    session = replayed_session(runs, controllers)
+    session.playing = False
+    session.clock.budget = float("inf")
+    return session
+
+
+def recorded(*laws: Law, steps: int = STEPS, robots: int = 4, **changes) -> Record:
+    return record_of(stepped(begun(*laws, robots=robots, **changes), steps))
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    return recorded()
+
+
+@pytest.fixture
+def counting(tmp_path: Path) -> Law:
+    path = tmp_path / "mine.py"
+    path.write_text(COUNTING)
+    return Law(f"{path}:Counting")
+
+
+def state_of(session: Session) -> tuple[np.ndarray, np.ndarray]:
+    return session.lanes[0].simulation.positions, session.lanes[0].simulation.velocities
+
+
+# looking at it
+
+
+def test_it_begins_at_the_beginning_and_plays(record: Record) -> None:
+    session = replayed_session([saved(record)])
+    assert session.playing
+    assert not session.live
+    assert (session.time, session.end) == (0.0, 1.0)
+    assert session.numbers == (1, 2, 3, 4)
+    assert session.scenario.start_name == "corner"
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[0])
+    session.clock.budget = float("inf")
+    for _ in range(30):
+        session.advance(1 / 60)
+    assert session.time == pytest.approx(0.5)
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[30])
+
+
+@pytest.mark.parametrize("law", [RAPF, RPF, LLOYD], ids=lambda law: law.name)
+def test_every_moment_is_the_recorded_one_with_all_that_explains_it(law: Law) -> None:
+    record = recorded(law)
+    session = replayed(record)
+    for k in (0, 17, STEPS):
+        session.look_at(k / 60)
+        snapshot = session.snapshot(session.lanes[0])
+        np.testing.assert_array_equal(snapshot.positions, record.positions[k])
+        np.testing.assert_array_equal(snapshot.velocities, record.velocities[k])
+        np.testing.assert_allclose(snapshot.decision.forces, record.forces[k], rtol=1e-12)
+        np.testing.assert_array_equal(snapshot.seen.obstacle_points, record.obstacle_points[k])
+        assert snapshot.decision.terms
+    assert session.live
+
+
+def test_where_it_went_and_what_it_sensed_is_there(record: Record) -> None:
+    session = replayed(record)
+    lane = session.lanes[0]
+    session.look_at(0.5)
+    places, times = session.trail(lane)
+    assert times[-1] == pytest.approx(0.5, abs=1 / 30)
+    np.testing.assert_array_equal(places[-1], record.positions[round(times[-1] * 60)])
+    np.testing.assert_array_equal(lane.starts, record.positions[0])
+    live = stepped(begun(robots=4), STEPS).lanes[0]
+    np.testing.assert_array_equal(lane.sensed.until(0.9)[0], live.sensed.until(0.9)[0])
+
+
+def test_the_curve_is_that_of_the_file(record: Record) -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    history = CostHistory(time, 3.0 - time, 10.0 - time, 0.0 * time)
+    lane = replayed_session([saved(record, history)]).lanes[0]
+    np.testing.assert_allclose(lane.curve.time, time)
+    np.testing.assert_allclose(lane.curve.value, 3.0 - time)
+    assert len(replayed_session([saved(record)]).lanes[0].curve) == 0
+
+
+def test_one_moment_is_the_present(record: Record) -> None:
+    session = replayed(recorded(steps=0))
+    assert session.live
+    stepped(session, 5)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[5])
+
+
+# going on
+
+
+@pytest.mark.parametrize("law", [RAPF, LLOYD, Law("rpf", {"k_rep": 1.0})], ids=lambda law: law.name)
+def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: Law) -> None:
+    whole = stepped(begun(law, robots=8, start="spread"), 2 * STEPS)
+    session = replayed(recorded(law, robots=8, start="spread"))
+    session.playing = True
+    for _ in range(2 * STEPS):
+        session.advance(1 / 60)
+    assert session.live
+    assert session.end == whole.end
+    for mine, theirs in zip(state_of(session), state_of(whole), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    assert same_arrays(record_of(session), record_of(whole))
+    assert record_of(session).session == {}
+
+
+def test_it_can_be_gone_on_from_any_moment(record: Record) -> None:
+    session = replayed(record)
+    session.look_at(0.4)
+    assert session.branch()
+    assert session.end == pytest.approx(0.4)
+    stepped(session, STEPS - 24)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
+
+
+def test_it_can_be_touched_at_any_moment(record: Record) -> None:
+    session = replayed(record)
+    session.look_at(0.5)
+    session.set_law(session.lanes[0], LLOYD)
+    session.fail_robot(2)
+    assert session.live
+    assert session.numbers == (1, 3, 4)
+    stepped(session, 10)
+    assert session.undo.can_undo
+
+
+def test_it_begins_anew_where_it_began(record: Record) -> None:
+    session = replayed(record)
+    session.look_at(0.5)
+    session.restart()
+    stepped(session, STEPS)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
+    session.restart(seed=7)
+    np.testing.assert_array_equal(state_of(session)[0], HALL.start("corner").sample(4, seed=7, radius=0.1))
+
+
+# parts of sessions
+
+
+def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
+    before = stepped(begun(robots=4), 30)
+    before.fail_robot(2)
+    stepped(before, 30)
+    session = replayed(record_of(before))
+    there = session.circumstances(session.lanes[0])
+    assert session.numbers == (1, 3, 4)
+    assert list(there.failed) == [2]
+    assert there.environment == HALL
+    assert session.end == pytest.approx(0.5)
+    session.look_at(session.end)
+    for one in (before, session):
+        one.revive_robot(2)
+        stepped(one, 20)
+    assert sorted(session.numbers) == [1, 2, 3, 4]
+    assert session.numbers == before.numbers
+    np.testing.assert_array_equal(state_of(session)[0], state_of(before)[0])
+
+
+def test_who_moved_at_the_beginning_moves_when_it_begins_anew() -> None:
+    before = stepped(begun(robots=4), 30)
+    before.set_law(before.lanes[0], LLOYD)
+    record = record_of(stepped(before, 30))
+    session = replayed(record)
+    assert session.scenario.start is None
+    session.restart()
+    stepped(session, 30)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
+    session.restart(robots=2)
+    assert not state_of(session)[1].any(), "other robots begin at rest"
+
+
+def test_a_record_with_moments_missing_goes_on_at_the_old_pace(record: Record) -> None:
+    parts = {
+        name: getattr(record, name)[::4]
+        for name in ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+    }
+    coarse = replace(record, dt=record.dt * 4, session={"control_dt_s": record.dt}, **parts)
+    assert control_dt(coarse) == record.dt
+    session = replayed(coarse)
+    assert session.history.steps[:3] == [0, 4, 8]
+    session.look_at(session.end)
+    stepped(session, 12)
+    assert session.end == pytest.approx(1.2)
+    session.look_at(0.4)
+    session.branch()
+    stepped(session, STEPS - 24)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
+
+
+def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
+    rate = 1.0 / (4 * record.dt)
+    session = replayed(record.thinned(rate))
+    assert session.scenario.dt == record.dt
+    assert session.history.steps[:3] == [0, 4, 8]
+    session.look_at(12 * record.dt)
+    session.branch()
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[12])
+    stepped(session, STEPS - 12)
+    np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
+    # as one that was thinned before and is thinned again
+    again = replayed(record.thinned(rate).thinned(rate / 3))
+    assert again.history.steps[:3] == [0, 12, 24] and again.scenario.dt == record.dt
+
+
+def test_moments_at_uneven_times_are_refused(record: Record) -> None:
+    with pytest.raises(InputError, match=r"record.npz: time: moments .* s apart were wanted"):
+        replayed(record.thinned(1.0 / (7 * record.dt)))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"robots": [1, 2], "failed": {}},
+        {"robots": [1, 2, 3, 3], "failed": {}},
+        {"robots": [1, 2, 3, 5], "failed": {"4": [1.0, 1.0]}},
+        {"control_dt_s": 0.011},
+    ],
+)
+def test_what_of_a_session_does_not_go_with_its_record_is_passed_over(record: Record, said: dict) -> None:
+    session = replayed(replace(record, session=said))
+    assert session.numbers == (1, 2, 3, 4)
+    assert session.scenario.dt == record.dt
+    assert list(session.events) == []
+
+
+def test_hands_are_told_of(record: Record) -> None:
+    touched = [{"from_s": 0.1, "to_s": 0.2, "robots": [2, 3]}]
+    (event,) = replayed(replace(record, session={"touched": touched})).events
+    assert (event.time, event.kind, event.text) == (0.2, "hand", "robot 2, 3 was dragged")
+
+
+# side by side
+
+
+def test_a_comparison_is_side_by_side() -> None:
+    before = stepped(begun(RAPF, RPF, LLOYD), STEPS)
+    records = records_of(before)
+    session = replayed(*records)
+    assert [lane.law.name for lane in session.lanes] == ["rapf", "rpf", "lloyd"]
+    session.look_at(0.5)
+    for lane, record in zip(session.lanes, records, strict=True):
+        np.testing.assert_array_equal(session.positions(lane), record.positions[30])
+    session.branch()
+    stepped(session, 30)
+    for lane, record in zip(session.lanes, records, strict=True):
+        np.testing.assert_array_equal(lane.simulation.positions, record.positions[-1])
+
+
+def test_robots_that_failed_at_different_places_stay_there() -> None:
+    before = stepped(begun(RAPF, LLOYD), 30)
+    before.fail_robot(1)
+    records = records_of(stepped(before, 10))
+    session = replayed(*records)
+    for lane, other in zip(session.lanes, before.lanes, strict=True):
+        assert session.circumstances(lane).failed == other.circumstances.failed
+    assert session.lanes[0].circumstances.environment is session.lanes[1].circumstances.environment
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (lambda record: recorded(steps=5), r"saved/1: moments: 6, but 61 as in saved/0 was wanted"),
+        (lambda record: recorded(dt=1 / 50), r"saved/1: dt_s: 0.02, but 0.016\d* as in"),
+        (lambda record: recorded(robots=3), r"saved/1: team: "),
+        (
+            lambda record: replace(record, time=record.time**2),
+            "saved/1/record.npz: time: moments 0.0166667 s apart",
+        ),
+        (
+            lambda record: replace(record, team=replace(record.team, radius=np.array([0.1, 0.1, 0.1, 0.2]))),
+            "saved/1: team: .*, but .* as in saved/0 was wanted",
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused(record: Record, other, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        replayed(record, other(record))
+
+
+def test_robots_that_differ_are_as_they_were(record: Record) -> None:
+    radius, speeds = np.array([0.1, 0.1, 0.1, 0.2]), np.array([1.0, 0.5, 0.5, 1.0])
+    team = replace(record.team, radius=radius, max_speed=speeds)
+    session = replayed(replace(record, team=team, gains={**record.gains, "cells": "time"}))
+    circumstances = session.circumstances(session.lanes[0])
+    assert circumstances.team.to_dict() == team.to_dict()
+    seen = session.snapshot(session.lanes[0]).seen
+    assert seen.max_speeds is not None
+    assert seen.max_speeds.tolist() == [1.0, 0.5, 0.5, 1.0]
+
+
+def test_more_than_there_is_room_for_is_refused(record: Record) -> None:
+    with pytest.raises(InputError, match="saved: 5 runs, but the window has room for 4"):
+        replayed(*[record] * 5)
+
+
+# controllers that are not what they were
+
+
+def test_a_controller_that_is_not_loaded_leaves_its_run_to_be_looked_at(counting: Law) -> None:
+    record = recorded(counting)
+    session = replayed(record)
+    lane = session.lanes[0]
+    law = session.circumstances(lane).law
+    assert isinstance(law, LostLaw)
+    assert law.label == "Counting"
+    for k in (0, 20, STEPS):
+        session.look_at(k / 60)
+        snapshot = session.snapshot(lane)
+        np.testing.assert_array_equal(snapshot.positions, record.positions[k])
+        np.testing.assert_array_equal(snapshot.decision.forces, record.forces[k])
+        assert snapshot.decision.goals is None
+    gone = r"not gone on with: Counting is none of .*; to go on, open it with --controller FILE.py:Counting$"
+    with pytest.raises(ParameterError, match=gone):
+        session.step()
+    session.look_at(0.5)
+    for deed in (session.branch, session.restart, lambda: session.fail_robot(1)):
+        with pytest.raises(ParameterError, match=gone):
+            deed()
+    assert (session.end, len(session.history)) == (1.0, STEPS + 1), "nothing is lost"
+
+
+def test_at_its_end_another_controller_may_take_over(counting: Law) -> None:
+    record = recorded(counting)
+    session = replayed(record)
+    session.look_at(session.end)
+    session.set_law(session.lanes[0], RAPF)
+    stepped(session, 10)
+    assert session.end == pytest.approx(1.0 + 10 / 60)
+
+
+def test_the_window_shows_what_it_can(tmp_path: Path, counting: Law) -> None:
+    record = recorded(counting)
+    opening = Opening(
+        replayed_session([saved(record)]), "", tmp_path, size=(900, 600), headless=True, lattice=16
+    )
+    with opening.window() as window:
+        for _ in range(40):
+            window.frame(1 / 30)
+        assert window.desk.session.live
+        assert "not gone on with" in window.desk.message
+        for tab in ("show", "robot", "parameters"):
+            window.panel.show_tab(tab)
+            window.do("robot:next")
+            window.frame(1 / 30)
+            window.frame(1 / 30)
+
+
+def test_a_controller_that_has_changed_does_not_change_the_past(tmp_path: Path, counting: Law) -> None:
+    record = recorded(counting)
+    (tmp_path / "mine.py").write_text(COUNTING.replace("0.05", "0.5"))
+    session = replayed(record, controllers=(counting.name,))
+    lane = session.lanes[0]
+    session.look_at(0.5)
+    np.testing.assert_array_equal(session.snapshot(lane).decision.forces, record.forces[30])
+    session.branch()
+    assert stepped(session, 5).end == pytest.approx(0.5 + 5 / 60)
+
+
+def test_a_controller_remembers_again_what_it_did(counting: Law) -> None:
+    whole = stepped(begun(counting, robots=4), STEPS + 20)
+    record = replace(recorded(counting), controller="elsewhere/theirs.py:Counting")
+    session = replayed(record, controllers=("lloyd", counting.name))
+    session.look_at(0.5)
+    session.branch()
+    stepped(session, STEPS + 20 - 30)
+    np.testing.assert_array_equal(state_of(session)[0], state_of(whole)[0])
+
+
+def test_cells_are_of_the_recorded_kind_also_without_the_controller(record: Record) -> None:
+    speeds = np.array([1.0, 0.5, 0.5, 1.0])
+    team = replace(record.team, max_speed=speeds)
+    record = replace(record, controller="theirs.py:Mine", team=team, gains={"cells": "time"})
+    session = replayed(record)
+    session.look_at(0.5)
+    cells = session.snapshot(session.lanes[0]).decision.cells
+    assert isinstance(cells, WeightedCells)
+    np.testing.assert_array_equal(cells.centroid, record.cells(30).centroid)
+
+
+def test_gains_that_it_does_not_take_any_more_are_said(record: Record) -> None:
+    session = replayed(replace(record, gains={"k_repulsion": 1.0}))
+    session.look_at(session.end)
+    with pytest.raises(ParameterError, match="unknown gain 'k_repulsion'"):
+        session.step()
+
+
+def test_only_gains_that_differ_are_the_users(record: Record) -> None:
+    assert replayed(record).lanes[0].law == RAPF
+    law = Law("rapf", {"k_rep": 0.7})
+    assert replayed(recorded(law, steps=3)).lanes[0].law == law
+
+
+def test_runs_of_any_origin_can_be_looked_at() -> None:
+    """Robots that walk through walls end where no simulation can begin; there they are pushed out."""
+    record = run_of(HALL, 3, steps=20)
+    record = replace(record, team=Team.homogeneous(3))
+    assert roster_of(record).numbers == (1, 2, 3)
+    session = replayed(record)
+    session.look_at(1.0)
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[10])

@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from touched_run import HALL, LLOYD, RAPF, RPF
+
+from robocov.controllers import make_controller
+from robocov.errors import ParameterError, StartError
+from robocov.robots import Team
+from robocov_app.viewer.parameters import limit_parameters, with_limit
+from robocov_app.viewer.session.scenario import (
+    MOST_PANES,
+    MOST_ROBOTS,
+    Law,
+    Limits,
+    Scenario,
+    branch_words,
+    gain_words,
+)
+
+MINE = """
+from dataclasses import dataclass
+with open({marks!r}, "a") as marks:
+    marks.write("run\\n")
+
+@dataclass(frozen=True)
+class Mine:
+    stiffness: float = 1.0
+
+    def force(self, own):
+        return self.stiffness * (own.centroid - own.position)
+"""
+
+
+class TestLaw:
+    def test_its_controller(self):
+        assert Law("rapf", {"k_rep": 0.3}).made() == make_controller("rapf", {"k_rep": 0.3})
+        assert [law.label for law in (RAPF, RPF, LLOYD)] == ["RAPF", "RPF", "LA"]
+
+    def test_its_gains(self):
+        law = Law("rapf", {"k_rep": 0.7})
+        assert law.value("k_rep") == 0.7
+        assert law.value("k_att") == law.known["k_att"].default
+        other = law.with_gain("k_att", 2.5)
+        assert (other.value("k_rep"), other.value("k_att")) == (0.7, 2.5)
+        assert law.value("k_att") != 2.5
+
+    def test_gains_are_those_that_differ(self):
+        default = RAPF.value("k_rep")
+        assert RAPF.with_gain("k_rep", 2 * default).with_gain("k_rep", default) == RAPF
+        assert RAPF.with_gain("k_rep", default).gains == {}
+
+    @pytest.mark.parametrize(("gain", "value"), [("k_rap", 1.0), ("k_rep", -1.0), ("k_rep", math.nan)])
+    def test_what_is_no_gain_is_refused(self, gain, value):
+        with pytest.raises(ParameterError):
+            RAPF.with_gain(gain, value)
+
+    def test_there_is_no_such_law(self):
+        with pytest.raises(ParameterError, match="did you mean 'rapf'"):
+            Law("rapff").made()
+
+    def test_a_file_is_not_run_for_each_picture(self, tmp_path):
+        marks = tmp_path / "marks"
+        (tmp_path / "mine.py").write_text(MINE.format(marks=str(marks)))
+        law = Law(f"{tmp_path / 'mine.py'}:Mine")
+        for _ in range(20):
+            assert law.label == "Mine"
+            assert law.value("stiffness") == 1.0
+        assert len(marks.read_text().splitlines()) <= 2
+
+    def test_what_differs_in_words(self):
+        stiff = Law("rapf", {"k_rep": 0.123456})
+        assert gain_words(RAPF, stiff) == "k_rep = 0.123"
+        assert gain_words(stiff, stiff.with_gain("k_att", 2.0)) == "k_att = 2"
+        assert gain_words(stiff, stiff) == ""
+        assert branch_words(RAPF) == "RAPF"
+        assert branch_words(stiff) == "RAPF, k_rep 0.123"
+        optional = [name for name, gain in RAPF.known.items() if gain.optional]
+        for name in optional:
+            law = Law("rapf", {name: 1.25})
+            assert "no limit" in gain_words(law, Law("rapf", {name: None})) + branch_words(
+                Law("rapf", {name: None})
+            )
+
+
+class TestLimits:
+    def test_they_make_a_team_and_are_told_by_it(self):
+        limits = Limits(radius=0.2, max_speed=0.5, sensing_range=math.inf)
+        team = limits.team(3)
+        assert len(team) == 3
+        assert team.radius.tolist() == [0.2] * 3
+        assert Limits.of(team) == limits
+
+    def test_robots_may_differ(self):
+        team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.1, 0.3]), mass=np.array([2.0, 1.0, 1.0]))
+        limits = Limits.of(team)
+        assert limits.team(3).to_dict() == team.to_dict()
+        # robots keep what is theirs under their numbers; a new one is as the first
+        assert limits.team((1, 3)).radius.tolist() == [0.1, 0.3]
+        assert limits.team(4).mass.tolist() == [2.0, 1.0, 1.0, 2.0]
+        assert limits.radius_of(3) == 0.3
+        assert Limits.of(team, (2, 5, 7)).team((7, 1)).radius.tolist() == [0.3, 0.1]
+        equal = with_limit(limits, "team.radius", 0.2)
+        assert equal.team(3).radius.tolist() == [0.2] * 3
+        assert equal.team(3).mass.tolist() == [2.0, 1.0, 1.0]
+        assert [each.label for each in limit_parameters(limits) if "≠" in each.label] == ["radius ≠"]
+        with pytest.raises(ParameterError, match="radius"):
+            replace(limits, different=(("radius", ((1, -1.0),)),)).team(1)
+
+    def test_they_are_the_papers_by_default(self):
+        assert Limits.of(Team.homogeneous(2)) == Limits()
+
+    @pytest.mark.parametrize("name", ["radius", "mass", "max_speed", "max_acceleration"])
+    @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
+    def test_what_cannot_be_is_refused(self, name, value):
+        with pytest.raises(ParameterError, match=name):
+            replace(Limits(), **{name: value}).team(1)
+
+
+class TestScenario:
+    def test_starts_are_those_of_the_map(self):
+        scenario = Scenario(HALL, robots=4, seed=3)
+        assert scenario.start_name == "corner"
+        np.testing.assert_array_equal(scenario.positions(), HALL.start("corner").sample(4, seed=3))
+        far = replace(scenario, start="far")
+        assert far.start_name == "far"
+        assert (far.positions()[:, 0] > 4.0).all()
+
+    def test_starts_that_are_given(self):
+        given = np.array([[1.0, 1.0], [2.0, 2.0]])
+        assert Scenario(HALL, given=given, robots=2).positions() is given
+
+    def test_larger_robots_start_farther_apart(self):
+        places = Scenario(HALL, robots=4, limits=Limits(radius=0.3)).positions()
+        apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+        assert apart[np.triu_indices(4, 1)].min() >= 0.6
+
+    @pytest.mark.parametrize("robots", [0, -1, MOST_ROBOTS + 1])
+    def test_too_many_robots_or_none(self, robots):
+        with pytest.raises(ParameterError, match="whole number from 1 to 1000"):
+            Scenario(HALL, robots=robots)
+
+    @pytest.mark.parametrize("count", [0, MOST_PANES + 1])
+    def test_too_many_controllers_or_none(self, count):
+        with pytest.raises(ParameterError, match="1 to 4 were wanted"):
+            Scenario(HALL, (RAPF,) * count)
+
+    def test_no_room_or_no_such_start(self):
+        with pytest.raises(StartError, match="room for about"):
+            Scenario(HALL, robots=500).positions()
+        with pytest.raises(StartError, match="did you mean 'corner'"):
+            Scenario(HALL, start="cornre").positions()

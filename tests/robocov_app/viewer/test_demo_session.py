@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from touched_run import (
+    HALL,
+    LLOYD,
+    PILLAR,
+    RAPF,
+    RPF,
+    all_told,
+    begun,
+    robots_of,
+    stepped,
+    too_deep,
+    with_pillar,
+)
+
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import ParameterError, StartError
+from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.scenario import Law, Limits
+
+# beginning anew
+
+
+def test_it_begins_anew_as_it_began():
+    session = begun(RAPF, LLOYD)
+    start = session.positions(session.lanes[0]).copy()
+    stepped(session, 20)
+    session.fail_robot(1)
+    session.add_robot((3.0, 3.0))
+    serial = session.serial
+    session.restart()
+    assert session.serial == serial + 1
+    assert (session.time, session.history.steps, session.live) == (0.0, [0], True)
+    assert robots_of(session) == ((1, 2, 3), ())
+    for lane in session.lanes:
+        np.testing.assert_array_equal(session.positions(lane), start)
+    assert list(session.events) == list(session.ghosts) == []
+    assert not session.undo.can_undo
+
+
+def test_what_was_drawn_can_be_undone_after_a_restart_but_not_what_was_done_to_robots() -> None:
+    session = begun()
+    session.edit(with_obstacle(session.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn")
+    session.add_robot((3.4, 3.0))
+    session.restart(seed=3)
+    assert robots_of(session) == ((1, 2, 3), ())
+    assert session.undo.undo() == "circle drawn"
+    assert session.environment.obstacles == HALL.obstacles
+    assert not session.undo.can_undo
+    assert session.undo.redo() == "circle drawn"
+    session.restart(environment=HALL)
+    assert not session.undo.can_undo and not session.undo.can_redo
+
+
+def test_it_begins_anew_with_changes():
+    session = begun(RAPF)
+    session.restart(robots=5)
+    assert session.numbers == (1, 2, 3, 4, 5)
+    session.restart(start="far", seed=4)
+    np.testing.assert_array_equal(
+        session.positions(session.lanes[0]), HALL.start("far").sample(5, seed=4, radius=0.1)
+    )
+    session.restart(laws=(RPF, LLOYD), limits=Limits(radius=0.15))
+    assert [lane.law for lane in session.lanes] == [RPF, LLOYD]
+    assert session.scenario.start == "far"
+    other = Environment("other", ((0, 0), (9, 0), (9, 9), (0, 9)))
+    session.restart(environment=other)
+    assert session.environment is other
+    assert session.scenario.start_name == "uniform"
+
+
+def test_what_was_chosen_stays_chosen():
+    session = begun(RAPF, RPF)
+    session.set_law(session.lanes[0], LLOYD)
+    session.set_limits(Limits(radius=0.2))
+    session.edit(with_pillar(), "circle drawn")
+    session.restart()
+    assert [lane.law for lane in session.lanes] == [LLOYD, RPF]
+    assert session.lanes[0].circumstances.limits == Limits(radius=0.2)
+    assert session.environment.obstacles[-1] == PILLAR
+
+
+def test_also_while_the_past_is_looked_at():
+    session = stepped(begun(RAPF), 10)
+    session.edit(with_pillar(), "circle drawn")
+    session.set_law(session.lanes[0], LLOYD)
+    stepped(session, 10)
+    session.look_at(0.0)
+    assert session.environment is HALL
+    session.restart()
+    assert session.environment.obstacles[-1] == PILLAR
+    assert session.lanes[0].law == LLOYD
+
+
+def test_a_start_that_was_covered_is_not_gone_back_to():
+    session = begun(start="far")
+    session.edit(with_obstacle(HALL, CircleObstacle((5.2, 3.2), 0.6)), "circle drawn")
+    assert "far" not in session.environment.starts
+    session.restart()
+    assert session.scenario.start is None
+    assert session.scenario.start_name == "corner"
+
+
+def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
+    given_starts = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 3.0]])
+    session = stepped(begun(given=given_starts), 10)
+    session.restart(laws=(RPF,))
+    np.testing.assert_array_equal(session.positions(session.lanes[0]), given_starts)
+    session.restart(seed=1)
+    assert session.scenario.given is None
+    assert np.abs(session.positions(session.lanes[0]) - given_starts).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"robots": 0},
+        {"robots": 700},
+        {"start": "nowhere"},
+        {"laws": (Law("nobody"),)},
+        {"laws": ()},
+        {"limits": Limits(radius=3.0)},
+        {"limits": Limits(max_speed=-1.0)},
+        {"dt": 7.0},
+        {"seed": -1},
+    ],
+)
+def test_what_cannot_be_begun_leaves_all_as_it_is(changes):
+    session = stepped(begun(RAPF, LLOYD), 12)
+    session.fail_robot(2)
+    session.look_at(0.1)
+    before = all_told(session)
+    with pytest.raises((StartError, ParameterError)):
+        session.restart(**changes)
+    assert all_told(session) == before
+
+
+# controllers and limits
+
+
+def test_another_controller_takes_over_in_one_pane():
+    session = stepped(begun(RAPF, RAPF), 20)
+    session.set_law(session.lanes[1], LLOYD)
+    assert [lane.law for lane in session.lanes] == [RAPF, LLOYD]
+    assert session.scenario.laws == (RAPF, LLOYD)
+    assert session.events[-1].text == "LA takes over"
+    session.set_law(session.lanes[0], RAPF.with_gain("k_rep", 0.5))
+    assert session.events[-1].text == "RAPF: k_rep = 0.5"
+    assert len(session.history) == 21
+    stepped(session, 20)
+
+
+def test_the_same_controller_again_is_no_event():
+    session = stepped(begun(RAPF), 10)
+    session.look_at(0.0)
+    before = all_told(session)
+    session.set_law(session.lanes[0], Law("rapf"))
+    session.set_limits(Limits())
+    assert all_told(session) == before
+
+
+def test_what_was_then_counts_not_what_is_now():
+    session = stepped(begun(), 20)
+    session.set_limits(Limits(max_speed=0.5))
+    session.set_law(session.lanes[0], LLOYD)
+    stepped(session, 20)
+    session.look_at(0.1)
+    session.set_limits(Limits(max_speed=0.5))
+    assert session.live
+    assert session.lanes[0].circumstances.limits.max_speed == 0.5
+    assert session.lanes[0].law == RAPF
+    assert session.end == pytest.approx(0.1)
+
+
+def test_limits_are_those_of_all():
+    session = stepped(begun(RAPF, LLOYD), 20)
+    session.set_limits(Limits(max_speed=0.3, communication_range=0.5))
+    for lane in session.lanes:
+        assert lane.simulation.team.max_speed.tolist() == [0.3] * 3
+        assert not lane.simulation.snapshot.seen.neighbours.complete
+    assert session.events[-1].kind == "limits"
+    before = all_told(session)
+    for limits in (Limits(max_speed=0.0), Limits(radius=1.9)):
+        with pytest.raises((ParameterError, StartError)):
+            session.set_limits(limits)
+        assert all_told(session) == before
+
+
+def test_larger_robots_make_room_for_each_other():
+    session = begun(robots=6)
+    session.set_limits(Limits(radius=0.3))
+    places = session.positions(session.lanes[0])
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    assert apart[np.triu_indices(6, 1)].min() >= 0.6
+    assert too_deep(session) <= 0.0

@@ -1,0 +1,303 @@
+"""The session, whatever is done with it in whatever order."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
+from touched_run import (
+    HALL,
+    LLOYD,
+    RAPF,
+    RPF,
+    all_told,
+    begun,
+    robots_of,
+    stepped,
+    too_deep,
+)
+
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError, ParameterError, RobocovError
+from robocov_app.viewer.session.map_edits import with_moved, with_obstacle, without_obstacle
+from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.timeline import MOST_EVENTS, MOST_GHOSTS
+
+# anything
+
+points = st.tuples(st.floats(-0.5, 6.5), st.floats(-0.5, 4.5))
+laws = st.sampled_from([RAPF, RPF, LLOYD, RAPF.with_gain("k_rep", 1.0)])
+some_limits = st.builds(
+    Limits,
+    radius=st.sampled_from([0.05, 0.1, 0.25]),
+    max_speed=st.sampled_from([0.5, 1.0, 4.0]),
+    sensing_range=st.sampled_from([0.3, 3.0, np.inf]),
+    communication_range=st.sampled_from([0.5, np.inf]),
+)
+
+
+class Anything(RuleBasedStateMachine):
+    """Whatever users do."""
+
+    @initialize(laws=st.lists(laws, min_size=1, max_size=2), robots=st.integers(1, 5), seed=st.integers(0, 9))
+    def begin(self, laws, robots, seed):
+        self.session = begun(*laws, robots=robots, seed=seed, start="spread")
+
+    def attempt(self, touch) -> None:
+        """Do something; what is refused leaves everything as it was."""
+        before = all_told(self.session)
+        try:
+            touch()
+        except RobocovError as error:
+            assert str(error)
+            assert all_told(self.session) == before
+
+    def number(self, k: int) -> int:
+        working, failed = robots_of(self.session)
+        return [*working, *failed][k % (len(working) + len(failed))]
+
+    @rule(steps=st.integers(1, 12))
+    def step(self, steps):
+        stepped(self.session, steps)
+
+    @rule(playing=st.booleans())
+    def pause(self, playing):
+        self.session.playing = playing
+
+    @rule(seconds=st.floats(0.0, 0.2))
+    def pass_time(self, seconds):
+        self.session.advance(seconds)
+
+    @rule(k=st.integers(0, 9), point=points)
+    def grab(self, k, point):
+        self.attempt(lambda: self.session.grab(self.number(k), point))
+
+    @rule()
+    def release(self):
+        self.session.release()
+        assert self.session.hand is None
+
+    @rule(k=st.integers(0, 9), point=points)
+    def place(self, k, point):
+        self.attempt(lambda: self.session.place(self.number(k), point))
+
+    @rule(point=points)
+    def add_robot(self, point):
+        self.attempt(lambda: self.session.add_robot(point))
+
+    @rule(k=st.integers(0, 9))
+    def remove_robot(self, k):
+        self.attempt(lambda: self.session.remove_robot(self.number(k)))
+
+    @rule(k=st.integers(0, 9))
+    def fail_robot(self, k):
+        self.attempt(lambda: self.session.fail_robot(self.number(k)))
+
+    @rule(k=st.integers(0, 9))
+    def revive_robot(self, k):
+        self.attempt(lambda: self.session.revive_robot(self.number(k)))
+
+    @rule(point=points, radius=st.sampled_from([0.1, 0.4, 1.2, 4.5]))
+    def draw(self, point, radius):
+        def draw():
+            circle = CircleObstacle(point, radius)
+            self.session.edit(with_obstacle(self.session.environment, circle), "circle drawn")
+
+        self.attempt(draw)
+
+    @rule(k=st.integers(0, 9), by=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+    def move_obstacle(self, k, by):
+        there = self.session.environment
+        if there.obstacles:
+            k %= len(there.obstacles)
+            self.attempt(lambda: self.session.edit(with_moved(there, k, *by), "moved"))
+
+    @rule(k=st.integers(0, 9))
+    def delete_obstacle(self, k):
+        there = self.session.environment
+        if there.obstacles:
+            k %= len(there.obstacles)
+            self.attempt(lambda: self.session.edit(without_obstacle(there, k), "deleted"))
+
+    @rule(redo=st.booleans())
+    def undo(self, redo):
+        self.session.look_at(1e9)
+        self.attempt(self.session.undo.redo if redo else self.session.undo.undo)
+
+    @rule(k=st.integers(0, 3), law=laws)
+    def set_law(self, k, law):
+        lane = self.session.lanes[k % len(self.session.lanes)]
+        self.attempt(lambda: self.session.set_law(lane, law))
+
+    @rule(limits=some_limits)
+    def set_limits(self, limits):
+        self.attempt(lambda: self.session.set_limits(limits))
+
+    @rule(part=st.floats(0.0, 1.0))
+    def look_at(self, part):
+        self.session.look_at(part * self.session.end)
+
+    @rule(by=st.integers(-8, 8))
+    def look_by(self, by):
+        self.session.look_by(by)
+
+    @rule()
+    def branch(self):
+        self.attempt(self.session.branch)
+        assert self.session.live
+
+    @rule(robots=st.integers(1, 6) | st.none())
+    def restart(self, robots):
+        self.attempt(lambda: self.session.restart(**({} if robots is None else {"robots": robots})))
+
+    @rule(law=laws)
+    def add_pane(self, law):
+        if len(self.session.lanes) < 3:
+            self.attempt(lambda: self.session.add_pane(law))
+
+    @rule(k=st.integers(0, 3))
+    def remove_pane(self, k):
+        if len(self.session.lanes) > 1:
+            self.session.remove_pane(self.session.lanes[k % len(self.session.lanes)])
+
+    @invariant()
+    def lanes_are_alike(self):
+        if not hasattr(self, "session"):
+            return
+        session = self.session
+        first = session.lanes[0].circumstances
+        assert len(first.numbers) >= 1
+        assert list(first.numbers) == sorted(set(first.numbers))
+        assert not set(first.numbers) & set(first.failed)
+        for lane in session.lanes:
+            there = lane.circumstances
+            assert there.numbers == first.numbers
+            assert set(there.failed) == set(first.failed)
+            assert there.environment is first.environment
+            assert there.limits == first.limits
+            count = len(there.numbers)
+            for rows in (lane.simulation.positions, lane.starts, lane.trail.positions[-1]):
+                assert rows.shape == (count, 2)
+                assert np.isfinite(rows).all()
+            assert len(lane.simulation.team) == count
+        assert len({lane.number for lane in session.lanes}) == len(session.lanes)
+        assert session.scenario.environment is first.environment
+        assert session.scenario.laws == tuple(lane.law for lane in session.lanes)
+        assert session.scenario.limits == first.limits
+
+    @invariant()
+    def times_are_consistent(self):
+        if not hasattr(self, "session"):
+            return
+        session = self.session
+        assert 0.0 <= session.time <= session.end
+        assert session.live == (session.time == session.end)
+        assert (np.diff(session.history.steps) > 0).all()
+        assert session.history.time(len(session.history) - 1) == session.end
+        for lane in session.lanes:
+            assert lane.time == pytest.approx(session.end, abs=1e-9)
+            assert (np.diff(lane.trail.time) > 0).all()
+            assert lane.trail.time[-1] <= session.end + 1e-9
+            last = session.history.last.states[lane.number]
+            np.testing.assert_array_equal(last.positions, lane.simulation.positions)
+            np.testing.assert_array_equal(last.velocities, lane.simulation.velocities)
+            assert last.circumstances is lane.circumstances
+        assert len(session.events) <= MOST_EVENTS
+        assert len(session.ghosts) <= MOST_GHOSTS
+        times = [event.time for event in session.events]
+        assert times == sorted(times)
+        assert not times or times[-1] <= session.end
+        assert session.hand is None or (session.live and session.hand[0] in session.numbers)
+
+    @invariant()
+    def what_is_looked_at_can_be_shown(self):
+        if not hasattr(self, "session"):
+            return
+        for lane in self.session.lanes:
+            there, snapshot = self.session.circumstances(lane), self.session.snapshot(lane)
+            assert snapshot.time == pytest.approx(self.session.time, abs=1e-9)
+            np.testing.assert_array_equal(snapshot.positions, self.session.positions(lane))
+            trail, times = self.session.trail(lane)
+            assert trail.shape[1:] == snapshot.positions.shape == (len(there.numbers), 2)
+            assert len(trail) == len(times) >= 1
+            assert times[-1] <= self.session.time + 1e-6
+
+    @invariant()
+    def robots_are_where_there_is_room(self):
+        if hasattr(self, "session"):
+            assert too_deep(self.session) < 2e-3
+
+
+def test_whatever_users_do_all_stays_in_order():
+    run_state_machine_as_test(Anything, settings=settings(max_examples=25, stateful_step_count=25))
+
+
+undoable = st.tuples(
+    st.sampled_from(["draw", "delete", "add", "remove", "fail", "revive", "step"]), points, st.integers(0, 9)
+)
+
+
+def touched(session, kind, point, k) -> None:
+    working, failed = robots_of(session)
+    obstacles = len(session.environment.obstacles)
+    if kind == "draw":
+        session.edit(with_obstacle(session.environment, CircleObstacle(point, 0.2)), "drawn")
+    elif kind == "delete" and obstacles:
+        session.edit(without_obstacle(session.environment, k % obstacles), "deleted")
+    elif kind == "add":
+        session.add_robot(point)
+    elif kind == "remove":
+        everybody = [*working, *failed]
+        session.remove_robot(everybody[k % len(everybody)])
+    elif kind == "fail":
+        session.fail_robot(working[k % len(working)])
+    elif kind == "revive" and failed:
+        session.revive_robot(failed[k % len(failed)])
+    else:
+        stepped(session, k)
+
+
+@given(st.lists(undoable, max_size=15))
+@settings(max_examples=25)
+def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
+    session = begun(RAPF, LLOYD)
+    for touch in touches:
+        # the last robot that works; a map that cannot be
+        with suppress(ParameterError, MapError):
+            touched(session, *touch)
+    end = robots_of(session), session.environment
+    while session.undo.undo() is not None:
+        stepped(session, 1)
+    assert robots_of(session) == ((1, 2, 3), ())
+    assert session.environment == HALL
+    while session.undo.redo() is not None:
+        stepped(session, 1)
+    assert (robots_of(session), session.environment) == end
+    assert {lane.numbers for lane in session.lanes} == {session.numbers}
+
+
+@given(
+    st.lists(undoable, max_size=6),
+    st.lists(laws, min_size=1, max_size=2),
+    st.integers(1, 30),
+    st.integers(0, 30),
+)
+@settings(max_examples=30)
+def test_however_it_came_so_far_from_there_it_goes_the_same_way_again(touches, controllers, steps, back):
+    session = begun(*controllers)
+    for touch in touches:
+        with suppress(ParameterError, MapError):
+            touched(session, *touch)
+    since = session.end
+    stepped(session, steps)
+    end, went = session.end, [lane.simulation.positions for lane in session.lanes]
+    session.look_at(max(end - back / 60, since))
+    session.branch()
+    while session.end < end:
+        session.step()
+    for lane, before in zip(session.lanes, went, strict=True):
+        np.testing.assert_allclose(lane.simulation.positions, before, rtol=0.0, atol=1e-9)

@@ -1,0 +1,128 @@
+"""The session: panes that come and go, and a map that changes under the robots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, stepped, too_deep, with_pillar
+
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import ParameterError, StartError
+from robocov_app.viewer.session.map_edits import without_obstacle
+from robocov_app.viewer.session.scenario import MOST_PANES, Limits
+
+# panes
+
+
+def test_panes_come_and_go():
+    session = stepped(begun(RAPF), 10)
+    session.add_pane(LLOYD)
+    assert [lane.law for lane in session.lanes] == [RAPF, LLOYD]
+    assert session.time == 0.0
+    stepped(session, 10)
+    session.remove_pane(session.lanes[0])
+    assert [lane.number for lane in session.lanes] == [1]
+    assert session.scenario.laws == (LLOYD,)
+    stepped(session, 10)
+    session.look_at(5 / 60)
+    assert session.positions(session.lanes[0]).shape == (3, 2)
+    session.branch()
+    stepped(session, 20)
+    assert session.lanes[0].time == pytest.approx(session.end)
+
+
+def test_there_are_neither_too_many_panes_nor_none():
+    session = begun(*[RAPF] * MOST_PANES)
+    with pytest.raises(ParameterError, match="room for 4 controllers"):
+        session.add_pane(RPF)
+    session = begun(RAPF)
+    with pytest.raises(ParameterError, match="the last pane stays"):
+        session.remove_pane(session.lanes[0])
+
+
+# the map
+
+
+def test_an_obstacle_is_drawn_and_pushes_robots():
+    session = stepped(begun(RAPF, LLOYD, robots=4), 30)
+    place = tuple(np.round(session.positions(session.lanes[0])[1], 3).tolist())
+    assert session.edit(with_pillar(pillar=CircleObstacle(place, 0.2)), "circle drawn") >= 1
+    assert session.environment.obstacles[-1].center == place
+    assert too_deep(session) <= 2e-3
+    assert session.events[-1].text == "circle drawn"
+    assert session.edit(with_pillar(session.environment, CircleObstacle((5.8, 0.2), 0.1)), "another") == 0
+    stepped(session, 30)
+    assert too_deep(session) <= 2e-3
+
+
+def test_who_leans_on_a_wall_is_not_pushed():
+    session = begun(LLOYD, robots=1)
+    session.playing = True
+    session.grab(1, (0.0, 2.0))
+    for _ in range(10):
+        session.advance(0.1)
+    session.release()
+    assert session.positions(session.lanes[0])[0, 0] < 0.11
+    assert session.edit(with_pillar(), "circle drawn") == 0
+
+
+def test_edits_are_taken_back_and_done_again():
+    session = stepped(begun(RAPF, LLOYD), 10)
+    first = with_pillar()
+    second = without_obstacle(first, 0)
+    session.edit(first, "circle drawn")
+    stepped(session, 5)
+    session.edit(second, "pillar deleted")
+    assert session.undo.undo() == "pillar deleted"
+    assert session.environment == first
+    assert session.undo.undo() == "circle drawn"
+    assert session.environment == HALL
+    assert session.scenario.environment == HALL
+    stepped(session, 5)
+    assert session.undo.redo() == "circle drawn"
+    assert session.undo.redo() == "pillar deleted"
+    assert session.environment == second
+    assert [event.text for event in session.events] == [
+        *("circle drawn", "pillar deleted", "pillar deleted: undone"),
+        *("circle drawn: undone", "circle drawn", "pillar deleted"),
+    ]
+    assert {event.kind for event in session.events} == {"obstacle"}
+    assert {lane.circumstances.environment for lane in session.lanes} == {session.environment}
+
+
+def test_a_map_without_room_is_refused():
+    """In the second pane, where the robots are elsewhere, or in both."""
+    session = stepped(begun(RAPF, LLOYD, robots=5), 40)
+    before = all_told(session)
+    crack = Environment("hall", ((0, 0), (6, 0), (6, 0.1), (0, 0.1)))
+    with pytest.raises(StartError, match="fits nowhere"):
+        session.edit(crack, "shrunk")
+    assert all_told(session) == before
+
+
+def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
+    session = stepped(begun(RAPF, LLOYD), 21)
+    before = all_told(session)
+
+    def no_room(wanted):
+        raise StartError("no room")
+
+    monkeypatch.setattr(session.lanes[1], "changed", no_room)
+    place = tuple(session.positions(session.lanes[0])[0].tolist())
+    for touch in (
+        lambda: session.edit(with_pillar(pillar=CircleObstacle(place, 0.3)), "drawn"),
+        lambda: session.set_limits(Limits(radius=0.2)),
+        lambda: session.add_robot((3.0, 3.0)),
+        lambda: session.fail_robot(1),
+        lambda: session.place(1, (5.0, 3.0)),
+    ):
+        with pytest.raises(StartError, match="no room"):
+            touch()
+        assert all_told(session) == before
+
+
+def test_the_newest_cost_of_each_pane():
+    session = begun(RAPF, LLOYD)
+    session.lanes[0].curve.add(0.0, 2.0)
+    assert session.summary()[0] == 2.0
+    assert np.isnan(session.summary()[1])

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov_app.viewer.settings import FOLDER, Settings, load_settings, save_settings, settings_file
+
+OTHERS = Settings(
+    theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
+)
+
+
+def test_what_is_saved_is_loaded(tmp_path):
+    file = tmp_path / "a" / "folder" / "window.json"
+    assert save_settings(OTHERS, file) == ""
+    assert load_settings(file) == (OTHERS, "")
+    assert [path.name for path in file.parent.iterdir()] == ["window.json"]
+    assert save_settings(Settings(), file) == ""
+    assert load_settings(file) == (Settings(), "")
+
+
+@given(
+    st.builds(
+        Settings,
+        theme=st.sampled_from(["light", "dark"]),
+        scale=st.none() | st.floats(0.5, 4.0),
+        width=st.integers(900, 7680),
+        height=st.integers(600, 4320),
+        shown=st.none() | st.lists(st.text(), max_size=4).map(tuple),
+        tab=st.text(),
+        fade=st.booleans(),
+    )
+)
+def test_whatever_they_are_they_come_back(settings):
+    assert Settings.model_validate_json(settings.model_dump_json()) == settings
+
+
+def test_the_first_time_there_are_none(tmp_path):
+    assert load_settings(tmp_path / "window.json") == (Settings(), "")
+    assert load_settings(None) == (Settings(), "")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '{"theme": "pink"}',
+        '{"scale": 0.1}',
+        '{"scale": NaN}',
+        '{"width": 10}',
+        '{"width": "wide"}',
+        '{"shown": 3}',
+        "\x00",
+    ],
+)
+def test_what_cannot_be_read_is_told_and_left_out(tmp_path, text):
+    file = tmp_path / "window.json"
+    file.write_text(text)
+    settings, words = load_settings(file)
+    assert settings == Settings()
+    assert words == f"{file} could not be read: default settings"
+    # and is put right the next time
+    assert save_settings(settings, file) == ""
+    assert load_settings(file) == (Settings(), "")
+
+
+def test_bytes_that_are_no_text(tmp_path):
+    file = tmp_path / "window.json"
+    file.write_bytes(b'{"tab": "\xff\xfe"}')
+    assert load_settings(file)[0] == Settings()
+
+
+def test_a_folder_in_its_place(tmp_path):
+    (tmp_path / "window.json").mkdir()
+    settings, words = load_settings(tmp_path / "window.json")
+    assert settings == Settings()
+    assert "could not be read" in words
+    assert save_settings(Settings(), tmp_path / "window.json").startswith("settings not saved: ")
+
+
+def test_settings_of_other_versions(tmp_path):
+    file = tmp_path / "window.json"
+    file.write_text(json.dumps({"theme": "dark", "of_tomorrow": [1, 2]}))
+    assert load_settings(file) == (Settings(theme="dark"), "")
+
+
+def test_what_cannot_be_written_is_told(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    words = save_settings(OTHERS, blocked / "window.json")
+    assert words.startswith("settings not saved: ")
+    assert "\n" not in words
+    assert blocked.read_text() == "in the way"
+    assert save_settings(OTHERS, None) == ""
+
+
+def test_where_they_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    assert settings_file() == tmp_path / "window.json"
+    monkeypatch.setenv(FOLDER, "")
+    assert settings_file() is None
+    monkeypatch.delenv(FOLDER)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    file = settings_file()
+    assert file is not None
+    assert file.name == "window.json"
+    assert "robocov" in file.parts
+    assert not Path(tmp_path / "config").exists()

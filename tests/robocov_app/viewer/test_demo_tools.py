@@ -1,0 +1,413 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from touched_run import HALL, LLOYD, RAPF, all_told, begun, robots_of, stepped, too_deep
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.errors import MapError, ParameterError, RobocovError
+from robocov_app.viewer.tool import Tool
+from robocov_app.viewer.tools import (
+    WALL_WIDTH,
+    Adder,
+    Circle,
+    Eraser,
+    Failer,
+    Hand,
+    Polygon,
+    Ruler,
+    Wall,
+    toolbox,
+)
+
+REACH = 0.1
+"""Metres that a finger is wide."""
+
+
+def clicked(tool, session, *points, number=None) -> str | None:
+    """Click at places one after the other; return what was told last."""
+    said = None
+    for point in points:
+        tool.move(session, point)
+        said = tool.press(session, point, REACH, number)
+        said = tool.release(session, point) or said
+    return said
+
+
+def dragged(tool, session, start, *points, number=None) -> str | None:
+    """Drag from one place to others; return what was told."""
+    said = tool.press(session, start, REACH, number)
+    for point in points:
+        tool.move(session, point)
+    return tool.release(session, points[-1]) or said
+
+
+def place_of(session, number) -> list[float]:
+    lane = session.lanes[0]
+    return lane.simulation.positions[lane.row(number)].tolist()
+
+
+def test_the_box_has_every_tool_once():
+    tools = toolbox()
+    assert list(tools) == [
+        *("hand", "polygon", "wall", "circle", "brush", "eraser", "robot", "failure", "ruler")
+    ]
+    for name, tool in tools.items():
+        assert tool.name == name
+        assert tool.title
+        assert tool.hint
+
+
+@pytest.mark.parametrize("name", [*toolbox(), ""])
+def test_a_tool_that_was_not_used_does_nothing(name):
+    tool, session = toolbox().get(name, Tool()), begun()
+    before = all_told(session)
+    tool.move(session, (1.0, 1.0))
+    assert tool.release(session, (1.0, 1.0)) is None
+    assert tool.finish(session) is None
+    assert not tool.cancel(session)
+    assert tool.preview(session) is None
+    assert all_told(session) == before
+
+
+class TestHand:
+    def test_a_click_chooses_a_robot_and_moves_nothing(self):
+        hand, session = Hand(), begun()
+        before = all_told(session)
+        x, y = place_of(session, 2)
+        assert dragged(hand, session, (x, y), (x + 0.01, y), number=2) is None
+        assert hand.selected == 2
+        assert not hand.holds
+        assert all_told(session) == before
+        assert hand.cancel(session)
+        assert hand.selected is None
+        assert not hand.cancel(session)
+
+    def test_it_drags_robots(self):
+        hand, session = Hand(), begun()
+        x, y = place_of(session, 2)
+        hand.press(session, (x, y), REACH, 2)
+        assert hand.holds
+        hand.move(session, (3.0, 3.0))
+        assert place_of(session, 2) == [3.0, 3.0]
+        # back to where it was taken
+        hand.move(session, (x, y))
+        assert place_of(session, 2) == [x, y]
+        assert hand.release(session, (x, y)) is None
+
+    def test_it_throws_robots(self):
+        hand, session = Hand(), begun()
+        session.playing = True
+        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
+        hand.move(session, (3.0, 3.2))
+        assert session.hand == (2, (3.0, 3.2))
+        session.advance(0.1)
+        hand.move(session, (3.1, 3.2))
+        assert session.hand == (2, (3.1, 3.2))
+        hand.release(session, (3.1, 3.2))
+        assert session.hand is None
+        assert session.events[-1].text == "robot 2 was dragged"
+
+    def test_who_gives_up_lets_go(self):
+        hand, session = Hand(), begun()
+        session.playing = True
+        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
+        hand.move(session, (3.0, 3.2))
+        assert hand.cancel(session)
+        assert session.hand is None
+        assert not hand.holds
+        hand.move(session, (1.0, 1.0))
+        assert session.hand is None
+
+    def test_it_drags_robots_that_failed(self):
+        hand, session = Hand(), begun()
+        session.fail_robot(2)
+        session.playing = True
+        failed = session.lanes[0].circumstances.failed
+        dragged(hand, session, failed[2], (3.0, 3.2), number=2)
+        assert session.lanes[0].circumstances.failed == {2: (3.0, 3.2)}
+
+    def test_a_robot_that_is_gone_meanwhile(self):
+        hand, session = Hand(), begun()
+        session.playing = True
+        hand.press(session, tuple(place_of(session, 2)), REACH, 2)
+        hand.move(session, (3.0, 3.2))
+        session.remove_robot(2)
+        hand.move(session, (3.0, 3.5))
+        assert hand.release(session, (3.0, 3.5)) is None
+        assert session.hand is None
+
+    def test_it_moves_obstacles(self):
+        hand, session = Hand(), begun()
+        hand.press(session, (4.2, 1.2), REACH, None)
+        assert hand.obstacle == 0
+        assert hand.preview(session) is None
+        hand.move(session, (4.5, 2.2))
+        preview = hand.preview(session)
+        assert preview.obstacle == replace(HALL.obstacles[0], center=(4.5, 2.2))
+        assert (preview.line, preview.words) == (((4.2, 1.2), (4.5, 2.2)), "1.04 m")
+        assert session.environment is HALL
+        assert hand.release(session, (4.5, 2.2)) == "circle “pillar” moved"
+        assert session.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
+        assert hand.preview(session) is None
+        assert session.undo.undo() == "circle “pillar” moved"
+        assert session.environment == HALL
+
+    def test_a_click_on_an_obstacle_or_the_floor_moves_nothing(self):
+        hand, session = Hand(), begun()
+        before = all_told(session)
+        assert clicked(hand, session, (4.2, 1.2), (5.5, 3.5)) is None
+        hand.press(session, (5.5, 3.5), REACH, None)
+        assert not hand.holds
+        assert all_told(session) == before
+
+    def test_another_map_meanwhile(self):
+        hand, session = Hand(), begun()
+        hand.press(session, (4.2, 1.2), REACH, None)
+        hand.move(session, (4.5, 2.2))
+        session.edit(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "turned round")
+        assert hand.preview(session) is None
+        assert hand.release(session, (4.5, 2.2)) is None
+        hand.press(session, (4.2, 1.2), REACH, None)
+        hand.move(session, (4.5, 2.2))
+        session.edit(replace(HALL, obstacles=()), "emptied")
+        assert hand.preview(session) is None
+        assert hand.release(session, (4.5, 2.2)) is None
+        assert session.environment.obstacles == ()
+
+    def test_from_the_past(self):
+        hand, session = Hand(), stepped(begun(), 20)
+        session.fail_robot(2)
+        session.look_at(0.1)
+        dragged(hand, session, place_of(session, 1), (3.0, 3.0), number=2)
+        assert session.live
+        assert session.end == pytest.approx(0.1)
+        assert place_of(session, 2) == [3.0, 3.0]
+
+
+class TestPolygon:
+    CORNERS = ((3.2, 3.2), (4.2, 3.2), (4.2, 3.8))
+
+    def test_enter_closes_it(self):
+        tool, session = Polygon(), begun()
+        assert clicked(tool, session, *self.CORNERS) is None
+        assert session.environment is HALL
+        assert tool.finish(session) == "polygon drawn"
+        assert session.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
+        assert tool.preview(session) is None
+        assert tool.finish(session) is None
+
+    def test_a_click_on_the_first_corner_closes_it(self):
+        tool, session = Polygon(), begun()
+        assert clicked(tool, session, *self.CORNERS, (3.25, 3.2)) == "polygon drawn"
+        assert session.environment.obstacles[-1] == PolygonObstacle(self.CORNERS)
+
+    def test_it_shows_what_it_would_be(self):
+        tool, session = Polygon(), begun()
+        clicked(tool, session, self.CORNERS[0])
+        tool.move(session, (3.2, 3.7))
+        preview = tool.preview(session)
+        assert (preview.line, preview.closed, preview.words) == (((3.2, 3.2), (3.2, 3.7)), False, "0.50 m")
+        clicked(tool, session, self.CORNERS[1])
+        assert tool.preview(session).closed
+        assert tool.cancel(session)
+        assert not tool.cancel(session)
+        assert tool.preview(session) is None
+
+    def test_a_double_click_is_one_corner(self):
+        tool, session = Polygon(), begun()
+        clicked(tool, session, *self.CORNERS, self.CORNERS[-1])
+        assert tool.finish(session) == "polygon drawn"
+        assert len(session.environment.obstacles[-1].vertices) == 3
+
+    def test_what_is_none_is_refused(self):
+        tool, session = Polygon(), begun()
+        before = all_told(session)
+        clicked(tool, session, *self.CORNERS[:2])
+        with pytest.raises(MapError, match="three corners"):
+            tool.finish(session)
+        clicked(tool, session, (3.2, 3.2), (4.2, 3.8), (4.2, 3.2), (3.2, 3.8))
+        with pytest.raises(MapError, match="crosses itself"):
+            tool.finish(session)
+        assert all_told(session) == before
+
+
+class TestWall:
+    def test_enter_ends_it(self):
+        tool, session = Wall(), begun()
+        clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
+        tool.move(session, (3.8, 3.8))
+        preview = tool.preview(session)
+        assert preview.obstacle == WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), WALL_WIDTH)
+        assert preview.words == "0.60 m, 0.1 m wide"
+        assert tool.finish(session) == "wall drawn"
+        assert session.environment.obstacles[-1] == WallObstacle(((3.2, 3.2), (3.2, 3.8)), WALL_WIDTH)
+        assert tool.finish(session) is None
+
+    def test_a_click_on_the_last_point_ends_it(self):
+        tool, session = Wall(), begun()
+        assert clicked(tool, session, (3.2, 3.2), (3.2, 3.8), (3.21, 3.8)) == "wall drawn"
+
+    def test_a_wall_may_come_round_to_its_first_point(self):
+        tool, session = Wall(), begun()
+        clicked(tool, session, (3.2, 3.0), (4.0, 3.0), (4.0, 3.8), (3.2, 3.8), (3.2, 3.0))
+        assert tool.finish(session) == "wall drawn"
+        assert len(session.environment.obstacles[-1].points) == 5
+
+    def test_wider_and_narrower(self):
+        tool, session = Wall(), begun()
+        tool.widen(1.25)
+        assert tool.width == 0.125
+        clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
+        tool.finish(session)
+        assert session.environment.obstacles[-1].width == 0.125
+        for factor, end in ((0.8, 0.02), (1.25, 5.0)):
+            for _ in range(60):
+                tool.widen(factor)
+            assert tool.width == end
+
+    def test_a_point_is_no_wall(self):
+        tool, session = Wall(), begun()
+        clicked(tool, session, (3.2, 3.2))
+        assert tool.preview(session).obstacle is None
+        with pytest.raises(MapError, match="two points that are apart"):
+            tool.finish(session)
+        assert session.environment is HALL
+
+
+class TestCircle:
+    def test_it_is_drawn_from_its_middle(self):
+        tool, session = Circle(), begun()
+        tool.press(session, (3.5, 3.2), REACH, None)
+        assert tool.preview(session).obstacle is None
+        tool.move(session, (3.5, 3.5))
+        assert tool.preview(session).words == "radius 0.30 m"
+        assert tool.preview(session).obstacle == CircleObstacle((3.5, 3.2), 0.3)
+        assert tool.release(session, (3.5, 3.5)) == "circle drawn"
+        assert session.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
+        assert tool.release(session, (3.5, 3.5)) is None
+
+    def test_a_click_is_no_circle(self):
+        tool, session = Circle(), begun()
+        with pytest.raises(MapError, match="drag from its middle"):
+            clicked(tool, session, (3.5, 3.2))
+        tool.press(session, (3.5, 3.2), REACH, None)
+        assert tool.cancel(session)
+        assert tool.release(session, (3.5, 3.9)) is None
+        assert session.environment is HALL
+
+
+class TestEraser:
+    def test_it_deletes_obstacles(self):
+        session = begun()
+        assert clicked(Eraser(), session, (2.53, 3.0)) == "wall deleted"
+        assert clicked(Eraser(), session, (4.2, 1.73)) == "circle “pillar” deleted"
+        assert session.environment.obstacles == ()
+        assert clicked(Eraser(), session, (4.2, 1.2)) is None
+
+    def test_a_robot_before_an_obstacle(self):
+        session = begun()
+        assert clicked(Eraser(), session, (4.2, 1.2), number=2) == "robot 2 taken out"
+        assert robots_of(session) == ((1, 3), ())
+        assert session.environment is HALL
+
+    def test_the_last_robot_stays(self):
+        session = begun(robots=1)
+        with pytest.raises(ParameterError, match="the last robot"):
+            clicked(Eraser(), session, (1.0, 1.0), number=1)
+
+
+def test_robots_join_where_it_is_clicked():
+    session = begun()
+    assert clicked(Adder(), session, (3.5, 3.2)) == "robot 4 joined"
+    assert place_of(session, 4) == [3.5, 3.2]
+    # in an obstacle it is as near as there is room
+    assert clicked(Adder(), session, (4.2, 1.2)) == "robot 5 joined"
+    assert too_deep(session) <= 0.0
+
+
+def test_robots_fail_and_work_again():
+    tool, session = Failer(), stepped(begun(RAPF, LLOYD), 5)
+    assert clicked(tool, session, (1.0, 1.0)) is None
+    assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 failed"
+    assert robots_of(session) == ((1, 3), (2,))
+    assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 works again"
+    assert robots_of(session) == ((1, 2, 3), ())
+    # as it was at the moment that is looked at
+    stepped(session, 5)
+    session.fail_robot(3)
+    session.look_at(0.1)
+    assert clicked(tool, session, (1.0, 1.0), number=3) == "robot 3 failed"
+
+
+class TestRuler:
+    def test_it_measures(self):
+        tool, session = Ruler(), begun()
+        before = all_told(session)
+        tool.press(session, (1.0, 1.0), REACH, None)
+        tool.move(session, (4.0, 5.0))
+        assert tool.preview(session).line == ((1.0, 1.0), (4.0, 5.0))
+        assert tool.preview(session).words == "5.00 m  (Δx 3.00, Δy 4.00)"
+        tool.release(session, (4.0, 5.0))
+        # and stays there
+        tool.move(session, (2.0, 2.0))
+        assert tool.preview(session).line == ((1.0, 1.0), (4.0, 5.0))
+        assert tool.cancel(session)
+        assert tool.preview(session) is None
+        assert not tool.cancel(session)
+        assert all_told(session) == before
+
+
+def test_it_is_told_who_was_pushed_and_which_starts_are_covered():
+    session = begun(start="spread")
+    session.place(1, (5.2, 3.2))
+    said = dragged(Circle(), session, (5.2, 3.2), (5.2, 3.75))
+    assert said == "circle drawn; 1 robot pushed out of the way; it covers the start far"
+    session.place(1, (1.0, 2.5))
+    session.place(2, (1.5, 2.5))
+    assert (
+        dragged(Circle(), session, (1.2, 2.5), (1.2, 2.9)) == "circle drawn; 2 robots pushed out of the way"
+    )
+
+
+points = st.tuples(st.floats(-1, 7), st.floats(-1, 5))
+uses = st.tuples(
+    st.sampled_from(list(toolbox())),
+    st.sampled_from(["press", "move", "release", "finish", "cancel", "undo", "step"]),
+    points,
+    st.none() | st.integers(1, 4),
+)
+
+
+@given(st.lists(uses, max_size=30))
+@settings(max_examples=60)
+def test_however_tools_are_used_nothing_breaks(actions):
+    session, tools = begun(), toolbox()
+    session.playing = True
+    for name, action, point, number in actions:
+        tool = tools[name]
+        working, failed = robots_of(session)
+        number = number if number in (*working, *failed) else None
+        try:
+            if action == "press":
+                said = tool.press(session, point, REACH, number)
+            elif action == "move":
+                said = tool.move(session, point)
+            elif action == "undo":
+                said = session.undo.undo()
+            elif action == "step":
+                said = session.advance(0.05) and None
+            elif action == "cancel":
+                said = None if isinstance(tool.cancel(session), bool) else "?"
+            else:
+                said = tool.release(session, point) if action == "release" else tool.finish(session)
+        except RobocovError as error:
+            said = str(error)
+        assert said is None or said == " ".join(said.split()) != ""
+        for each in tools.values():
+            preview = each.preview(session)
+            assert preview is None or len(preview.line) >= 2
+    assert too_deep(session) < 2e-3

@@ -1,0 +1,396 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
+
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import ParameterError, StartError
+from robocov.robots import Team
+from robocov_app.viewer.session import touches as module
+from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.touches import nearest_free
+
+RADIUS = 0.1
+places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
+
+
+def place_of(session, number, pane=0) -> list[float]:
+    lane = session.lanes[pane]
+    return lane.simulation.positions[lane.row(number)].tolist()
+
+
+def failed_at(session, number, pane=0) -> tuple[float, float]:
+    return session.lanes[pane].circumstances.failed[number]
+
+
+# where there is room
+
+
+@given(places, st.lists(places, max_size=12), st.sampled_from([0.05, 0.1, 0.3]))
+def test_the_nearest_place_where_a_robot_fits(point, others, radius):
+    others = np.array(others).reshape(-1, 2)
+    place = nearest_free(HALL, radius, others, point)
+    room = HALL.free.buffer(-radius)
+    if len(others):
+        room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), 2 * radius)))
+        assert np.hypot(*(others - place).T).min() >= 2 * radius
+    assert shapely.distance(HALL.free.boundary, shapely.Point(place)) >= radius - 1e-9
+    assert HALL.free.contains(shapely.Point(place))
+    # no other is nearer, but for a millimetre's room
+    nearest = shapely.distance(room, shapely.Point(point))
+    assert np.hypot(place[0] - point[0], place[1] - point[1]) <= nearest + 0.02
+
+
+def test_where_it_fits_it_stays():
+    assert nearest_free(HALL, RADIUS, np.empty((0, 2)), (3.0, 2.0)) == (3.0, 2.0)
+    assert nearest_free(HALL, RADIUS, np.array([[3.0, 2.2]]), (3.0, 2.0)) == (3.0, 2.0)
+
+
+def test_a_room_that_is_full():
+    cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
+    assert nearest_free(cell, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
+    for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, np.empty((0, 2)))):
+        with pytest.raises(StartError, match="no room for a robot there"):
+            nearest_free(cell, radius, others, (0.25, 0.25))
+
+
+# placing
+
+
+def test_a_robot_is_placed_in_all_panes():
+    session = stepped(begun(RAPF, LLOYD), 20)
+    others = [lane.simulation.positions[1:].copy() for lane in session.lanes]
+    session.place(1, (5.0, 3.0))
+    for pane, lane in enumerate(session.lanes):
+        assert place_of(session, 1, pane) == [5.0, 3.0]
+        assert lane.simulation.velocities[0].tolist() == [0.0, 0.0]
+        np.testing.assert_array_equal(lane.simulation.positions[1:], others[pane])
+    assert session.history.last.states[0].positions[0].tolist() == [5.0, 3.0]
+    assert len(session.history) == 21
+
+
+@given(st.lists(st.tuples(st.integers(1, 6), places), min_size=1, max_size=6))
+@settings(max_examples=40)
+def test_wherever_robots_are_placed_they_fit(drags):
+    session = begun(robots=6)
+    for number, point in drags:
+        others = [k for k in range(6) if k != number - 1]
+        before = session.lanes[0].simulation.positions[others]
+        session.place(number, point)
+        np.testing.assert_array_equal(session.lanes[0].simulation.positions[others], before)
+        assert too_deep(session) <= 1e-9
+    session.step()
+    assert too_deep(session) < 2e-3
+
+
+def test_a_robot_that_failed_is_placed_too():
+    session = stepped(begun(RAPF, RPF), 10)
+    session.fail_robot(2)
+    session.fail_robot(3)
+    session.place(2, (5.0, 3.0))
+    assert [failed_at(session, 2, pane) for pane in (0, 1)] == [(5.0, 3.0)] * 2
+    session.place(2, failed_at(session, 3))
+    assert np.hypot(*np.subtract(failed_at(session, 2), failed_at(session, 3))) >= 2 * RADIUS
+    session.place(2, (9.0, 9.0))
+    assert failed_at(session, 2) == pytest.approx((5.899, 3.899))
+    assert robots_of(session) == ((1,), (2, 3))
+
+
+def test_grabbing_places_while_it_is_paused():
+    session = stepped(begun(), 5)
+    session.grab(2, (3.0, 3.0))
+    assert session.hand is None
+    assert place_of(session, 2) == [3.0, 3.0]
+    session.playing = True
+    session.grab(2, (3.2, 3.0))
+    assert place_of(session, 2) == [3.0, 3.0]
+    assert session.hand == (2, (3.2, 3.0))
+    # paused while it was held
+    session.playing = False
+    session.grab(2, (3.4, 3.0))
+    assert session.hand is None
+    assert place_of(session, 2) == [3.4, 3.0]
+
+
+def test_what_has_failed_is_not_pulled():
+    session = begun()
+    session.fail_robot(2)
+    session.playing = True
+    session.grab(2, (3.0, 3.0))
+    assert session.hand is None
+    assert failed_at(session, 2) == (3.0, 3.0)
+
+
+# joining and leaving
+
+
+def test_robots_join_at_rest():
+    session = stepped(begun(RAPF, LLOYD), 10)
+    velocities = session.lanes[0].simulation.velocities
+    assert session.add_robot((5.0, 3.0)) == 4
+    assert session.add_robot((5.0, 3.0)) == 5
+    for lane in session.lanes:
+        assert lane.numbers == (1, 2, 3, 4, 5)
+        assert lane.simulation.positions[3].tolist() == [5.0, 3.0]
+        assert 2 * RADIUS <= np.hypot(*(lane.simulation.positions[4] - (5.0, 3.0))) < 2 * RADIUS + 0.01
+        assert lane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
+    np.testing.assert_array_equal(session.lanes[0].simulation.velocities[:3], velocities)
+    assert [event.text for event in session.events] == ["robot 4 joined", "robot 5 joined"]
+    assert session.add_robot((1.0, 3.0), 9) == 9
+    assert session.add_robot((1.0, 3.0)) == 10
+
+
+def test_robots_leave_and_come_back_to_their_rows():
+    session = stepped(begun(RAPF, LLOYD, robots=4), 15)
+    where = [place_of(session, 2, pane) for pane in (0, 1)]
+    assert where[0] != where[1]
+    session.remove_robot(2)
+    assert robots_of(session) == ((1, 3, 4), ())
+    session.undo.undo()
+    assert robots_of(session) == ((1, 2, 3, 4), ())
+    # in each pane to its own place
+    assert [place_of(session, 2, pane) for pane in (0, 1)] == where
+    session.undo.redo()
+    assert robots_of(session) == ((1, 3, 4), ())
+
+
+def test_a_robot_that_failed_leaves_and_comes_back_failed():
+    session = stepped(begun(RAPF, LLOYD, robots=3), 15)
+    session.fail_robot(1)
+    where = [failed_at(session, 1, pane) for pane in (0, 1)]
+    session.remove_robot(1)
+    assert robots_of(session) == ((2, 3), ())
+    session.undo.undo()
+    assert robots_of(session) == ((2, 3), (1,))
+    assert [failed_at(session, 1, pane) for pane in (0, 1)] == where
+    assert session.undo.undo() == "failure of robot 1"
+    assert robots_of(session) == ((1, 2, 3), ())
+
+
+def test_numbers_are_not_given_twice():
+    session = begun()
+    session.fail_robot(3)
+    assert session.add_robot((3.0, 3.0)) == 4
+    session.remove_robot(4)
+    assert session.add_robot((3.0, 3.0)) == 4
+    for number in (1, 3):
+        with pytest.raises(ParameterError, match=f"there is a robot {number} already"):
+            session.add_robot((3.0, 3.0), number)
+
+
+# failing
+
+
+def test_who_fails_is_not_heard_but_sensed():
+    session = begun(RPF, robots=3, given=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
+    lane = session.lanes[0]
+    before = lane.simulation.snapshot
+    assert before.seen.neighbours.of(0).tolist() == [1, 2]
+    session.fail_robot(2)
+    seen = lane.simulation.snapshot.seen
+    assert lane.numbers == (1, 3)
+    assert seen.neighbours.count == 2
+    assert seen.neighbours.of(0).tolist() == [1]
+    # its rim, where there was nothing nearer than a wall
+    assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)
+    assert lane.simulation.snapshot.decision.terms["repulsion_obstacle"][0, 0] < 0.0
+    session.revive_robot(2)
+    assert lane.numbers == (1, 2, 3)
+    after = lane.simulation.snapshot
+    np.testing.assert_array_equal(after.seen.obstacle_points, before.seen.obstacle_points)
+    np.testing.assert_array_equal(after.decision.forces, before.decision.forces)
+
+
+def test_who_failed_stands_still_and_in_the_way():
+    session = stepped(begun(LLOYD, robots=2), 10)
+    session.playing = True
+    session.fail_robot(2)
+    there = failed_at(session, 2)
+    session.grab(1, there)
+    for _ in range(10):
+        session.advance(0.1)
+    assert failed_at(session, 2) == there
+    assert np.hypot(*np.subtract(place_of(session, 1), there)) > 2 * RADIUS - 3e-3
+    session.release()
+    session.revive_robot(2)
+    # who leans on it makes it step aside a little at most
+    assert np.hypot(*np.subtract(place_of(session, 2), there)) < 5e-3
+
+
+def test_who_fails_is_let_go():
+    session = stepped(begun(), 3)
+    session.playing = True
+    for touch in (session.fail_robot, session.remove_robot):
+        session.grab(2, (3.0, 3.0))
+        touch(1 if touch == session.fail_robot else 3)
+        assert session.hand is not None
+        touch(2)
+        assert session.hand is None
+        session.undo.undo()
+        session.undo.undo()
+        assert robots_of(session) == ((1, 2, 3), ())
+
+
+def test_revival_beside_an_obstacle_that_was_drawn_meanwhile():
+    session = stepped(begun(), 3)
+    session.fail_robot(1)
+    there = failed_at(session, 1)
+    session.edit(replace(HALL, obstacles=(*HALL.obstacles, CircleObstacle(there, 0.3))), "circle drawn")
+    session.revive_robot(1)
+    away = np.hypot(*np.subtract(place_of(session, 1), there))
+    assert 0.39 < away < 0.8
+    assert too_deep(session) < 2e-3
+
+
+# refusals
+
+
+def test_what_cannot_be_changes_nothing():
+    session = stepped(begun(RAPF, RPF), 12)
+    session.fail_robot(3)
+    session.undo.undo()
+    session.undo.redo()
+    for paused in (True, False):
+        session.playing = not paused
+        before = all_told(session)
+        for touch, match in (
+            (lambda: session.fail_robot(3), "robot 3 has failed already"),
+            (lambda: session.fail_robot(9), "there is no robot 9"),
+            (lambda: session.revive_robot(1), "robot 1 works"),
+            (lambda: session.revive_robot(9), "there is no robot 9"),
+            (lambda: session.remove_robot(9), "there is no robot 9"),
+            (lambda: session.place(9, (1.0, 1.0)), "there is no robot 9"),
+            (lambda: session.grab(9, (1.0, 1.0)), "there is no robot 9"),
+            (lambda: session.add_robot((1.0, 1.0), 3), "there is a robot 3 already"),
+        ):
+            with pytest.raises(ParameterError, match=match):
+                touch()
+            assert all_told(session) == before
+
+
+def test_the_last_that_works_stays():
+    session = begun(robots=2)
+    session.fail_robot(1)
+    before = all_told(session)
+    for touch in (session.fail_robot, session.remove_robot):
+        with pytest.raises(ParameterError, match="the last robot that works stays"):
+            touch(2)
+        assert all_told(session) == before
+    # who does not work may go
+    session.remove_robot(1)
+    assert robots_of(session) == ((2,), ())
+
+
+def test_a_full_map_and_a_full_team(monkeypatch):
+    cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
+    session = begun(robots=1, environment=cell, given=np.array([[0.225, 0.225]]))
+    before = all_told(session)
+    with pytest.raises(StartError, match="no room"):
+        session.add_robot((0.1, 0.1))
+    assert all_told(session) == before
+    session = begun(robots=3)
+    monkeypatch.setattr(module, "MOST_ROBOTS", 3)
+    before = all_told(session)
+    with pytest.raises(ParameterError, match="there are 3 robots already"):
+        session.add_robot((3.0, 3.0))
+    assert all_told(session) == before
+
+
+# from the past
+
+
+def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
+    session = stepped(begun(RAPF, LLOYD), 20)
+    session.remove_robot(2)
+    stepped(session, 20)
+    session.look_at(10 / 60)
+    then = session.positions(session.lanes[1]).copy()
+    # it is not there any more, but was then
+    session.remove_robot(2)
+    assert session.live
+    assert session.end == pytest.approx(10 / 60)
+    assert robots_of(session) == ((1, 3), ())
+    np.testing.assert_array_equal(session.positions(session.lanes[1]), then[[0, 2]])
+    session.undo.undo()
+    np.testing.assert_array_equal(session.positions(session.lanes[1]), then)
+
+
+@pytest.mark.parametrize(
+    "touch",
+    [
+        lambda session: session.fail_robot(9),
+        lambda session: session.revive_robot(1),
+        lambda session: session.remove_robot(4),
+        lambda session: session.place(4, (1.0, 1.0)),
+        lambda session: session.add_robot((1.0, 1.0), 2),
+        lambda session: session.edit(replace(HALL, boundary=((0, 0), (0.3, 0), (0.3, 0.3))), "shrunk"),
+        lambda session: session.set_limits(Limits(radius=2.5)),
+    ],
+)
+def test_what_could_not_be_then_keeps_what_came_after(touch):
+    session = stepped(begun(RAPF, LLOYD), 20)
+    for lane in session.lanes:
+        for k in range(20):
+            lane.curve.add(k / 60, 2.0)
+    session.add_robot((3.0, 3.0))
+    session.undo.undo()
+    session.undo.redo()
+    stepped(session, 20)
+    session.look_at(10 / 60)
+    session.playing = True
+    before = all_told(session)
+    with pytest.raises((ParameterError, StartError)):
+        touch(session)
+    assert all_told(session) == before
+    assert not session.live
+    session.look_at(99.0)
+    stepped(session, 3)
+    assert robots_of(session) == ((1, 2, 3, 4), ())
+
+
+def test_undo_is_of_the_present():
+    session = stepped(begun(), 20)
+    session.remove_robot(2)
+    stepped(session, 20)
+    session.look_at(10 / 60)
+    assert robots_of(session) == ((1, 2, 3), ())
+    assert session.undo.undo() == "robot 2 taken out"
+    assert session.live
+    assert session.end == pytest.approx(40 / 60)
+    assert robots_of(session) == ((1, 2, 3), ())
+    session.look_at(10 / 60)
+    assert session.undo.redo() == "robot 2 taken out"
+    assert robots_of(session) == ((1, 3), ())
+    assert session.live
+
+
+def test_robots_that_differ_keep_what_is_theirs():
+    """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
+    radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
+    limits = Limits.of(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
+    session = begun(RAPF, robots=3, limits=limits)
+    team = session.lanes[0].simulation.team
+    assert team.radius.tolist() == radius.tolist()
+    positions = session.lanes[0].simulation.positions
+    apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))[np.triu_indices(3, 1)]
+    assert apart.min() >= 0.6, "room for the largest"
+    session.fail_robot(2)
+    assert session.lanes[0].simulation.team.radius.tolist() == [0.1, 0.2]
+    (wreck,) = session.lanes[0].circumstances.solid.obstacles[len(HALL.obstacles) :]
+    assert wreck.radius == 0.3
+    session.revive_robot(2)
+    assert session.lanes[0].simulation.team.radius.tolist() == radius.tolist()
+    session.place(3, place_of(session, 2))
+    gap = np.hypot(*np.subtract(place_of(session, 3), place_of(session, 2)))
+    assert gap >= 0.5 - 1e-6
+    session.add_robot((3.0, 2.0))
+    assert session.lanes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
+    stepped(session, 3)
+    session.set_limits(Limits())
+    assert set(session.lanes[0].simulation.team.radius.tolist()) == {0.1}

@@ -1,0 +1,321 @@
+"""The window, as it is used: everything is pressed, dragged and typed, without a display."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pygame
+import pytest
+from driven_window import FRAME, Driver, opened, resized
+from PIL import Image
+from touched_run import RAPF, begun
+
+from robocov_app.viewer.opening import Opening
+from robocov_app.viewer.overlays import Palette
+from robocov_app.viewer.screen import show_compiling
+from robocov_app.viewer.settings import FOLDER
+from robocov_app.viewer.status import cursor_words
+
+# playing
+
+
+def test_space_plays_and_pauses(driver: Driver) -> None:
+    driver.key("space")
+    driver.frames(10)
+    assert driver.session.time == pytest.approx(10 * FRAME, abs=0.02)
+    driver.key("space")
+    driver.frames(5)
+    assert driver.session.time == pytest.approx(10 * FRAME, abs=0.02)
+
+
+def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
+    driver.push("pause")
+    assert driver.session.playing and driver.widget("button", "pause").text == "Pause"
+    driver.frames(5)
+    driver.push("pause")
+    assert not driver.session.playing and driver.widget("button", "pause").text == "Play"
+    end = driver.session.end
+    driver.push("step")
+    assert driver.session.end == pytest.approx(end + driver.session.scenario.dt)
+    driver.push("settle")
+    assert driver.session.stop_when_settled
+    assert "#chosen" in driver.widget("button", "settle").object_ids
+    driver.push("restart")
+    assert driver.session.end < 0.1
+
+
+def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
+    with opened(tmp_path, robots=1) as driver:
+        driver.key("s")
+        for _ in range(2000):
+            driver.window.advance(0.1)
+            if not driver.session.playing:
+                break
+        assert driver.session.settled
+        assert driver.desk.message.startswith("settled at ")
+
+
+def test_twice_the_speed_is_twice_the_time(driver: Driver) -> None:
+    driver.key("=")
+    driver.key("space")
+    driver.frames(10)
+    assert driver.session.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
+
+
+# words, pictures, files
+
+
+def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> None:
+    with opened(tmp_path, lattice=48) as driver:
+        driver.frames(3)
+        driver.move(*driver.robot(2))
+        assert "robot 2" in cursor_words(driver.desk)
+        driver.move(*driver.pixel((4.2, 1.2)))
+        assert "not free" in cursor_words(driver.desk)
+        driver.post(pygame.WINDOWLEAVE)
+        driver.settle()
+        assert cursor_words(driver.desk) == ""
+
+
+def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -> None:
+    picture = driver.picture()
+    driver.key("f12")
+    with Image.open(tmp_path / "robocov-1.png") as saved:
+        assert np.array_equal(np.asarray(saved.convert("RGB")).astype(int), picture)
+    driver.turn("keep")
+    driver.push("screenshot")
+    assert (tmp_path / "robocov-2.png").exists()
+
+
+def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> None:
+    for _ in range(30):
+        driver.session.step()
+    driver.key("ctrl+e")
+    driver.window.keeper.finish()
+    driver.frames(2)
+    assert not driver.desk.trouble and "saved" in driver.desk.message
+    (record,) = tmp_path.rglob("record.npz")
+    assert record.parent != tmp_path
+
+
+def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:
+    driver.key("space")
+    driver.key("f9")
+    assert driver.desk.filming
+    driver.frames(60)
+    resized(driver, (1000, 640))
+    driver.frames(15)
+    driver.key("f9")
+    path = tmp_path / "robocov-1.mp4"
+    assert driver.desk.message.startswith(f"film saved: {path}") and not driver.desk.filming
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert seconds == pytest.approx(75 * FRAME, abs=0.15) and count == pytest.approx(45, abs=4)
+    assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
+
+
+def test_closing_ends_the_film(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.key("f9")
+        driver.frames(10)
+        driver.post(pygame.QUIT)
+        driver.settle()
+        assert driver.window.closed
+    assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "robocov-1.mp4"))[0] > 0
+
+
+def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with opened(tmp_path / "file") as driver:
+        for key in ("f12", "f9", "ctrl+s"):
+            driver.desk.trouble = False
+            driver.key(key)
+            assert driver.desk.trouble and driver.desk.message, key
+        assert driver.window.film is None and not driver.desk.filming
+
+
+# help, palette, theme, size
+
+
+@pytest.mark.parametrize("key", ["f1", "shift+/"])
+def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Driver) -> None:
+    plain = driver.picture()
+    driver.key(key)
+    assert driver.window.help and not driver.same(plain)
+    driver.key("escape")
+    assert not driver.window.help
+    driver.key(key)
+    driver.click(300, 300)
+    assert not driver.window.help and driver.desk.selected is None
+
+
+@pytest.mark.parametrize("key", ["/", "ctrl+k"])
+def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
+    driver.key(key)
+    palette = driver.window.palette
+    assert palette.open and palette.text == ""
+    driver.type("single")
+    assert [action.name for action in palette.found] == ["step"]
+    driver.key("return")
+    assert driver.session.end > 0.0 and not palette.open
+
+
+def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
+    palette = driver.window.palette
+    driver.key("ctrl+k")
+    driver.type("rob")
+    several = palette.found
+    assert len(several) > 2
+    driver.key("down", 2)
+    driver.key("up")
+    assert palette.chosen == 1
+    driver.key("backspace")
+    assert palette.text == "ro" and palette.chosen == 0
+    driver.key("up")
+    assert palette.chosen == 0
+    driver.key("down", Palette.ROWS + 3)
+    assert palette.chosen == len(palette.found) - 1
+    driver.key("escape")
+    assert not palette.open and driver.session.end == 0.0
+
+
+def test_values_are_set_by_typing(driver: Driver) -> None:
+    driver.key("ctrl+k")
+    driver.type("k_rep 0.5")
+    driver.key("return")
+    assert driver.session.lanes[0].law.value("k_rep") == 0.5
+    driver.key("ctrl+k")
+    driver.type("robots 5")
+    driver.key("enter")
+    assert len(driver.session.numbers) == 5
+    driver.key("ctrl+k")
+    driver.type("robots many")
+    driver.key("return")
+    assert driver.desk.trouble
+
+
+def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(
+    driver: Driver, tmp_path: Path
+) -> None:
+    for code, name in ((pygame.K_F12, ""), (pygame.K_PERIOD, ".")):
+        for _ in range(5):
+            driver.post(pygame.KEYDOWN, key=code, mod=0, unicode=name, scancode=0)
+        driver.post(pygame.KEYUP, key=code, mod=0, unicode=name, scancode=0)
+    driver.settle()
+    assert [path.name for path in tmp_path.iterdir()] == ["robocov-1.png"]
+    assert driver.session.end == pytest.approx(5 / 60)
+    driver.key("f12")
+    assert (tmp_path / "robocov-2.png").exists()
+
+
+def test_the_theme_is_switched_for_everything(driver: Driver) -> None:
+    light = driver.picture()
+    driver.key("t")
+    driver.frames(3, 0.3)
+    dark = driver.picture()
+    for part in (slice(0, 500), slice(600, 900)):
+        assert light[:, part].mean() > 190 and dark[:, part].mean() < 90
+    driver.key("t")
+    driver.frames(3, 0.3)
+    assert driver.picture().mean() > 190
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1500, 700), (3840, 2160), (640, 480)])
+@pytest.mark.parametrize("panes", [1, 3])
+def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int, tmp_path: Path) -> None:
+    with opened(
+        tmp_path, *([RAPF] * panes), size=(1280, 720), scale=2.0 if size[0] > 3000 else 1.0
+    ) as driver:
+        resized(driver, size)
+        assert driver.window.layout.size == size
+        driver.key("space")
+        driver.frames(2)
+        driver.push("pause")
+        assert not driver.session.playing
+        driver.turn("keep")
+        driver.click(*driver.robot(1))
+        assert driver.desk.selected == 1
+        if size[0] >= 900:
+            driver.turn("parameters")
+            driver.push("reset:k_rep")
+
+
+def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver: Driver) -> None:
+    entry = driver.widget("entry", "team.radius")
+    left, top, width, height = driver.window.panel.body
+    assert entry.rect.bottom > 600
+    for _ in range(12):
+        driver.wheel(left + width / 2, top + height / 2, -3)
+        driver.frames(3)
+    assert entry.rect.bottom <= 600
+    driver.write("team.radius", "0.12")
+    driver.key("return")
+    assert driver.session.lanes[0].circumstances.limits.radius == 0.12
+    bar = driver.window.panel.widgets._sections["page"].scrolled.vert_scroll_bar.sliding_button
+    driver.drag(bar.rect.center, (bar.rect.centerx, bar.rect.centery - 200))
+    driver.frames(2)
+    assert entry.rect.bottom > 600
+    camera = driver.window.arena._painters[0].camera
+    driver.wheel(left + width / 2, top + height / 2, -3)
+    assert driver.window.arena._painters[0].camera == camera
+
+
+# tour
+
+
+def test_the_tour_is_played_and_ends_on_a_key(driver: Driver) -> None:
+    shown = set(driver.desk.shown)
+    driver.key("f2")
+    assert driver.window.tour is not None and driver.session.playing
+    driver.frames(5)
+    driver.key("f12")
+    driver.key("t")
+    assert driver.window.tour is not None
+    driver.key("escape")
+    assert driver.window.tour is None and driver.desk.shown == shown
+    assert driver.desk.message == "the tour has ended"
+
+
+def test_the_tour_ends_when_the_arena_is_touched(driver: Driver) -> None:
+    driver.key("f2")
+    driver.frames(3)
+    driver.click(*driver.window.layout.arena[2:])
+    driver.click(200, 200)
+    assert driver.window.tour is None
+
+
+# settings
+
+
+def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER, str(tmp_path / "settings"))
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+
+    def window(size: tuple[int, int] | None = None):
+        opening = Opening(begun(), "hall", tmp_path, size=size, lattice=4)
+        return opening.window()
+
+    with window((1000, 640)) as first:
+        driver = Driver(first)
+        driver.key("t")
+        driver.key("shift+t")
+        driver.turn("show")
+        driver.tick("cells")
+        first.close()
+    kept = json.loads((tmp_path / "settings/window.json").read_text())
+    assert kept["theme"] == "dark" and kept["fade"] and kept["tab"] == "show"
+    assert "cells" not in kept["shown"] and (kept["width"], kept["height"]) == (1000, 640)
+    with window() as second:
+        assert second.screen.get_size() == (1000, 640)
+        assert second.desk.theme == "dark" and second.desk.fade and second.panel.tab == "show"
+        assert "cells" not in second.desk.shown and "robots" in second.desk.shown
+        second.close()
+
+
+def test_while_kernels_are_compiled_the_window_says_so() -> None:
+    show_compiling((300, 200))
+    pixels = pygame.surfarray.array3d(pygame.display.get_surface())
+    assert (pixels == 255).mean() > 0.5
+    assert (pixels < 128).any()

@@ -1,0 +1,369 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_run import HALL, ROOMS, SQUARE
+from explained_moments import line, moment, says_no_nonsense, sums_up, texts
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov import Rapf, Simulation, Team
+from robocov.observation import Decision
+from robocov.voronoi import partition
+from robocov_app.viewer import inspector
+from robocov_app.viewer.inspector import REST, explain
+
+# sizes and directions
+
+
+def test_eight_directions():
+    ways = [inspector._compass(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
+    assert ways == "east north-east north north-west west south-west south south-east".split()
+    assert inspector._compass(0j) == ""
+    assert inspector._compass(-1 - 1e-9j) == "west"
+    assert inspector._compass(complex(2.0, 5e-324)) == "east"
+
+
+@pytest.mark.parametrize(
+    ("metres", "words"),
+    [
+        (-1e-5, "0 mm"),
+        (0, "0 mm"),
+        (0.0042, "4 mm"),
+        (0.01, "1 cm"),
+        (0.42, "42 cm"),
+        (0.994, "99 cm"),
+        (0.996, "1.0 m"),
+        (2.44, "2.4 m"),
+        (9.96, "10 m"),
+        (24.4, "24 m"),
+        (1e9, "over a million m"),
+    ],
+)
+def test_lengths(metres, words):
+    assert inspector._length(metres) == words
+
+
+@pytest.mark.parametrize(
+    ("newtons", "words"),
+    [(0, "0 N"), (4e-4, "0 N"), (0.0042, "4 mN"), (0.314, "0.31 N"), (2, "2.0 N"), (12.3, "12 N")],
+)
+def test_forces(newtons, words):
+    assert inspector._force(newtons) == words
+
+
+# moments made by hand
+
+
+def test_each_force_is_told_with_what_causes_it():
+    report = moment(
+        [[2, 4], [1.2, 4], [2, 6]],
+        goals=[[5, 4], [0, 0], [0, 0]],
+        points=[[2, 3.58], [np.nan] * 2, [np.nan] * 2],
+        velocities=[[0.2, 0], [0, 0], [0, 0]],
+        attraction=[[0.31, 0], [0, 0], [0, 0]],
+        repulsion_robots=[[0.12, 0], [0, 0], [0, 0]],
+        repulsion_obstacle=[[0, 0.3], [0, 0], [0, 0]],
+        names=[4, 7, 9],
+    )
+    assert report.title == "Robot 4"
+    assert report.verdict == "moving 0.20 m/s east to its goal"
+    assert texts(report) == [
+        "at (2.00, 4.00) m, 0.20 m/s east",
+        "pulled 0.31 N to its goal, 3.0 m away",
+        "pushed 0.12 N by robot 7, 80 cm west (2 robots in range)",
+        "pushed 0.30 N by the obstacle, 42 cm south",
+        "held back 0.40 N by viscosity",
+        "resultant 0.30 N north",
+        "32 cm clear of the obstacle south of it",
+        "hears 2 robots, the nearest is robot 7, 80 cm west",
+    ]
+    assert line(report, "attraction").vector == (0.31, 0.0)
+    assert line(report, "viscosity").vector == (-0.4, 0.0)
+    sums_up(report)
+
+
+def test_robots_at_like_distances_are_named_together():
+    report = moment([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
+    pushed = "pushed 0.36 N south-east by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
+    assert line(report, "repulsion_robots").text == pushed
+
+
+@pytest.mark.parametrize(
+    ("point", "name"),
+    [
+        ((4, 5), "the obstacle"),
+        ((0, 5), "the outer wall"),
+        ((8.1, 1), "the wall"),
+        ((10.05, 2.8), "the obstacle"),
+    ],
+)
+def test_an_obstacle_point_is_told_by_what_it_belongs_to(point, name):
+    here = np.array(point) - [0.5, 0.0]
+    report = moment([here], points=[point], environment=ROOMS, repulsion_obstacle=[[-1.0, 0.0]])
+    assert line(report, "repulsion_obstacle").text == f"pushed 1.0 N by {name}, 50 cm east"
+
+
+@pytest.mark.parametrize(
+    ("environment", "here", "goal", "hidden"),
+    [
+        (ROOMS, (3, 5), (3, 6), ""),
+        (ROOMS, (3, 5), (6, 5), ", behind an obstacle"),
+        (ROOMS, (3, 5), (4.4, 5), ", inside an obstacle"),
+        (ROOMS, (4.4, 8), (2.5, 8), ", behind an obstacle"),  # a courtyard
+        (HALL, (10, 2), (5, 9), ", behind the outer wall"),
+        (HALL, (10, 2), (10, 8), ", outside the map"),
+        (HALL, (5, 2), (5, 9), ""),
+    ],
+)
+def test_what_hides_a_goal(environment, here, goal, hidden):
+    pull = np.array(goal, dtype=float) - here
+    away = inspector._length(float(np.hypot(*pull))) + " away" + hidden
+    size = inspector._force(float(np.hypot(*pull)))
+    report = moment([here], goals=[goal], environment=environment, attraction=[pull])
+    assert line(report, "attraction").text == f"pulled {size} to its goal, {away}"
+    held = moment([here], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
+    assert held.verdict.startswith("at rest, stuck: " if hidden else "at rest ")
+    assert any(text.startswith("stuck: ") for text in texts(held)) == bool(hidden)
+
+
+def test_two_forces_that_balance_are_named():
+    report = moment(
+        [[3.4, 5]],
+        goals=[[6, 5]],
+        points=[[4, 5]],
+        environment=ROOMS,
+        attraction=[[0.31, 0]],
+        repulsion_obstacle=[[-0.3, 0]],
+        swarm_cohesion=[[0.001, 0]],
+    )
+    assert report.verdict == "at rest, stuck: its goal is 2.6 m away, behind an obstacle"
+    assert "stuck: the pull to its goal (0.31 N) and the push of the obstacle (0.30 N) balance" in texts(
+        report
+    )
+    assert "pushed 1 mN east by swarm cohesion" in texts(report)
+
+
+def test_three_forces_that_balance_are_named_when_two_do_not():
+    forces = {"attraction": [[0, 1]], "repulsion_obstacle": [[0.87, -0.5]], "wind": [[-0.87, -0.5]]}
+    report = moment([[3, 3]], goals=[[3, 5]], **forces)
+    assert report.verdict == "at rest 2.0 m short of its goal: the forces balance"
+    balance = "the pull to its goal (1.0 N) and the push of obstacles (1.0 N) and wind (1.0 N) balance"
+    assert balance in texts(report)
+
+
+def test_a_robot_pressed_against_something_is_held_by_it():
+    east = {"goals": [[5, 5]], "attraction": [[10.0, 0.0]], "environment": ROOMS}
+    report = moment([[3.9, 5]], points=[[4, 5]], **east)
+    assert report.verdict == "at rest, stuck: its goal is 1.1 m away, behind an obstacle"
+    assert "stuck: the pull to its goal (10 N) presses it against the obstacle" in texts(report)
+    assert "touches the obstacle east of it" in texts(report)
+    assert "limited: 2.0 m/s² instead of 10 m/s²" in texts(report)
+    blind = moment([[3.9, 5]], sensing_range=0.05, **east)
+    assert blind.verdict == report.verdict
+    assert "touches the obstacle east of it" in texts(blind)
+    assert "senses nothing within 5 cm" in texts(blind)
+    away = moment([[3.9, 5]], points=[[4, 5]], environment=ROOMS, wind=[[-1.0, 0.0]])
+    assert away.verdict == "setting off west"
+    sliding = moment([[3.9, 5]], points=[[4, 5]], velocities=[[0, -0.5]], **east)
+    assert sliding.verdict == "sliding 0.50 m/s south along the obstacle"
+
+
+def test_robots_that_touch():
+    report = moment([[4, 4], [4.2, 4]], wind=[[1, 0], [0, 0]])
+    assert report.verdict == "at rest, held by robot 2"
+    assert "wind (1.0 N) presses it against robot 2" in texts(report)
+
+
+@pytest.mark.parametrize(
+    ("distance", "verdict"),
+    [
+        (0.0, "arrived: at rest on its goal"),
+        (0.03, "arrived: at rest on its goal"),
+        (0.2, "arrived: at rest 20 cm from its goal"),
+        (0.5, "at rest 50 cm short of its goal: no force acts on it"),
+    ],
+)
+def test_arrivals(distance, verdict):
+    assert moment([[4, 4]], goals=[[4, 4 + distance]]).verdict == verdict
+
+
+def test_arrived_at_what_is_inside_an_obstacle():
+    report = moment([[3.85, 5]], goals=[[4.1, 5]], environment=ROOMS)
+    assert report.verdict == "arrived: at rest 25 cm from its goal, which is inside an obstacle"
+
+
+@pytest.mark.parametrize(
+    ("velocity", "force", "verdict"),
+    [
+        ((0.58, 0.58), (0, 0), "moving 0.82 m/s north-east to its goal"),
+        ((-0.5, 0), (-1, 0), "moving 0.50 m/s west, its goal is 2.8 m away"),
+        ((0.5, 0.5), (-3, -3), "braking from 0.71 m/s north-east, its goal is 2.8 m away"),
+        ((0.02, 0), (1, 1), "setting off north-east to its goal"),
+        ((0.02, 0), (-1, 0), "setting off west"),
+    ],
+)
+def test_motion_by_speed(velocity, force, verdict):
+    report = moment([[4, 4]], velocities=[velocity], goals=[[6, 6]], forces=[force], viscosity=0.0)
+    assert report.verdict == verdict
+
+
+def wave(size, turns, drift=0.0, k=31):
+    phase = np.linspace(0, 1, k)
+    return np.column_stack([4 + size * np.sin(2 * np.pi * turns * phase) + drift * phase, np.full(k, 4.0)])
+
+
+@pytest.mark.parametrize(
+    ("recent", "speed", "verdict"),
+    [
+        (wave(0.0, 0), 0.0, "at rest, no force acts on it"),
+        (wave(0.001, 8), 0.04, "at rest, no force acts on it"),
+        (wave(0.01, 8), 0.2, "trembling in place"),
+        (wave(0.01, 8), 0.0, "trembling in place"),  # at a turn
+        (wave(0.1, 4), 0.5, "trembling in place"),
+        (wave(0.0, 0), 0.2, "trembling in place"),  # too quick for the samples
+        (wave(0.0, 0, drift=2.0), 0.5, "moving 0.50 m/s east"),
+        (wave(0.0, 0, drift=0.08), 0.02, "moving 0.02 m/s east"),
+        (wave(0.0, 0, drift=0.03), 0.3, "moving 0.30 m/s east"),  # has just set off
+        (wave(0.0, 0, drift=2.0), 0.001, "at rest, no force acts on it"),
+        (wave(0.0, 0, drift=2.0)[:1], 0.5, "moving 0.50 m/s east"),
+        (wave(0.0, 0, drift=2.0)[:0], 0.5, "moving 0.50 m/s east"),
+        (np.full((5, 2), np.nan), 0.5, "moving 0.50 m/s east"),
+    ],
+)
+def test_motion_by_what_was_done_of_late(recent, speed, verdict):
+    velocities = [[speed, 0.0]]
+    assert moment([[4, 4]], velocities=velocities, recent=recent, viscosity=0.0).verdict == verdict
+
+
+def test_trembling_robots_may_be_stuck():
+    report = moment([[3, 5]], goals=[[6, 5]], environment=ROOMS, recent=wave(0.02, 8))
+    assert report.verdict == "trembling in place, stuck: its goal is 3.0 m away, behind an obstacle"
+
+
+def test_who_sways_does_not_set_off_and_who_begins_does():
+    push = {"forces": [[0.2, 0.0]]}
+    assert moment([[4, 4]], recent=wave(0.002, 2), **push).verdict == "setting off east"
+    assert moment([[4, 4]], recent=wave(0.01, 1), **push).verdict == "at rest, the forces almost balance"
+
+
+def test_limits():
+    fast = moment([[4, 4]], velocities=[[1, 0]], max_speed=1.0)
+    assert "at its top speed, 1.0 m/s" in texts(fast)
+    thrown = moment([[4, 4]], velocities=[[5, 0]], max_speed=1.0)
+    assert "faster than its top speed, 1.0 m/s" in texts(thrown)
+    heavy = moment([[4, 4]], forces=[[10, 0]], mass=20.0, max_acceleration=0.6)
+    assert not [text for text in texts(heavy) if "limited" in text]
+
+
+@pytest.mark.parametrize(
+    ("reach", "text"),
+    [(3.0, "senses nothing within 3.0 m"), (np.inf, "senses nothing"), (0.0, "senses nothing")],
+)
+def test_what_is_not_sensed(reach, text):
+    report = moment([[4, 4]], sensing_range=reach)
+    assert text in texts(report)
+    assert "hears no other robot" in texts(report)
+
+
+def test_only_those_in_range_are_heard():
+    report = moment([[4, 4], [5, 4], [7, 4]], communication_range=1.5)
+    assert "hears 1 robot, the nearest is robot 2, 1.0 m east" in texts(report)
+
+
+def test_the_centroid_is_called_so():
+    positions = np.array([[1.0, 1.0], [7.0, 7.0]])
+    cells = partition(positions, SQUARE.region)
+    report = moment(positions, goals=cells.centroid, cells=cells)
+    assert report.verdict.endswith("short of its centroid: no force acts on it")
+
+
+def test_forces_that_no_term_explains():
+    none = moment([[4, 4]], forces=[[1.0, 0.0]])
+    assert line(none, REST).text == "pushed 1.0 N east by its law"
+    some = moment([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
+    assert line(some, REST).text == "pushed 1.1 N south-east by the rest of its law"
+    for report in (none, some):
+        sums_up(report)
+
+
+def test_terms_of_users_may_be_anything():
+    terms = {
+        "viscosity": [[1.0, 0.0]],
+        "resultant": [[1.0, 0.0]],
+        "words": "none",
+        "short": [],
+        "wild": [[np.nan] * 2],
+    }
+    team = Team.homogeneous(1)
+    simulation = Simulation(SQUARE, Rapf(), [[4.0, 4.0]], team)
+    decision = Decision(np.array([[1.0, 0.0]]), None, terms)
+    report = explain(replace(simulation.snapshot, decision=decision), team, SQUARE, 0)
+    assert [line.kind for line in report.lines if line.kind] == [REST, "viscosity", "resultant"]
+    sums_up(report)
+
+
+def test_a_force_that_is_no_number():
+    report = moment([[4, 4]], velocities=[[0.5, 0]], forces=[[np.nan, 1.0]])
+    assert "its law gives no force that is a number" in texts(report)
+    assert line(report, "resultant").vector == (-1.0, 0.0)
+
+
+def test_braking_before_the_goal_is_no_pull():
+    report = moment([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
+    assert line(report, "attraction").text == "braked 3.0 N west on the way to its goal, 20 cm away"
+    assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
+    aside = moment([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
+    assert line(aside, "attraction").text == "pulled 1.4 N north-east on the way to its goal, 2.0 m away"
+
+
+# anything
+
+
+numbers = st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, 1e-300, 1e-9, 4.0])
+wild = numbers | st.sampled_from([np.nan, np.inf, -np.inf, 1e300, 1e9])
+
+
+@st.composite
+def moments(draw):
+    n = draw(st.integers(1, 4))
+
+    def rows(values):
+        pair = st.tuples(values, values)
+        return np.array(draw(st.lists(pair, min_size=n, max_size=n)), dtype=float)
+
+    kinds = ["attraction", "repulsion_robots", "repulsion_obstacle", "swarm_cohesion", "viscosity"]
+    terms = {kind: rows(wild) for kind in draw(st.lists(st.sampled_from(kinds), unique=True))}
+    if draw(st.booleans()):
+        forces = sum((np.nan_to_num(term, posinf=0, neginf=0) for term in terms.values()), np.zeros((n, 2)))
+    else:
+        forces = rows(wild)
+    place = st.floats(-1, 17) | st.sampled_from([0.0, 4.0, 16.0])
+    recent = draw(
+        st.none() | st.lists(st.tuples(place, place), max_size=5).map(lambda r: np.reshape(r, (-1, 2)))
+    )
+    limits = {
+        "viscosity": draw(st.sampled_from([0.0, 2.0])),
+        "mass": draw(st.sampled_from([1e-6, 1.0, 1e6])),
+        "sensing_range": draw(st.sampled_from([0.0, 3.0, np.inf])),
+        "communication_range": draw(st.sampled_from([0.0, 3.0, np.inf])),
+    }
+    return {
+        "positions": rows(place),
+        "velocities": rows(st.floats(-2, 2) | st.sampled_from([0.0, 1e-300])),
+        "forces": forces,
+        "goals": rows(place | st.just(np.nan)) if draw(st.booleans()) else None,
+        "points": rows(place | st.just(np.nan)),
+        "environment": draw(st.sampled_from([ROOMS, HALL, SQUARE])),
+        "recent": recent,
+        "robot": draw(st.integers(0, n - 1)),
+        **limits,
+        **{kind: term for kind, term in terms.items() if kind not in limits},
+    }
+
+
+@given(moments())
+def test_no_text_ever_holds_nonsense_and_the_forces_sum_up(given_moment):
+    says_no_nonsense(moment(**given_moment))
