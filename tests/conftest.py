@@ -34,11 +34,21 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
-# the same examples every time, so that a failure is the fault of the change that is tested;
-# `pytest --hypothesis-profile=explore` looks for new ones
-settings.register_profile("robocov", derandomize=True, database=None, **QUIET)
+# the same examples every time, so that a failure is the fault of the change that is tested; a quarter of them
+# unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones
+settings.register_profile("thorough", derandomize=True, database=None, **QUIET)
 settings.register_profile("explore", max_examples=500, print_blob=True, **QUIET)
-settings.load_profile("robocov")
+settings.load_profile("thorough")
+
+
+@pytest.hookimpl(trylast=True)  # hypothesis marks its tests in a hook of its own
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--hypothesis-profile"):
+        return
+    for test in {item.function for item in items if item.get_closest_marker("hypothesis")}:  # type: ignore[attr-defined]
+        wanted = getattr(test, "_hypothesis_internal_use_settings", None) or settings.default
+        test._hypothesis_internal_use_settings = settings(wanted, max_examples=-(-wanted.max_examples // 4))
+
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 

@@ -115,7 +115,8 @@ def test_ci_runs_the_readmes_test_command_and_then_what_is_slow() -> None:
         line for line in script if line and not line.startswith("#")
     ]
     assert command in readme.splitlines()
-    assert slow == ".venv-test/bin/python -m pytest -m slow"
+    thorough = '-m "slow or hypothesis" --hypothesis-profile=thorough'
+    assert slow == f".venv-test/bin/python -m pytest {thorough}"
     assert interpreted.startswith("NUMBA_DISABLE_JIT=1 .venv-test/bin/python -m pytest ")
     assert paper.startswith(".venv-test/bin/python -m pytest ")
     named = [word for line in (interpreted, paper) for word in line.split() if word.startswith("tests/")]

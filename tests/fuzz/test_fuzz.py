@@ -12,7 +12,7 @@ from fuzz_reading import Job, Outcome, Reader
 from fuzz_seeds import SEEDS, Case
 from fuzz_shrinking import shrunk
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")]
 
 FEW = {"dxf": 60}
 """Cases of formats whose libraries are slow."""

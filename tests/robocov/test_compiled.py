@@ -54,6 +54,7 @@ def said(*args, **options):
     return answer.split()
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_once_and_a_damaged_cache_is_a_miss(tmp_path):
     assert said(tmp_path) == ["doubled", "1.0"]
     (entry,) = tmp_path.iterdir()
@@ -64,6 +65,7 @@ def test_a_kernel_is_compiled_once_and_a_damaged_cache_is_a_miss(tmp_path):
         assert said(tmp_path) == ["doubled", "1.0"]
 
 
+@pytest.mark.slow
 def test_of_several_processes_one_compiles(tmp_path):
     script = SCRIPT + "print(sum(doubled._dispatcher._cache_hits.values()))"
     processes = [started(tmp_path, script=script) for _ in range(3)]
@@ -84,6 +86,7 @@ def test_all_kernels_of_a_step_and_of_the_cost_are_there_before_a_run(monkeypatc
     summarise(record, cost_history(record, CoverageCost(rooms, 16)))
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("no folder")
     assert said(tmp_path / "file") == ["doubled", "1.0"]

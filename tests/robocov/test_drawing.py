@@ -135,6 +135,7 @@ assert not heavy, heavy
 """
 
 
+@pytest.mark.slow
 def test_nothing_heavy_is_loaded_before_something_is_drawn() -> None:
     done = subprocess.run([sys.executable, "-c", _LIGHT], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -44,6 +44,7 @@ def finished() -> Simulation:
     return some
 
 
+@pytest.mark.slow
 def test_it_leaves_the_first_room_and_ends_far_below_rapf(finished: Simulation) -> None:
     cost = CoverageCost(ROOMS, lattice=32)
     other = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
@@ -67,6 +68,7 @@ def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulatio
     assert all(state.idle and state.quiet for state in finished.memory.states)
 
 
+@pytest.mark.slow
 def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
     """The gap turns out to be too narrow: then all acceleration would go into turning, none into braking."""
     places = [
@@ -117,6 +119,7 @@ def test_what_was_remembered_stays_as_it_was() -> None:
     assert some.positions.tobytes() == again.positions.tobytes()
 
 
+@pytest.mark.slow
 def test_maps_are_shared_where_it_says_so() -> None:
     unknown = {}
     for kind in (Atlas, AtlasShared):
@@ -134,6 +137,7 @@ def test_maps_are_shared_where_it_says_so() -> None:
     assert information_of(AtlasShared()) == "shared map"
 
 
+@pytest.mark.slow
 def test_a_robot_alone_and_a_crowd() -> None:
     alone = simulation(n=1)
     for _ in range(300):

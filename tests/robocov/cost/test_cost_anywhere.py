@@ -153,6 +153,7 @@ def test_every_bundled_map(name):
     assert compared(environment, 32, robots) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rooms", "corridor"])
 def test_medium_maps_agree_with_the_brute_force(name):
     environment = load_map(name)
@@ -191,6 +192,7 @@ print(len(cost.corners), most / (1e6 if sys.platform == "linux" else 1e9))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="memory is measured otherwise")
 def test_a_large_map_takes_less_than_a_gigabyte():
     folder = str(Path(__file__).parents[1])

@@ -106,6 +106,7 @@ for speeds in (None, np.array([0.3, 0.7, 0.3])):
 """
 
 
+@pytest.mark.slow
 def test_as_python_and_on_any_processor_the_bits_are_the_same():
     script = SAME_BITS.format(folder=str(Path(__file__).parents[1]))
     settings = (

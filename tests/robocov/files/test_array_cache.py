@@ -124,6 +124,7 @@ def _write(folder, value):
         cache.save("entry", {"a": np.full(20_000, value)})
 
 
+@pytest.mark.slow
 def test_writers_at_the_same_time_leave_a_whole_entry(tmp_path):
     context = multiprocessing.get_context("spawn")
     writers = [context.Process(target=_write, args=(tmp_path, value)) for value in (1.0, 2.0)]

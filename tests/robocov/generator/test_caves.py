@@ -55,6 +55,7 @@ def test_vertices_are_few_and_walls_smooth() -> None:
         assert (turn > 100.0).mean() < 0.02
 
 
+@pytest.mark.slow
 def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
     narrow, pillars = [], 0
     for seed in range(20):

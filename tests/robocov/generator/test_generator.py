@@ -98,6 +98,7 @@ def test_a_map_is_what_was_asked_for(words):
     assert all(value == round(value, digits) for value in coordinates(environment))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["polygons", "blocks", "rooms", "mazes"])
 def test_maps_may_be_large(kind):
     environment = generated_map(0, kind=kind, obstacles=250, side=50.0)
@@ -191,6 +192,7 @@ def test_maps_that_studies_used_stay_as_they_are(words, expected):
     assert digest(generated_map(**words)) == expected
 
 
+@pytest.mark.slow
 def test_maps_do_not_depend_on_the_process():
     script = (
         "import sys\n"
@@ -212,6 +214,7 @@ def test_numbers_may_be_numpys():
     )
 
 
+@pytest.mark.slow
 def test_the_shapes_of_polygons_are_mixed():
     counts = {"convex": 0, 6: 0, 8: 0}
     for seed in range(60):
@@ -266,7 +269,7 @@ def test_parameters_out_of_range_are_named(words, message):
     "words",
     [
         {"kind": "polygons", "obstacles": 200, "area": 0.5},
-        {"kind": "polygons", "obstacles": 12, "area": 0.35},
+        pytest.param({"kind": "polygons", "obstacles": 12, "area": 0.35}, marks=pytest.mark.slow),
         {"kind": "blocks", "obstacles": 6, "area": 0.85},
         {"kind": "blocks", "obstacles": 200, "area": 0.2},
         {"kind": "rooms", "obstacles": 100, "area": 0.1},

@@ -218,6 +218,7 @@ def test_points_that_are_no_numbers_are_named():
         Geodesics(SLANTED).place([1.0, 2.0, 3.0])
 
 
+@pytest.mark.slow
 def test_a_large_map_agrees_with_the_brute_force():
     rng = np.random.default_rng(11)
     turn = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])

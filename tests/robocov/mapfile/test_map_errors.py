@@ -228,6 +228,7 @@ def test_of_very_many_mistakes_some_are_listed_and_all_counted(place: Callable[[
     assert caught.value.unlisted == 50 - MapError.MOST_LISTED
 
 
+@pytest.mark.slow
 def test_lines_are_looked_up_in_large_files_too() -> None:
     ring = [[math.cos(k / 1e4), math.sin(k / 1e4)] for k in range(60_000)]
     document = changed("boundary", [*ring, [2, "x"]], document=changed("extra", {"more": ring}))

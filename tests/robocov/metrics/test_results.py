@@ -232,6 +232,7 @@ def test_a_file_that_is_no_history_is_named_with_its_line(tmp_path: Path, text: 
         read_history(tmp_path / "none.csv")
 
 
+@pytest.mark.slow
 def test_reading_does_not_load_what_is_not_needed(folder: Path) -> None:
     script = (
         "import sys, robocov as rc\n"

@@ -153,6 +153,7 @@ def test_positions_are_clear_and_the_cost_is_theirs(seed, kind, robots):
     assert again.uncovered_area == best.uncovered_area == 0.0
 
 
+@pytest.mark.slow
 def test_more_restarts_are_never_worse_and_begin_alike():
     where = load_map("museum")
     found = [optimum(where, 6, lattice=24, restarts=restarts, seed=1) for restarts in (1, 2, 5, 9)]
@@ -163,6 +164,7 @@ def test_more_restarts_are_never_worse_and_begin_alike():
         np.testing.assert_array_equal(best.costs, found[-1].costs[: len(best.costs)])
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_also_in_another_process():
     script = (
         "import sys\nfrom robocov.mapfile import load_map\nfrom robocov.optimum import optimum\n"

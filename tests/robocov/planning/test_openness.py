@@ -30,6 +30,7 @@ def walks(state: np.ndarray, row: int, column: int, seed: int, count: int = 4000
     return found / count
 
 
+@pytest.mark.slow
 def test_it_is_the_chance_of_a_random_walk() -> None:
     state = np.full((7, 9), UNKNOWN, dtype=np.uint8)
     state[0], state[:, 0], state[6, 4:] = WALL, WALL, FREE

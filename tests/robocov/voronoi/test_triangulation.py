@@ -190,6 +190,7 @@ def test_a_triangulation_of_other_places_does_no_harm(seed: int, n: int) -> None
     assert_delaunay(fitted(mirrored, fitted(points)), mirrored)
 
 
+@pytest.mark.slow
 def test_slow_robots_need_no_second_triangulation() -> None:
     """Flips alone keep it Delaunay: robots on the hull included, which may leave and enter it."""
     rng = np.random.default_rng(8)

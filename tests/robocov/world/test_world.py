@@ -91,7 +91,13 @@ def test_no_robot_enters_a_wall_however_it_is_driven(cluttered: Environment, dt:
 
 @pytest.mark.parametrize(
     ("ratio", "speed", "radii"),
-    [(1, 2, (0.1,)), (100, 2, (0.05, 0.1)), (1000, 20, (0.1, 0.15)), (10, 5, (0.1,)), (1, 20, (0.3, 0.5))],
+    [
+        (1, 2, (0.1,)),
+        (10, 5, (0.1,)),
+        (1, 20, (0.3, 0.5)),
+        pytest.param(100, 2, (0.05, 0.1), marks=pytest.mark.slow),
+        pytest.param(1000, 20, (0.1, 0.15), marks=pytest.mark.slow),
+    ],
 )
 def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
     empty: Environment, ratio: float, speed: float, radii: tuple[float, ...]
