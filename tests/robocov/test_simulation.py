@@ -64,6 +64,7 @@ def digests() -> list[str]:
     ],
     ids=["libraries", "instructions"],
 )
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names of x86 processors")
 def test_another_process_on_any_x86_processor_has_the_same_bits(environment: dict[str, str]) -> None:
     script = "import sys; sys.path.insert(0, sys.argv[1]); import test_simulation as t; print(*t.digests())"
