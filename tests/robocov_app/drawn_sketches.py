@@ -11,10 +11,10 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.edits import arranging, booleans, clipboard, edits, simplifying, vertices
+from robocov_app.editor.edits import boolean, clipboard, create, properties, simplify, transform, vertices
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import BOUNDARY, Item, Sketch
 from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
@@ -159,7 +159,7 @@ def changes(draw, sketch):
     length, dx, dy = draw(_SOME_LENGTHS), draw(_SHIFTS), draw(_SHIFTS)
     degrees = draw(st.sampled_from([90.0, -45.0, 30.0, 7.3, 180.0]))
     factor = draw(st.sampled_from([0.5, 2.0, -1.0, 1.37]))
-    side = draw(st.sampled_from(arranging.SIDES))
+    side = draw(st.sampled_from(transform.SIDES))
     axis = draw(st.sampled_from(["x", "y"]))
     edges = [
         Edge(each, ring, k, points[k])
@@ -171,36 +171,36 @@ def changes(draw, sketch):
     handles = sorted(selection.vertices, key=str) or [vertex for vertex, _ in points_of(sketch, owner)][:1]
     key = owner if isinstance(owner, int) else 0
     deeds = [
-        lambda: edits.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
-        lambda: edits.rectangle_drawn(sketch, a, b),
-        lambda: edits.circle_drawn(sketch, a, length),
-        lambda: edits.wall_drawn(sketch, [a, b], length),
-        lambda: edits.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
-        lambda: edits.disc_start_drawn(sketch, a, length),
-        lambda: edits.points_start_drawn(sketch, [a, b]),
-        lambda: edits.uniform_start_added(sketch),
-        lambda: edits.start_point_added(sketch, str(owner), a),
-        lambda: edits.moved(sketch, selection, dx, dy),
-        lambda: edits.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
-        lambda: edits.scaled(sketch, selection, factor, draw(st.sampled_from([None, 1.5])), a),
-        lambda: edits.resized(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
-        lambda: edits.placed(sketch, selection, a[0], None),
-        lambda: edits.mirrored(sketch, selection, axis),
-        lambda: edits.mirrored_across(sketch, selection, a, b),
-        lambda: edits.duplicated(sketch, selection, dx, dy),
-        lambda: edits.arrayed(sketch, selection, 2, 2, 1.0, 1.0),
-        lambda: edits.deleted(sketch, selection),
-        lambda: edits.renamed(sketch, owner, draw(st.sampled_from(["", "x", "start", "y" * 101]))),
-        lambda: edits.noted(sketch, selection, "a note"),
-        lambda: edits.titled(sketch, "another", "and its description"),
-        lambda: edits.widened(sketch, selection, length),
-        lambda: edits.sized(sketch, selection, length),
-        lambda: edits.raised(sketch, selection, draw(st.sampled_from(["top", "up", "down", "bottom"]))),
-        lambda: edits.start_first(sketch, str(owner)),
-        lambda: edits.start_replaced(sketch, str(owner), DiscStart(a, length)),
-        lambda: edits.made_polygons(sketch, selection),
-        lambda: edits.made_boundary(sketch, selection),
-        lambda: edits.underlaid(sketch, Background("plan.png", (40, 30))),
+        lambda: create.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
+        lambda: create.rectangle_drawn(sketch, a, b),
+        lambda: create.circle_drawn(sketch, a, length),
+        lambda: create.wall_drawn(sketch, [a, b], length),
+        lambda: create.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
+        lambda: create.disc_start_drawn(sketch, a, length),
+        lambda: create.points_start_drawn(sketch, [a, b]),
+        lambda: create.uniform_start_added(sketch),
+        lambda: create.start_point_added(sketch, str(owner), a),
+        lambda: transform.moved(sketch, selection, dx, dy),
+        lambda: transform.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
+        lambda: transform.scaled(sketch, selection, factor, draw(st.sampled_from([None, 1.5])), a),
+        lambda: transform.resized(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
+        lambda: transform.placed(sketch, selection, a[0], None),
+        lambda: transform.mirrored(sketch, selection, axis),
+        lambda: transform.mirrored_across(sketch, selection, a, b),
+        lambda: transform.duplicated(sketch, selection, dx, dy),
+        lambda: transform.arrayed(sketch, selection, 2, 2, 1.0, 1.0),
+        lambda: properties.deleted(sketch, selection),
+        lambda: properties.renamed(sketch, owner, draw(st.sampled_from(["", "x", "start", "y" * 101]))),
+        lambda: properties.noted(sketch, selection, "a note"),
+        lambda: properties.titled(sketch, "another", "and its description"),
+        lambda: properties.widened(sketch, selection, length),
+        lambda: properties.sized(sketch, selection, length),
+        lambda: properties.raised(sketch, selection, draw(st.sampled_from(["top", "up", "down", "bottom"]))),
+        lambda: properties.start_first(sketch, str(owner)),
+        lambda: properties.start_replaced(sketch, str(owner), DiscStart(a, length)),
+        lambda: properties.made_polygons(sketch, selection),
+        lambda: properties.made_boundary(sketch, selection),
+        lambda: properties.underlaid(sketch, Background("plan.png", (40, 30))),
         lambda: vertices.moved(sketch, selection, dx, dy),
         lambda: vertices.put(sketch, dict.fromkeys(handles, a)),
         lambda: vertices.inserted(sketch, edge),
@@ -216,19 +216,19 @@ def changes(draw, sketch):
         lambda: vertices.split(sketch, handles[0]) if handles else None,
         lambda: vertices.joined(sketch, selection),
         lambda: vertices.reversed_order(sketch, owner),
-        lambda: booleans.united(sketch, selection),
-        lambda: booleans.subtracted(sketch, selection),
-        lambda: booleans.intersected(sketch, selection),
-        lambda: booleans.divided(sketch, selection),
-        lambda: booleans.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
-        lambda: booleans.clipped(sketch, selection),
-        lambda: booleans.repaired(sketch, selection),
-        lambda: simplifying.simplified(sketch, selection, length),
-        lambda: simplifying.straightened(sketch, selection, 20.0),
-        lambda: arranging.aligned(sketch, selection, side),
-        lambda: arranging.aligned(sketch, selection, side, to_boundary=True),
-        lambda: arranging.distributed(sketch, selection, axis),
-        lambda: arranging.distributed(sketch, selection, axis, gap=0.5),
+        lambda: boolean.united(sketch, selection),
+        lambda: boolean.subtracted(sketch, selection),
+        lambda: boolean.intersected(sketch, selection),
+        lambda: boolean.divided(sketch, selection),
+        lambda: boolean.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
+        lambda: boolean.clipped(sketch, selection),
+        lambda: boolean.repaired(sketch, selection),
+        lambda: simplify.simplified(sketch, selection, length),
+        lambda: simplify.straightened(sketch, selection, 20.0),
+        lambda: transform.aligned(sketch, selection, side),
+        lambda: transform.aligned(sketch, selection, side, to_boundary=True),
+        lambda: transform.distributed(sketch, selection, axis),
+        lambda: transform.distributed(sketch, selection, axis, gap=0.5),
         lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),
     ]
     try:

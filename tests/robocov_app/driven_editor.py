@@ -12,9 +12,9 @@ import pygame
 from driven_window import MODIFIERS, Driver
 
 from robocov.mapfile import load_map
-from robocov_app.editor.model.document import Sketch
-from robocov_app.editor.model.paper import FIRST_SHEET, Paper
+from robocov_app.editor.model.document import FIRST_SHEET, Document
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.desk import Desk
 from robocov_app.editor.ui.opening import DirectReadings
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
@@ -47,15 +47,15 @@ def opened_editor(
     size: tuple[int, int] = SIZE,
     scale: float = 1.0,
     drafts: Path | None = None,
-    paper: Paper | None = None,
+    document: Document | None = None,
     theme: str = "light",
     readings: Any = None,
 ) -> Iterator[Hands]:
     """Open the editor without a display."""
     with display(headless=True):
-        if paper is None:
-            paper = Paper(sketch if sketch is not None else sheet(), drafts)
-        desk = Desk(paper, readings or DirectReadings(), OwnPasteboard(), folder)
+        if document is None:
+            document = Document(sketch if sketch is not None else sheet(), drafts)
+        desk = Desk(document, readings or DirectReadings(), OwnPasteboard(), folder)
         desk.theme = theme
         hands = Hands(EditorWindow(desk, size, scale, drafts, patient=True))
         hands.settle()
@@ -66,7 +66,7 @@ def opened_editor(
             if pygame.display.get_init():  # another window may have ended it
                 pygame.key.set_mods(0)
             hands.window.close()
-            desk.paper.close(discard=False)
+            desk.document.close(discard=False)
 
 
 class Hands(Driver):

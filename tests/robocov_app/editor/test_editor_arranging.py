@@ -6,10 +6,9 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart
 from robocov.errors import MapError
-from robocov_app.editor.edits.arranging import SIDES, aligned, distributed
-from robocov_app.editor.edits.edits import bounds_of
-from robocov_app.editor.model.document import BOUNDARY, Sketch
+from robocov_app.editor.edits.transform import SIDES, aligned, bounds_of, distributed
 from robocov_app.editor.model.selection import Selection, Vertex, place_of
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 
 def box(x, y, width, height):

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import booleans, edits
-from robocov_app.editor.model.document import Item, Sketch
-from robocov_app.editor.model.outlines import outlines
-from robocov_app.editor.model.problems import problems
+from robocov_app.editor.edits import boolean, properties
+from robocov_app.editor.model.geometry import outlines
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.model.validation import problems
 
 
 def covered(sketch: Sketch) -> shapely.Geometry:
@@ -47,7 +47,7 @@ def test_results_have_the_areas_that_shapely_says_and_cover_the_same_places(shap
     }
     perimeter = sum(shape.length for shape in raw)
     try:
-        change = getattr(booleans, name)(sketch, Selection.of(*keys))
+        change = getattr(boolean, name)(sketch, Selection.of(*keys))
     except MapError:
         assert wanted[name].area < 1e-3 * perimeter
         return
@@ -88,16 +88,16 @@ def test_holes_stay():
         "f",
     )
     sketch, (a, b) = Sketch(boundary=HALL).added([frame, box(4.5, 2.5, 2.0, 1.0)])
-    change = booleans.united(sketch, Selection.of(a, b))
+    change = boolean.united(sketch, Selection.of(a, b))
     (item,) = change.sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(12.0 + 1.5)
     assert change.words == "2 obstacles united"
-    cut = booleans.subtracted(change.sketch.added([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
+    cut = boolean.subtracted(change.sketch.added([box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1))
     assert cut.selection
     # from a plate, a smaller one cuts a hole
     sketch, keys = Sketch().added([box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
-    (item,) = booleans.subtracted(sketch, Selection.of(*keys)).sketch.obstacles
+    (item,) = boolean.subtracted(sketch, Selection.of(*keys)).sketch.obstacles
     assert len(item.shape.holes) == 1
     assert item.shape.polygon.area == pytest.approx(16.0 - np.pi, abs=5e-3)
 
@@ -111,7 +111,7 @@ def test_the_result_takes_the_place_of_the_lowest():
             Item(4, replace(box(1.0, -1.0, 1.0, 3.0), name="knife")),
         )
     )
-    change = booleans.subtracted(sketch, Selection.of(4, 3))
+    change = boolean.subtracted(sketch, Selection.of(4, 3))
     assert change.words == "1 obstacle cut out of polygon “desk”"
     keys = [item.key for item in change.sketch.obstacles]
     assert keys[:2] == [5, 3]
@@ -135,7 +135,7 @@ def test_the_result_takes_the_place_of_the_lowest():
 def test_what_cannot_be_is_said(name, shapes, words):
     sketch, keys = Sketch().added(shapes)
     with pytest.raises(MapError, match=words):
-        getattr(booleans, name)(sketch, Selection.of(*keys))
+        getattr(boolean, name)(sketch, Selection.of(*keys))
 
 
 @given(sound_shapes(), st.sampled_from([0.05, 0.3, 1.0, -0.05, -0.2]))
@@ -143,7 +143,7 @@ def test_an_offset_is_as_far_away_as_asked(shape, by):
     sketch, (key,) = Sketch().added([shape])
     before = shape.polygon
     try:
-        change = booleans.offset(sketch, Selection.of(key), by)
+        change = boolean.offset(sketch, Selection.of(key), by)
     except MapError as error:
         assert "nothing would be left" in str(error)
         assert by < 0
@@ -169,32 +169,32 @@ def test_what_sticks_out_is_cut_off():
         CircleObstacle((30.0, 4.0), 1.0, "outside"),
     ]
     sketch, _ = Sketch(boundary=HALL).added(shapes)
-    change = booleans.clipped(sketch, Selection())
+    change = boolean.clipped(sketch, Selection())
     assert change.words == "2 obstacles cut off at the boundary"
     inside, half = change.sketch.obstacles
     assert inside is sketch.obstacles[0]
     assert half.shape.polygon.area == pytest.approx(np.pi / 2, abs=5e-3)
     assert shapely.Polygon(HALL).covers(half.geometry)
     with pytest.raises(MapError, match="nothing sticks out"):
-        booleans.clipped(change.sketch, Selection())
+        boolean.clipped(change.sketch, Selection())
     with pytest.raises(MapError, match="boundary must be sound"):
-        booleans.clipped(replace(sketch, boundary=None), Selection())
+        boolean.clipped(replace(sketch, boundary=None), Selection())
 
 
 def test_crossing_outlines_are_repaired():
     bow_tie = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
     sketch = Sketch("n", boundary=((0.0, 0.0), (8.0, 8.0), (8.0, 0.0), (0.0, 8.0), (0.0, 7.0)))
     sketch, keys = sketch.added([PolygonObstacle(bow_tie, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)])
-    change = booleans.repaired(sketch, Selection())
+    change = boolean.repaired(sketch, Selection())
     assert change.words == "2 outlines repaired"
     assert not [problem for problem in problems(change.sketch) if problem.grave]
     assert sum(item.geometry.area for item in change.sketch.obstacles[:2]) == pytest.approx(2.0)
     assert change.sketch.obstacles[-1] is sketch.obstacles[-1]
     assert change.selection.boundary
     with pytest.raises(MapError, match="nothing to repair"):
-        booleans.repaired(change.sketch, Selection())
+        boolean.repaired(change.sketch, Selection())
     # of what is selected only
-    only = booleans.repaired(sketch, Selection.of(keys[0]))
+    only = boolean.repaired(sketch, Selection.of(keys[0]))
     assert only.sketch.boundary == sketch.boundary
 
 
@@ -202,7 +202,7 @@ def test_crossing_outlines_are_repaired():
 def test_walls_and_circles_become_the_polygons_that_they_are(sketch):
     keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
     assume(keys)
-    change = edits.made_polygons(sketch, Selection.of(*keys))
+    change = properties.made_polygons(sketch, Selection.of(*keys))
     assert all(isinstance(item.shape, PolygonObstacle) for item in change.sketch.obstacles)
     difference = covered(change.sketch) ^ covered(sketch)
     assert difference.area <= 1e-4 * sum(item.geometry.length for item in sketch.obstacles)

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map
-from robocov_app.editor.edits import edits
+from robocov_app.editor.edits import transform
 from robocov_app.editor.edits.clipboard import copied, pasted
-from robocov_app.editor.model.document import Sketch, sketch_text
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch, sketch_text
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5)
@@ -39,7 +39,7 @@ def test_what_is_copied_comes_back(sketch):
 def test_it_comes_where_the_cursor_is(sketch, at):
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
     change = pasted(sketch, copied(sketch, whole), at)
-    low_x, low_y, high_x, high_y = edits.bounds_of(change.sketch, change.selection)
+    low_x, low_y, high_x, high_y = transform.bounds_of(change.sketch, change.selection)
     assert ((low_x + high_x) / 2, (low_y + high_y) / 2) == pytest.approx(at, abs=2e-4)
     assert len(change.sketch.obstacles) == 2 * len(sketch.obstacles)
     assert change.sketch.obstacles[: len(sketch.obstacles)] == sketch.obstacles

@@ -14,10 +14,11 @@ from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedPolygo
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
-from robocov_app.editor.edits import densities
-from robocov_app.editor.model.document import Sketch, parse_sketch, sketch_of, sketch_text
-from robocov_app.editor.model.files import opened, saved
-from robocov_app.editor.model.problems import problems
+from robocov_app.editor.edits import density as density_edits
+from robocov_app.editor.model.file import opened, saved
+from robocov_app.editor.model.parser import parse_sketch, sketch_of
+from robocov_app.editor.model.sketch import Sketch, sketch_text
+from robocov_app.editor.model.validation import problems
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
@@ -75,46 +76,46 @@ def test_a_density_that_is_nothing_in_the_free_space_is_a_problem():
 
 class TestEdits:
     def test_the_first_hot_spot_stands_on_a_floor_of_one(self):
-        change = densities.peak_added(sheet(), (3.0, 4.0), 1.5, 4.0)
+        change = density_edits.peak_added(sheet(), (3.0, 4.0), 1.5, 4.0)
         assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
-        two = densities.peak_added(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
-        assert len(densities.peaks_of(two)) == 2
-        assert densities.peak_added(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
+        two = density_edits.peak_added(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
+        assert len(density_edits.peaks_of(two)) == 2
+        assert density_edits.peak_added(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
 
     def test_with_the_last_one_the_density_goes(self):
-        assert densities.peak_removed(heavy(), 0).sketch.density is None
-        assert densities.density_removed(heavy()).sketch.density is None
+        assert density_edits.peak_removed(heavy(), 0).sketch.density is None
+        assert density_edits.density_removed(heavy()).sketch.density is None
         with pytest.raises(MapError, match="the same already"):
-            densities.density_removed(sheet())
+            density_edits.density_removed(sheet())
 
     def test_move_size_weigh(self):
-        moved = densities.peak_moved(heavy(), 0, (4.0, 5.0)).sketch
-        assert densities.peaks_of(moved)[0].center == (4.0, 5.0)
-        sized = densities.peak_sized(moved, 0, 2.5).sketch
-        assert densities.peaks_of(sized)[0].sigma == 2.5
-        weighed = densities.peak_weighed(sized, 0, 7.0).sketch
+        moved = density_edits.peak_moved(heavy(), 0, (4.0, 5.0)).sketch
+        assert density_edits.peaks_of(moved)[0].center == (4.0, 5.0)
+        sized = density_edits.peak_sized(moved, 0, 2.5).sketch
+        assert density_edits.peaks_of(sized)[0].sigma == 2.5
+        weighed = density_edits.peak_weighed(sized, 0, 7.0).sketch
         assert weighed.density == Gaussians((Gaussian((4.0, 5.0), 7.0, sigma=2.5),), 0.5)
-        assert densities.floor_set(weighed, 0.0).sketch.density.floor == 0.0
+        assert density_edits.floor_set(weighed, 0.0).sketch.density.floor == 0.0
 
     def test_one_that_is_not_round_keeps_its_shape(self):
         slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
         sketch = heavy(Gaussians((slanted,), 0.5))
-        spread = densities.spread_of(slanted)
-        twice = densities.peaks_of(densities.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
-        assert densities.spread_of(twice) == pytest.approx(2.0 * spread)
+        spread = density_edits.spread_of(slanted)
+        twice = density_edits.peaks_of(density_edits.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
+        assert density_edits.spread_of(twice) == pytest.approx(2.0 * spread)
         assert np.array(twice.matrix) == pytest.approx(4.0 * np.array(slanted.matrix))
 
     @pytest.mark.parametrize(
         ("act", "words"),
         [
-            (lambda: densities.peak_added(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
-            (lambda: densities.peak_added(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: 0"),
-            (lambda: densities.peak_added(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
-            (lambda: densities.peak_weighed(heavy(), 0, float("nan")), "weight: nan"),
-            (lambda: densities.peak_weighed(heavy(), 0, 1e9), "weight: 1e"),
-            (lambda: densities.peak_moved(heavy(), 5, (1.0, 1.0)), "no such hot spot"),
-            (lambda: densities.floor_set(sheet(), 0.0), "weight: 0"),
-            (lambda: densities.peak_added(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
+            (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
+            (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: 0"),
+            (lambda: density_edits.peak_added(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
+            (lambda: density_edits.peak_weighed(heavy(), 0, float("nan")), "weight: nan"),
+            (lambda: density_edits.peak_weighed(heavy(), 0, 1e9), "weight: 1e"),
+            (lambda: density_edits.peak_moved(heavy(), 5, (1.0, 1.0)), "no such hot spot"),
+            (lambda: density_edits.floor_set(sheet(), 0.0), "weight: 0"),
+            (lambda: density_edits.peak_added(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
         ],
     )
     def test_what_cannot_be(self, act, words):
@@ -128,15 +129,15 @@ class TestEdits:
     )
     @settings(max_examples=15, deadline=None)
     def test_whatever_is_drawn_can_be_saved(self, center, sigma, weight):
-        sketch = densities.peak_added(heavy(), center, sigma, weight).sketch
+        sketch = density_edits.peak_added(heavy(), center, sigma, weight).sketch
         assert parse_sketch(sketch_text(sketch), "again").density == sketch.density
         assert sketch.environment().density == sketch.density
 
     def test_in_words(self):
-        assert densities.density_words(None) == "none: every place counts the same"
-        assert densities.density_words(ONE) == "1 hot spot, floor 0.5"
-        assert densities.density_words(KINDS["bilinear"]) == "picture, 13 x 11"
-        assert densities.density_words(KINDS["rooms"]) == "polygons, 0.3 to 4"
+        assert density_edits.density_words(None) == "none: every place counts the same"
+        assert density_edits.density_words(ONE) == "1 hot spot, floor 0.5"
+        assert density_edits.density_words(KINDS["bilinear"]) == "picture, 13 x 11"
+        assert density_edits.density_words(KINDS["rooms"]) == "polygons, 0.3 to 4"
 
 
 def test_with_the_mouse_and_by_typing(tmp_path):
@@ -144,29 +145,29 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         plain = hands.picture()
         hands.key("d")
         hands.drag(*(hands.pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
-        (peak,) = densities.peaks_of(hands.sketch)
+        (peak,) = density_edits.peaks_of(hands.sketch)
         assert peak.center == pytest.approx((3.0, 3.0), abs=0.06)
         assert peak.sigma == pytest.approx(2.0, abs=0.1) and peak.weight == 4.0
         assert not hands.same(plain)
         hands.type("6.5")
         hands.key("return")
-        assert densities.peaks_of(hands.sketch)[0].weight == 6.5
+        assert density_edits.peaks_of(hands.sketch)[0].weight == 6.5
         # the rim
         rim = hands.pixel((peak.center[0], peak.center[1] + peak.sigma))
         hands.wait()
         hands.drag(rim, *(hands.pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
-        assert densities.peaks_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
+        assert density_edits.peaks_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
         # the middle
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in (peak.center, (4, 4), (6, 5))))
-        assert densities.peaks_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
+        assert density_edits.peaks_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
-        assert [each.weight for each in densities.peaks_of(hands.sketch)] == [6.5, 6.5]
+        assert [each.weight for each in density_edits.peaks_of(hands.sketch)] == [6.5, 6.5]
         hands.key("backspace")
-        assert len(densities.peaks_of(hands.sketch)) == 1
+        assert len(density_edits.peaks_of(hands.sketch)) == 1
         hands.key("ctrl+z")
-        assert len(densities.peaks_of(hands.sketch)) == 2
+        assert len(density_edits.peaks_of(hands.sketch)) == 2
         hands.wait()
         hands.click_at((6.0, 5.0))
         assert hands.desk.tool.chosen == 0
@@ -175,7 +176,7 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         hands.command("floor 0.2")
         hands.command("weight 3")
         assert hands.sketch.density.floor == 0.2 and hands.desk.tool.weight == 3.0
-        assert densities.density_words(hands.sketch.density) == "2 hot spots, floor 0.2"
+        assert density_edits.density_words(hands.sketch.density) == "2 hot spots, floor 0.2"
         hands.command("density none")
         assert hands.sketch.density is None
         hands.command("density some")
@@ -192,4 +193,4 @@ def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
         assert hands.desk.tool.change is not None
         hands.key("escape")
         hands.release()
-        assert hands.sketch.density is None and not hands.desk.paper.history.can_undo
+        assert hands.sketch.density is None and not hands.desk.document.history.can_undo

@@ -9,8 +9,8 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.model.document import BOUNDARY
 from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.snapping import KINDS
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui import actions

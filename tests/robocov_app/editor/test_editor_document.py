@@ -24,17 +24,9 @@ from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
 from robocov_app.editor.edits import vertices
 from robocov_app.editor.model.annotations import annotated, taken_apart
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import (
-    BOUNDARY,
-    Item,
-    Sketch,
-    draft_document,
-    geometry_of,
-    parse_sketch,
-    sketch_of,
-    sketch_text,
-)
+from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch, draft_document, geometry_of, sketch_text
 
 EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 

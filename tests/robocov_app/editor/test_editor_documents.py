@@ -15,10 +15,10 @@ from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
-from robocov_app.editor.edits import edits
-from robocov_app.editor.model.drafts import FOLDER as DRAFTS
-from robocov_app.editor.model.drafts import left_behind
-from robocov_app.editor.model.paper import Paper
+from robocov_app.editor.edits import create
+from robocov_app.editor.model.autosave import FOLDER as DRAFTS
+from robocov_app.editor.model.autosave import recoverable
+from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.opening import EditorOpening, offer
@@ -42,7 +42,7 @@ def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
     hands.type("plan")
     hands.key("return")
     assert hands.desk.asked is None and load_map(tmp_path / "plan.json").obstacles
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
     assert hands.desk.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
     assert hands.desk.recent == [str(tmp_path / "plan.json")]
@@ -66,26 +66,26 @@ def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path:
 
 
 def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(edits.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.desk.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.window.frame(0.0)
     hands.key("ctrl+s")
     hands.key("return")
     assert "as a draft" in hands.said
-    assert Paper.opened(tmp_path / "untitled.json", None).history.sketch == hands.sketch.renumbered()
+    assert Document.opened(tmp_path / "untitled.json", None).history.sketch == hands.sketch.renumbered()
 
 
 def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     for name in ("nowhere/plan.json", "a\0b"):
         hands.key("ctrl+s")
         hands.key("ctrl+backspace")
         hands.desk.asked.text = name
         hands.key("return")
-        assert hands.desk.trouble and hands.desk.paper.unsaved, name
+        assert hands.desk.trouble and hands.desk.document.unsaved, name
 
 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     assert asked(hands) == "Save the changes?"
     hands.key("escape")
@@ -100,15 +100,15 @@ def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_pat
 
 
 def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.key("d")
-    assert hands.shapes == [] and hands.desk.paper.title == "Untitled"
-    assert left_behind(tmp_path / "drafts") == ()
+    assert hands.shapes == [] and hands.desk.document.title == "Untitled"
+    assert recoverable(tmp_path / "drafts") == ()
 
 
 def test_answers_are_clicked_too(hands: Hands) -> None:
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.window.draw()
     boxes = {k: box for box, k in hands.window.dialogs._boxes}
@@ -121,7 +121,7 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
 
 
 def test_the_mouse_over_a_list_that_has_gone_chooses_nothing_in_the_question_after_it(hands: Hands) -> None:
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+shift+o")
     hands.window.draw()
     box = max((box for box, k in hands.window.dialogs._boxes if k == 7), key=lambda box: box.width)
@@ -138,12 +138,12 @@ def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: 
     hands.type("ell")
     hands.key("tab")
     hands.key("return")
-    assert hands.desk.paper.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
+    assert hands.desk.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
     hands.key("ctrl+shift+o")
     assert isinstance(hands.desk.asked, Picker)
     hands.type("rooms")
     hands.key("return")
-    assert hands.desk.paper.path is None and len(hands.shapes) == 18
+    assert hands.desk.document.path is None and len(hands.shapes) == 18
     hands.key("ctrl+o")
     hands.type("missing.txt")
     hands.key("return")
@@ -166,14 +166,14 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     hands.window.frame(2.0)
     assert asked(hands) == "The file has changed"
     hands.key("r")
-    assert hands.shapes == [] and not hands.desk.paper.unsaved
+    assert hands.shapes == [] and not hands.desk.document.unsaved
     hands.key("ctrl+z")
     assert len(hands.shapes) == 1
     touched(path, json.dumps({**document, "name": "Again"}))
     hands.window.frame(2.0)
     hands.window.frame(2.0)
     hands.key("k")
-    assert len(hands.shapes) == 1 and hands.desk.paper.unsaved
+    assert len(hands.shapes) == 1 and hands.desk.document.unsaved
     hands.key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
@@ -206,8 +206,8 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     assert hands.desk.asked.text == "untitled.svg"
     hands.key("return")
     first = (tmp_path / "untitled.svg").read_text()
-    assert "<svg" in first and "exported" in hands.said and hands.desk.paper.path is None
-    hands.desk.change(edits.circle_drawn(hands.sketch, (2, 2), 0.5))
+    assert "<svg" in first and "exported" in hands.said and hands.desk.document.path is None
+    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+e")
     hands.key("return")
     assert asked(hands) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
@@ -218,7 +218,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands.type("plan.xyz")
     hands.key("return")
     assert hands.desk.trouble and "unknown format" in hands.said
-    hands.desk.change(edits.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.desk.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.key("ctrl+e")
     assert hands.desk.trouble and hands.desk.asked is None
 
@@ -261,29 +261,29 @@ def test_settings_are_remembered(places: Path) -> None:
 
 
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
-    lost = Paper(sheet(), places / "drafts")
-    lost.history.do(edits.circle_drawn(lost.history.sketch, (5, 5), 1.0))
+    lost = Document(sheet(), places / "drafts")
+    lost.history.do(create.circle_drawn(lost.history.sketch, (5, 5), 1.0))
     lost.keep()
     lost.flush()
     lost.close(discard=False)
     with opening(places).window() as window:
         assert isinstance(window.desk.asked, Question) and "Recover" in window.desk.asked.title
         window.dialogs.key("r")
-        assert len(window.desk.sketch.obstacles) == 1 and window.desk.paper.unsaved
+        assert len(window.desk.sketch.obstacles) == 1 and window.desk.document.unsaved
     # the window went without a decision: it is offered again
     with opening(places).window() as window:
         assert window.desk.asked is not None
         window.dialogs.key("l")
-        offer(window, left_behind(places / "drafts"))
+        offer(window, recoverable(places / "drafts"))
         window.dialogs.key("d")
         window.documents.leaving = True
-    assert left_behind(places / "drafts") == ()
+    assert recoverable(places / "drafts") == ()
 
 
 def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -> None:
-    paper = Paper.new(places / "drafts")
-    paper.save(places / "plan.json")
-    paper.flush()
+    document = Document.new(places / "drafts")
+    document.save(places / "plan.json")
+    document.flush()
     with (
         pytest.raises(InputError, match="another editor has it open"),
         opening(places, places / "plan.json").window(),
@@ -293,12 +293,12 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
         window.desk.attempt(lambda: window.documents.open(places / "plan.json"))
         assert window.desk.trouble and "another editor" in window.desk.message
         window.documents.leaving = True
-    paper.close(discard=True)
+    document.close(discard=True)
 
 
 def test_a_new_name_is_a_new_map(places: Path) -> None:
     with opening(places, places / "fresh.json").window() as window:
-        assert window.desk.paper.title == "fresh.json" and not window.desk.paper.unsaved
+        assert window.desk.document.title == "fresh.json" and not window.desk.document.unsaved
         window.desk.attempt(window.documents.save)
         window.documents.leaving = True
     assert load_map(places / "fresh.json").area == 100.0
@@ -357,7 +357,7 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
         end = time.monotonic() + 60.0
         while window.desk.asked is not None and time.monotonic() < end:
             window.frame(0.01)
-        assert window.desk.paper.path is None and window.desk.paper.unsaved
+        assert window.desk.document.path is None and window.desk.document.unsaved
         assert window.desk.sketch.environment().free_area == 12.0
         window.documents.leaving = True
 

@@ -18,12 +18,12 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.edits import edits
-from robocov_app.editor.edits.affine import Affine
+from robocov_app.editor.edits import create, properties, transform
+from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.document import BOUNDARY, Sketch
-from robocov_app.editor.model.plane import cos_sin, ring_near, rounded, tenths
+from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenths
 from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")
@@ -47,87 +47,87 @@ ALL = Selection(frozenset({0, 1, 2}), frozenset(), frozenset({"corner", "two", "
 
 
 def test_what_is_drawn_lies_on_top_and_is_selected(sketch):
-    change = edits.circle_drawn(sketch, (2.00004, 3.0), 0.70001)
+    change = create.circle_drawn(sketch, (2.00004, 3.0), 0.70001)
     item = change.sketch.obstacles[-1]
     assert item.shape == CircleObstacle((2.0, 3.0), 0.7)
     assert change.selection == Selection.of(item.key)
     assert change.words == "circle drawn"
-    wall = edits.wall_drawn(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
+    wall = create.wall_drawn(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
     assert wall.sketch.obstacles[-1].shape == WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15)
-    box = edits.rectangle_drawn(sketch, (3.0, 2.0), (1.0, 5.0))
+    box = create.rectangle_drawn(sketch, (3.0, 2.0), (1.0, 5.0))
     assert box.sketch.obstacles[-1].shape.vertices == ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
-    ring = edits.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
+    ring = create.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
     assert ring.sketch.obstacles[-1].shape.vertices == ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-    crossing = edits.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
+    crossing = create.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
     assert len(crossing.sketch.obstacles) == 4
 
 
 def test_boundary_and_starts_are_drawn(sketch):
     ring = [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0)]
-    assert edits.boundary_drawn(Sketch(), ring).words == "boundary drawn"
-    change = edits.boundary_drawn(sketch, ring)
+    assert create.boundary_drawn(Sketch(), ring).words == "boundary drawn"
+    change = create.boundary_drawn(sketch, ring)
     assert change.sketch.boundary == tuple(ring)
     assert change.selection == Selection(boundary=True)
     assert change.words == "boundary drawn anew"
-    change = edits.disc_start_drawn(sketch, (2.0, 2.0), 0.5)
+    change = create.disc_start_drawn(sketch, (2.0, 2.0), 0.5)
     assert change.sketch.starts[-1] == ("start", DiscStart((2.0, 2.0), 0.5))
-    change = edits.disc_start_drawn(change.sketch, (2.0, 2.0), 0.5)
+    change = create.disc_start_drawn(change.sketch, (2.0, 2.0), 0.5)
     assert change.sketch.starts[-1][0] == "start 2"
     assert change.selection == Selection.of("start 2")
-    change = edits.points_start_drawn(sketch, [(1.0, 1.0), (2.0, 1.0), (1.0, 1.00001)], "mine")
+    change = create.points_start_drawn(sketch, [(1.0, 1.0), (2.0, 1.0), (1.0, 1.00001)], "mine")
     assert change.sketch.starts[-1] == ("mine", PointsStart(((1.0, 1.0), (2.0, 1.0))))
-    change = edits.start_point_added(change.sketch, "mine", (3.0, 1.0))
+    change = create.start_point_added(change.sketch, "mine", (3.0, 1.0))
     assert change.sketch.start("mine") == PointsStart(((1.0, 1.0), (2.0, 1.0), (3.0, 1.0)))
-    assert edits.uniform_start_added(sketch).sketch.start("start") == UniformStart()
+    assert create.uniform_start_added(sketch).sketch.start("start") == UniformStart()
 
 
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: edits.polygon_drawn(s, [(0, 0), (1, 1)]), "three corners"),
-        (lambda s: edits.polygon_drawn(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
-        (lambda s: edits.rectangle_drawn(s, (0, 0), (0, 3)), "a width and a height"),
-        (lambda s: edits.circle_drawn(s, (0, 0), 0.0), "needs a radius"),
-        (lambda s: edits.circle_drawn(s, (math.nan, 0), 1.0), "too far away"),
-        (lambda s: edits.circle_drawn(s, (1e8, 0), 1.0), "too far away"),
-        (lambda s: edits.wall_drawn(s, [(1, 1), (1, 1)], 0.1), "two points that are apart"),
-        (lambda s: edits.wall_drawn(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
-        (lambda s: edits.boundary_drawn(s, [(1, 1), (2, 1)]), "three corners"),
-        (lambda s: edits.disc_start_drawn(s, (1, 1), 0.0), "needs a radius"),
-        (lambda s: edits.disc_start_drawn(s, (1, 1), 1.0, "corner"), "a start “corner” already"),
-        (lambda s: edits.points_start_drawn(s, []), "a place for a robot"),
-        (lambda s: edits.start_point_added(s, "corner", (1, 1)), "made of places"),
-        (lambda s: edits.start_point_added(s, "two", (9.0, 1.0)), "a robot's place already"),
-        (lambda s: edits.moved(s, Selection(), 1, 1), "select something"),
-        (lambda s: edits.moved(s, ALL, 1e9, 1), "too far away"),
-        (lambda s: edits.moved(s, ALL, math.nan, 1), "too far away"),
-        (lambda s: edits.rotated(s, ALL, math.inf), "an angle"),
-        (lambda s: edits.scaled(s, ALL, 0.0), "a factor that is not 0"),
-        (lambda s: edits.scaled(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
-        (lambda s: edits.resized(s, Selection.of(0), None, None), "a width or a height"),
-        (lambda s: edits.resized(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
-        (lambda s: edits.resized(s, Selection.of("all"), 1.0, None), "select something"),
-        (lambda s: edits.mirrored(s, ALL, "z"), "an axis x or y"),
-        (lambda s: edits.mirrored_across(s, ALL, (1, 1), (1, 1)), "two points that are apart"),
-        (lambda s: edits.duplicated(s, Selection(boundary=True)), "obstacles or starts to copy"),
-        (lambda s: edits.arrayed(s, ALL, 1, 1, 1.0, 1.0), "two columns or rows"),
-        (lambda s: edits.arrayed(s, ALL, 1000, 1000, 1.0, 1.0), "more than 10000"),
-        (lambda s: edits.deleted(s, Selection()), "select something"),
-        (lambda s: edits.renamed(s, "corner", " "), "a start needs a name"),
-        (lambda s: edits.renamed(s, "corner", "two"), "a start “two” already"),
-        (lambda s: edits.renamed(s, 0, "x" * 101), "at most 100 characters"),
-        (lambda s: edits.renamed(s, 0, "a\x00b"), "text on one line"),
-        (lambda s: edits.renamed(s, BOUNDARY, "b"), "boundary has no name"),
-        (lambda s: edits.noted(s, Selection.of("corner"), "x"), "select obstacles"),
-        (lambda s: edits.titled(s, ""), "a map needs a name"),
-        (lambda s: edits.titled(s, None, "x" * 10001), "at most 10000"),
-        (lambda s: edits.widened(s, Selection.of(0), 0.2), "select walls"),
-        (lambda s: edits.widened(s, ALL, -0.2), "at least 1 mm"),
-        (lambda s: edits.sized(s, Selection.of(0), 0.2), "select circles"),
-        (lambda s: edits.raised(s, ALL, "left"), "top, up, down or bottom"),
-        (lambda s: edits.start_first(s, "none"), "no start “none”"),
-        (lambda s: edits.made_polygons(s, Selection.of(0)), "select circles or walls"),
-        (lambda s: edits.made_boundary(s, Selection.of(1)), "select one polygon"),
+        (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1)]), "three corners"),
+        (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
+        (lambda s: create.rectangle_drawn(s, (0, 0), (0, 3)), "a width and a height"),
+        (lambda s: create.circle_drawn(s, (0, 0), 0.0), "needs a radius"),
+        (lambda s: create.circle_drawn(s, (math.nan, 0), 1.0), "too far away"),
+        (lambda s: create.circle_drawn(s, (1e8, 0), 1.0), "too far away"),
+        (lambda s: create.wall_drawn(s, [(1, 1), (1, 1)], 0.1), "two points that are apart"),
+        (lambda s: create.wall_drawn(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
+        (lambda s: create.boundary_drawn(s, [(1, 1), (2, 1)]), "three corners"),
+        (lambda s: create.disc_start_drawn(s, (1, 1), 0.0), "needs a radius"),
+        (lambda s: create.disc_start_drawn(s, (1, 1), 1.0, "corner"), "a start “corner” already"),
+        (lambda s: create.points_start_drawn(s, []), "a place for a robot"),
+        (lambda s: create.start_point_added(s, "corner", (1, 1)), "made of places"),
+        (lambda s: create.start_point_added(s, "two", (9.0, 1.0)), "a robot's place already"),
+        (lambda s: transform.moved(s, Selection(), 1, 1), "select something"),
+        (lambda s: transform.moved(s, ALL, 1e9, 1), "too far away"),
+        (lambda s: transform.moved(s, ALL, math.nan, 1), "too far away"),
+        (lambda s: transform.rotated(s, ALL, math.inf), "an angle"),
+        (lambda s: transform.scaled(s, ALL, 0.0), "a factor that is not 0"),
+        (lambda s: transform.scaled(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
+        (lambda s: transform.resized(s, Selection.of(0), None, None), "a width or a height"),
+        (lambda s: transform.resized(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
+        (lambda s: transform.resized(s, Selection.of("all"), 1.0, None), "select something"),
+        (lambda s: transform.mirrored(s, ALL, "z"), "an axis x or y"),
+        (lambda s: transform.mirrored_across(s, ALL, (1, 1), (1, 1)), "two points that are apart"),
+        (lambda s: transform.duplicated(s, Selection(boundary=True)), "obstacles or starts to copy"),
+        (lambda s: transform.arrayed(s, ALL, 1, 1, 1.0, 1.0), "two columns or rows"),
+        (lambda s: transform.arrayed(s, ALL, 1000, 1000, 1.0, 1.0), "more than 10000"),
+        (lambda s: properties.deleted(s, Selection()), "select something"),
+        (lambda s: properties.renamed(s, "corner", " "), "a start needs a name"),
+        (lambda s: properties.renamed(s, "corner", "two"), "a start “two” already"),
+        (lambda s: properties.renamed(s, 0, "x" * 101), "at most 100 characters"),
+        (lambda s: properties.renamed(s, 0, "a\x00b"), "text on one line"),
+        (lambda s: properties.renamed(s, BOUNDARY, "b"), "boundary has no name"),
+        (lambda s: properties.noted(s, Selection.of("corner"), "x"), "select obstacles"),
+        (lambda s: properties.titled(s, ""), "a map needs a name"),
+        (lambda s: properties.titled(s, None, "x" * 10001), "at most 10000"),
+        (lambda s: properties.widened(s, Selection.of(0), 0.2), "select walls"),
+        (lambda s: properties.widened(s, ALL, -0.2), "at least 1 mm"),
+        (lambda s: properties.sized(s, Selection.of(0), 0.2), "select circles"),
+        (lambda s: properties.raised(s, ALL, "left"), "top, up, down or bottom"),
+        (lambda s: properties.start_first(s, "none"), "no start “none”"),
+        (lambda s: properties.made_polygons(s, Selection.of(0)), "select circles or walls"),
+        (lambda s: properties.made_boundary(s, Selection.of(1)), "select one polygon"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(sketch, deed, words):
@@ -144,7 +144,7 @@ def everything(sketch: Sketch) -> shapely.Geometry:
     return shapely.GeometryCollection([*shapes, shapely.Polygon(sketch.boundary)])
 
 
-def apart(a: shapely.Geometry, b: shapely.Geometry) -> float:
+def distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
     """The largest distance between corresponding vertices."""
     first, second = shapely.get_coordinates(a), shapely.get_coordinates(b)
     assert len(first) == len(second)
@@ -153,29 +153,29 @@ def apart(a: shapely.Geometry, b: shapely.Geometry) -> float:
 
 @given(sound_sketches(least=1), st.sampled_from([0.0, 1.0, -2.7, 0.1234]), places)
 def test_moving_is_what_shapely_says(sketch, dx, about):
-    change = edits.moved(sketch, Selection.all(sketch), dx, 0.5)
+    change = transform.moved(sketch, Selection.all(sketch), dx, 0.5)
     expected = affinity.translate(everything(sketch), dx, 0.5)
-    assert apart(everything(change.sketch), expected) <= 1e-4
-    back = edits.moved(change.sketch, change.selection, -dx, -0.5).sketch
+    assert distance(everything(change.sketch), expected) <= 1e-4
+    back = transform.moved(change.sketch, change.selection, -dx, -0.5).sketch
     assert back == sketch
 
 
 @given(sound_sketches(least=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), places)
 def test_turning_is_what_shapely_says(sketch, degrees, about):
     polygons = [item.key for item in sketch.obstacles if isinstance(item.shape, PolygonObstacle)]
-    change = edits.rotated(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
+    change = transform.rotated(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
     for key in polygons:
         expected = affinity.rotate(sketch.item(key).shape.polygon, degrees, origin=about)
-        assert apart(change.sketch.item(key).shape.polygon, expected) <= 1e-4
+        assert distance(change.sketch.item(key).shape.polygon, expected) <= 1e-4
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
     quarter = sketch
     for _ in range(4):
-        quarter = edits.rotated(quarter, whole, 90.0, about).sketch
+        quarter = transform.rotated(quarter, whole, 90.0, about).sketch
     assert quarter == sketch, "a whole turn in quarters is exact"
 
 
 def test_circles_walls_and_starts_turn_too(sketch):
-    change = edits.rotated(sketch, ALL, 90.0, (0.0, 0.0))
+    change = transform.rotated(sketch, ALL, 90.0, (0.0, 0.0))
     assert change.sketch.item(1).shape == replace(PILLAR, center=(-4.0, 6.0))
     assert change.sketch.item(2).shape.points == ((0.0, 5.0), (-2.4, 5.0), (-2.4, 7.0))
     assert change.sketch.start("corner") == DiscStart((-5.0, 1.0), 0.8)
@@ -183,7 +183,7 @@ def test_circles_walls_and_starts_turn_too(sketch):
     assert change.sketch.start("all") == UniformStart()
     assert change.sketch.boundary == ((0.0, 0.0), (0.0, 12.0), (-8.0, 12.0), (-8.0, 0.0))
     # about its middle by default
-    assert edits.rotated(sketch, Selection.of(0), 90.0).sketch.item(0).shape.vertices == (
+    assert transform.rotated(sketch, Selection.of(0), 90.0).sketch.item(0).shape.vertices == (
         (2.5, 0.5),
         (2.5, 2.5),
         (1.5, 2.5),
@@ -192,7 +192,7 @@ def test_circles_walls_and_starts_turn_too(sketch):
 
 
 def test_scaling_both_ways_grows_radii_and_widths(sketch):
-    change = edits.scaled(sketch, ALL, 2.0, about=(0.0, 0.0))
+    change = transform.scaled(sketch, ALL, 2.0, about=(0.0, 0.0))
     assert change.sketch.item(1).shape == CircleObstacle((12.0, 8.0), 1.0, "pillar")
     assert change.sketch.item(2).shape == WallObstacle(((10.0, 0.0), (10.0, 4.8), (14.0, 4.8)), 0.2)
     assert change.sketch.start("corner") == DiscStart((2.0, 10.0), 1.6)
@@ -200,29 +200,29 @@ def test_scaling_both_ways_grows_radii_and_widths(sketch):
 
 
 def test_stretching_makes_polygons_of_circles_and_keeps_the_width_of_walls(sketch):
-    change = edits.scaled(sketch, Selection.of(0, 1, 2), 2.0, 1.0, (0.0, 0.0))
+    change = transform.scaled(sketch, Selection.of(0, 1, 2), 2.0, 1.0, (0.0, 0.0))
     ellipse = change.sketch.item(1).shape
     assert isinstance(ellipse, PolygonObstacle)
     assert ellipse.name == "pillar"
     assert ellipse.polygon.area == pytest.approx(2.0 * PILLAR.polygon.area, rel=1e-3)
     assert change.sketch.item(2).shape.width == 0.1
-    mirrored = edits.scaled(sketch, Selection.of(1), -1.0, 1.0, (0.0, 0.0))
+    mirrored = transform.scaled(sketch, Selection.of(1), -1.0, 1.0, (0.0, 0.0))
     assert mirrored.sketch.item(1).shape == replace(PILLAR, center=(-6.0, 4.0))
 
 
 @given(sound_shapes(), st.sampled_from([0.2, 1.0, 3.7]), st.sampled_from([0.5, 2.0]))
 def test_a_typed_size_is_the_size(shape, width, height):
     sketch, (key,) = Sketch().added([shape])
-    before = edits.bounds_of(sketch, Selection.of(key))
+    before = transform.bounds_of(sketch, Selection.of(key))
     for wanted in ((width, height), (width, None), (None, height)):
         try:
-            change = edits.resized(sketch, Selection.of(key), *wanted)
+            change = transform.resized(sketch, Selection.of(key), *wanted)
         except MapError as error:
             # a level wall is as high as it is wide
             assert isinstance(shape, WallObstacle)
             assert "walls keep their width" in str(error)
             continue
-        low_x, low_y, high_x, high_y = edits.bounds_of(change.sketch, change.selection)
+        low_x, low_y, high_x, high_y = transform.bounds_of(change.sketch, change.selection)
         if wanted[0] is not None:
             assert high_x - low_x == pytest.approx(wanted[0], abs=3e-4)
         if wanted[1] is not None:
@@ -232,23 +232,23 @@ def test_a_typed_size_is_the_size(shape, width, height):
 
 
 def test_a_typed_place_is_the_place(sketch):
-    change = edits.placed(sketch, Selection.of(0), 4.0, None)
-    assert edits.bounds_of(change.sketch, change.selection) == (4.0, 1.0, 6.0, 2.0)
-    change = edits.placed(sketch, Selection.of(1, "corner"), 0.0, 0.0)
-    assert edits.bounds_of(change.sketch, change.selection)[:2] == pytest.approx((0.0, 0.0), abs=1e-4)
+    change = transform.placed(sketch, Selection.of(0), 4.0, None)
+    assert transform.bounds_of(change.sketch, change.selection) == (4.0, 1.0, 6.0, 2.0)
+    change = transform.placed(sketch, Selection.of(1, "corner"), 0.0, 0.0)
+    assert transform.bounds_of(change.sketch, change.selection)[:2] == pytest.approx((0.0, 0.0), abs=1e-4)
 
 
 @given(sound_sketches(least=1), st.sampled_from(["x", "y"]), places, places)
 def test_mirroring_twice_is_nothing(sketch, axis, a, b):
     whole = Selection.all(sketch)
-    twice = edits.mirrored(edits.mirrored(sketch, whole, axis, 1.5).sketch, whole, axis, 1.5).sketch
+    twice = transform.mirrored(transform.mirrored(sketch, whole, axis, 1.5).sketch, whole, axis, 1.5).sketch
     assert twice == sketch
     if math.dist(a, b) > 0.1:
-        once = edits.mirrored_across(sketch, whole, a, b).sketch
+        once = transform.mirrored_across(sketch, whole, a, b).sketch
         for item in sketch.obstacles:
             assert once.item(item.key).geometry.area == pytest.approx(item.geometry.area, abs=0.01)
-        twice = edits.mirrored_across(once, whole, a, b).sketch
-        assert apart(everything(twice), everything(sketch)) <= 2e-4
+        twice = transform.mirrored_across(once, whole, a, b).sketch
+        assert distance(everything(twice), everything(sketch)) <= 2e-4
 
 
 def test_mirroring_keeps_the_line():
@@ -261,26 +261,26 @@ def test_mirroring_keeps_the_line():
 
 def test_single_vertices_go_along_unless_their_owner_does(sketch):
     corner = Vertex(0, 0, 2)
-    change = edits.moved(sketch, Selection(frozenset({1}), frozenset({corner})), 1.0, 0.0)
+    change = transform.moved(sketch, Selection(frozenset({1}), frozenset({corner})), 1.0, 0.0)
     assert change.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
     assert change.sketch.item(1).shape.center == (7.0, 4.0)
-    once = edits.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
+    once = transform.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
     assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).shape(BOX)
-    turned = edits.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
+    turned = transform.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
     assert turned.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
 
 def test_copies(sketch):
-    noted = edits.noted(sketch, Selection.of(0), "oak").sketch
-    change = edits.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
+    noted = properties.noted(sketch, Selection.of(0), "oak").sketch
+    change = transform.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
     assert copy.shape == Affine.shift(1.0, 0.5).shape(BOX)
     assert copy.note == "oak"
     assert change.sketch.start("corner 2") == DiscStart((2.0, 5.5), 0.8)
     assert change.selection == Selection.of(copy.key, "corner 2", "all 2")
-    again = edits.duplicated(change.sketch, change.selection)
+    again = transform.duplicated(change.sketch, change.selection)
     assert "corner 3" in dict(again.sketch.starts)
-    grid = edits.arrayed(sketch, Selection.of(1), 3, 2, 1.5, 2.0)
+    grid = transform.arrayed(sketch, Selection.of(1), 3, 2, 1.5, 2.0)
     centers = [item.shape.center for item in grid.sketch.obstacles if isinstance(item.shape, CircleObstacle)]
     assert centers == [(6.0, 4.0), (7.5, 4.0), (9.0, 4.0), (6.0, 6.0), (7.5, 6.0), (9.0, 6.0)]
     assert len(grid.selection.items) == 6
@@ -291,7 +291,7 @@ def test_copies(sketch):
 
 
 def test_deleting(sketch):
-    change = edits.deleted(
+    change = properties.deleted(
         sketch, Selection(frozenset({0}), frozenset({Vertex(2, 0, 1)}), frozenset({"two"}))
     )
     assert [item.key for item in change.sketch.obstacles] == [1, 2]
@@ -299,31 +299,31 @@ def test_deleting(sketch):
     assert [name for name, _ in change.sketch.starts] == ["corner", "all"]
     assert change.selection == Selection()
     assert change.words == "3 things deleted"
-    assert edits.deleted(sketch, Selection(boundary=True)).sketch.boundary is None
+    assert properties.deleted(sketch, Selection(boundary=True)).sketch.boundary is None
 
 
 def test_names_and_notes(sketch):
-    assert edits.renamed(sketch, 2, " west\twall ").sketch.item(2).shape.name == "west wall"
-    change = edits.renamed(sketch, 0, "")
+    assert properties.renamed(sketch, 2, " west\twall ").sketch.item(2).shape.name == "west wall"
+    change = properties.renamed(sketch, 0, "")
     assert change.sketch.item(0).shape.name is None
     assert change.words == "polygon “desk”: name taken away"
-    change = edits.renamed(sketch, "two", "pair")
+    change = properties.renamed(sketch, "two", "pair")
     assert [name for name, _ in change.sketch.starts] == ["corner", "pair", "all"]
     assert change.selection == Selection.of("pair")
-    change = edits.noted(sketch, Selection.of(0, 2), " ask Ada ")
+    change = properties.noted(sketch, Selection.of(0, 2), " ask Ada ")
     assert [item.note for item in change.sketch.obstacles] == ["ask Ada", "", "ask Ada"]
-    assert edits.noted(change.sketch, Selection.of(0), "").sketch.item(0).note == ""
-    change = edits.titled(sketch, "Office", "One floor.")
+    assert properties.noted(change.sketch, Selection.of(0), "").sketch.item(0).note == ""
+    change = properties.titled(sketch, "Office", "One floor.")
     assert (change.sketch.name, change.sketch.description) == ("Office", "One floor.")
     # halves of characters, which no file could hold, do not come in
-    assert edits.renamed(sketch, 0, "a\ud800b").sketch.item(0).shape.name == "ab"
+    assert properties.renamed(sketch, 0, "a\ud800b").sketch.item(0).shape.name == "ab"
 
 
 def test_widths_and_radii(sketch):
-    change = edits.widened(sketch, ALL, 0.25)
+    change = properties.widened(sketch, ALL, 0.25)
     assert change.sketch.item(2).shape == replace(WALL, width=0.25)
     assert change.words == "wall made 0.25 m wide"
-    change = edits.sized(sketch, ALL, 1.25)
+    change = properties.sized(sketch, ALL, 1.25)
     assert change.sketch.item(1).shape.radius == 1.25
     assert change.sketch.start("corner") == DiscStart((1.0, 5.0), 1.25)
 
@@ -334,38 +334,43 @@ def test_widths_and_radii(sketch):
 )
 def test_order(where, order):
     sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
-    assert [item.key for item in edits.raised(sketch, Selection.of(0), where).sketch.obstacles] == order
+    assert [item.key for item in properties.raised(sketch, Selection.of(0), where).sketch.obstacles] == order
 
 
 def test_several_things_keep_their_order_among_each_other():
     sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
     for where, order in [("up", [0, 3, 1, 2]), ("down", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
-        change = edits.raised(sketch, Selection.of(1, 2), where)
+        change = properties.raised(sketch, Selection.of(1, 2), where)
         assert [item.key for item in change.sketch.obstacles] == order
-    there = edits.raised(sketch, Selection.of(2, 3), "up")
+    there = properties.raised(sketch, Selection.of(2, 3), "up")
     assert there.sketch == sketch
 
 
 def test_starts_have_an_order_and_kinds(sketch):
-    assert edits.start_first(sketch, "all").sketch.starts[0][0] == "all"
-    change = edits.start_replaced(sketch, "corner", UniformStart())
+    assert properties.start_first(sketch, "all").sketch.starts[0][0] == "all"
+    change = properties.start_replaced(sketch, "corner", UniformStart())
     assert change.sketch.starts[0] == ("corner", UniformStart())
 
 
 def test_a_polygon_becomes_the_boundary(sketch):
-    change = edits.made_boundary(sketch, Selection.of(0))
+    change = properties.made_boundary(sketch, Selection.of(0))
     assert change.sketch.boundary == BOX.vertices
     assert [item.key for item in change.sketch.obstacles] == [1, 2]
-    assert edits.underlaid(sketch, Background("p.png", (3, 4))).words == "picture laid under"
+    assert properties.underlaid(sketch, Background("p.png", (3, 4))).words == "picture laid under"
 
 
 def test_bounds(sketch):
-    assert edits.bounds_of(sketch, Selection.of(0)) == (1.0, 1.0, 3.0, 2.0)
-    assert edits.bounds_of(sketch, Selection.of(2)) == pytest.approx((4.95, 0.0, 7.0, 2.45))
-    assert edits.bounds_of(sketch, Selection.of("corner")) == pytest.approx((0.2, 4.2, 1.8, 5.8))
-    assert edits.bounds_of(sketch, Selection(vertices=frozenset({Vertex(0, 0, 0)}))) == (1.0, 1.0, 1.0, 1.0)
-    assert edits.bounds_of(sketch, Selection.of("all")) is None
-    assert edits.bounds_of(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
+    assert transform.bounds_of(sketch, Selection.of(0)) == (1.0, 1.0, 3.0, 2.0)
+    assert transform.bounds_of(sketch, Selection.of(2)) == pytest.approx((4.95, 0.0, 7.0, 2.45))
+    assert transform.bounds_of(sketch, Selection.of("corner")) == pytest.approx((0.2, 4.2, 1.8, 5.8))
+    assert transform.bounds_of(sketch, Selection(vertices=frozenset({Vertex(0, 0, 0)}))) == (
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+    )
+    assert transform.bounds_of(sketch, Selection.of("all")) is None
+    assert transform.bounds_of(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
 
 
 # the plane

@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import load_map
-from robocov_app.editor.model import files
-from robocov_app.editor.model.document import Sketch, sketch_text
-from robocov_app.editor.model.files import ChangedError, opened, saved, state_of
+from robocov_app.editor.model import file
+from robocov_app.editor.model.file import ChangedError, opened, saved, state_of
+from robocov_app.editor.model.sketch import Sketch, sketch_text
 
 SKETCH = Sketch("Hall", boundary=HALL)
 
@@ -123,7 +123,7 @@ def test_what_cannot_be_opened_is_said(tmp_path):
 
 def test_paths_are_absolute(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    disk = saved(SKETCH, files.Path("map.json"))
+    disk = saved(SKETCH, file.Path("map.json"))
     assert disk.path.is_absolute()
     monkeypatch.chdir(tmp_path.parent)
     assert state_of(disk) == "same"

@@ -11,7 +11,7 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.findings import STEM
 from robocov_app.editor.canvas.strips import map_words
-from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.theme import DARK, LIGHT
 
 NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
@@ -36,8 +36,8 @@ def without_message(hands: Hands) -> np.ndarray:
 def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Path, theme: str) -> None:
     red = (LIGHT if theme == "light" else DARK).trajectory
     with opened_editor(tmp_path, sheet(*NARROW), theme=theme) as hands:
-        readout = hands.desk.readout
-        assert readout.gap.width == pytest.approx(0.15) and not readout.impassable.is_empty
+        measurement = hands.desk.measurement
+        assert measurement.gap.width == pytest.approx(0.15) and not measurement.impassable.is_empty
         at = hands.pixel((4.975, 5))
         assert near(without_message(hands), at, red, 6) > 15
         hands.command("radius 0.05")
@@ -50,8 +50,8 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
 def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as hands:
         hands.turn("map")
-        assert len(hands.desk.readout.components) == 2
-        assert not hands.desk.readout.sealed.is_empty
+        assert len(hands.desk.measurement.components) == 2
+        assert not hands.desk.measurement.sealed.is_empty
         words = [entry.text for entry in hands.window.arena.strips._entries]
         assert "cut off" in words
 

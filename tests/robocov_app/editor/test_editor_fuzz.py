@@ -10,8 +10,9 @@ from driven_editor import Hands, of_map, opened_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.model.document import parse_sketch, sketch_text
-from robocov_app.editor.model.readout import readout
+from robocov_app.editor.model.measurement import measure
+from robocov_app.editor.model.parser import parse_sketch
+from robocov_app.editor.model.sketch import sketch_text
 from robocov_app.editor.ui.actions import all_actions
 from robocov_app.editor.ui.panel import TABS
 from robocov_app.editor.ui.typed import COMMANDS
@@ -57,7 +58,7 @@ SHEETS: dict[str, Callable[[], object]] = {
 
 
 class SeldomReadings:
-    """Measures now and then: the readout has tests of its own."""
+    """Measures now and then: the measurement has tests of its own."""
 
     busy = False
 
@@ -72,7 +73,7 @@ class SeldomReadings:
         if self._asked is None or self._count % 40:
             return None
         asked, self._asked = self._asked, None
-        return readout(*asked)
+        return measure(*asked)
 
     def close(self) -> None:
         pass
@@ -199,7 +200,7 @@ def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
         if hands.window.trial is not None:
             hands.window.trial.ended = True
             hands.window.frame(0.0)
-        history = hands.desk.paper.history
+        history = hands.desk.document.history
         last = history.sketch
         undone = 0
         while history.undo() is not None:

@@ -2,10 +2,12 @@ from drawn_sketches import changes, drafts, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov_app.editor.edits import edits
-from robocov_app.editor.model.document import DECIMALS, Sketch, draft_document, sketch_of
+from robocov_app.editor.edits import create, properties, transform
+from robocov_app.editor.model.geometry import DECIMALS
 from robocov_app.editor.model.history import History
+from robocov_app.editor.model.parser import sketch_of
 from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch, draft_document
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
@@ -62,7 +64,7 @@ def test_coordinates_come_out_to_the_tenth_of_a_millimetre(data):
 def drawn(count: int) -> History:
     history = History(Sketch(boundary=HALL))
     for k in range(count):
-        history.do(edits.circle_drawn(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
+        history.do(create.circle_drawn(history.sketch, (k % 12 + 0.5, k % 7 + 0.5), 0.3))
     return history
 
 
@@ -71,16 +73,16 @@ def test_a_drag_is_one_step():
     selection = Selection.of(0)
     before = history.sketch
     for k in range(1, 30):
-        assert history.do(edits.moved(before, selection, 0.1 * k, 0.0), drag="drag 1")
+        assert history.do(transform.moved(before, selection, 0.1 * k, 0.0), drag="drag 1")
     assert history.past == ("circle moved", "circle drawn")
     history.break_drag()
-    history.do(edits.moved(history.sketch, selection, 1.0, 0.0), drag="drag 1")
+    history.do(transform.moved(history.sketch, selection, 1.0, 0.0), drag="drag 1")
     assert len(history.past) == 3
     history.undo()
     history.undo()
     assert history.sketch == before
     # and after undoing, the same drag begins anew
-    history.do(edits.moved(before, selection, 0.1, 0.0), drag="drag 1")
+    history.do(transform.moved(before, selection, 0.1, 0.0), drag="drag 1")
     assert history.past == ("circle moved", "circle drawn")
 
 
@@ -88,9 +90,9 @@ def test_a_drag_that_comes_back_is_none():
     history = drawn(1)
     before = history.sketch
     history.mark_saved()
-    history.do(edits.moved(before, Selection.of(0), 1.0, 0.0), drag=1)
+    history.do(transform.moved(before, Selection.of(0), 1.0, 0.0), drag=1)
     assert history.unsaved
-    history.do(edits.moved(before, Selection.of(0), 0.0, 0.0), drag=1)
+    history.do(transform.moved(before, Selection.of(0), 0.0, 0.0), drag=1)
     assert history.past == ("circle drawn",)
     assert history.sketch == before
     assert not history.unsaved
@@ -102,7 +104,7 @@ def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone():
     assert not history.do(Change(history.sketch, Selection.of(0), "nothing"))
     assert history.can_redo
     assert history.selection == Selection.of(0)
-    history.do(edits.circle_drawn(history.sketch, (5.0, 5.0), 1.0))
+    history.do(create.circle_drawn(history.sketch, (5.0, 5.0), 1.0))
     assert not history.can_redo
 
 
@@ -138,7 +140,7 @@ def test_saved_is_what_the_file_holds_wherever_one_goes():
 def test_undoing_selects_what_was_selected():
     history = drawn(2)
     history.selection = Selection.of(0)
-    history.do(edits.deleted(history.sketch, Selection.of(0)))
+    history.do(properties.deleted(history.sketch, Selection.of(0)))
     assert history.selection == Selection()
     back = history.undo()
     assert back is not None

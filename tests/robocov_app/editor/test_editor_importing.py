@@ -12,7 +12,7 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
 
-from robocov_app.editor.edits.edits import titled
+from robocov_app.editor.edits.properties import titled
 from robocov_app.editor.ui import import_process
 from robocov_app.editor.ui.asking import Question
 from robocov_app.editor.ui.importing import ImportQuestion, options_of
@@ -161,7 +161,11 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.key("return")
     hands.frames(2)
     assert hands.desk.asked is None
-    assert hands.desk.paper.unsaved and hands.desk.paper.path is None and hands.desk.paper.title == "plan"
+    assert (
+        hands.desk.document.unsaved
+        and hands.desk.document.path is None
+        and hands.desk.document.title == "plan"
+    )
     assert hands.sketch.environment().free_area == pytest.approx(56)
     assert hands.said == "imported: plan.png, not saved yet"
 

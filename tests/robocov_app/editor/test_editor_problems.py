@@ -17,8 +17,8 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.editor.model.document import BOUNDARY, Sketch
-from robocov_app.editor.model.problems import problems, runnable
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
+from robocov_app.editor.model.validation import problems, runnable
 
 
 def hall(*shapes, starts=(), **others) -> Sketch:

@@ -13,9 +13,9 @@ from shapely import MultiPolygon
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.mapfile import bundled_maps, load_map
 from robocov.mapfile.check import check_map
-from robocov_app.editor.model.document import Sketch
-from robocov_app.editor.model.problems import problems
-from robocov_app.editor.model.readout import reach_of, readout
+from robocov_app.editor.model.measurement import measure, reach_of
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.validation import problems
 
 FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
@@ -74,7 +74,7 @@ def test_what_robots_reach_is_what_a_raster_says(sketch, radius):
     [(0.9, 0.4, True), (0.9, 0.45, True), (0.9, 0.4501, False), (0.5, 0.3, False)],
 )
 def test_a_door_lets_pass_whom_it_lets_pass(width, radius, passes):
-    result = readout(doors(width), radius)
+    result = measure(doors(width), radius)
     assert result.gap.width == pytest.approx(width)
     assert result.components == pytest.approx([96.0 - 0.2 * (8.0 - width)])
     assert len(result.reached) == (1 if passes else 2)
@@ -99,7 +99,7 @@ def test_a_door_lets_pass_whom_it_lets_pass(width, radius, passes):
 
 
 def test_one_of_three_doors_is_too_narrow():
-    result = readout(doors(1.0, 0.5, 2.0), 0.3)
+    result = measure(doors(1.0, 0.5, 2.0), 0.3)
     assert result.gap.width == pytest.approx(0.5)
     (mark,) = result.impassable.geoms
     assert mark.distance(shapely.Point(6.0, 4.0)) == 0.0
@@ -113,14 +113,14 @@ def test_a_passage_that_leads_back_to_the_same_place_is_marked_too():
         PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0))),
         PolygonObstacle(((5.3, 3.0), (7.3, 3.0), (7.3, 5.0), (5.3, 5.0))),
     ]
-    result = readout(Sketch(boundary=HALL).added(blocks)[0], 0.2)
+    result = measure(Sketch(boundary=HALL).added(blocks)[0], 0.2)
     assert len(result.reached) == 1
     (mark,) = result.impassable.geoms
     # the slot, and half a disc at either end
     assert mark.area == pytest.approx(0.3 * 2.0 + math.pi * 0.15**2, abs=0.01)
     # no more than a crack is taken for touching
     closed = [blocks[0], PolygonObstacle(((5.0015, 3.0), (7.3, 3.0), (7.3, 5.0), (5.0015, 5.0)))]
-    result = readout(Sketch(boundary=HALL).added(closed)[0], 0.2)
+    result = measure(Sketch(boundary=HALL).added(closed)[0], 0.2)
     assert result.impassable.is_empty
     assert result.gap.width == pytest.approx(3.0)
 
@@ -133,17 +133,17 @@ def test_niches_and_sealed_pockets_are_marked_but_not_corners():
         ((8.0, 4.0), (9.0, 4.0), (9.0, 5.0), (8.0, 5.0)), (((8.4, 4.4), (8.6, 4.4), (8.6, 4.6), (8.4, 4.6)),)
     )
     pillar = CircleObstacle((10.0, 2.0), 0.5)
-    result = readout(Sketch(boundary=HALL).added([niche, frame, pillar])[0], 0.3)
+    result = measure(Sketch(boundary=HALL).added([niche, frame, pillar])[0], 0.3)
     marks = sorted(result.impassable.geoms, key=lambda part: part.centroid.x)
     assert len(marks) == 2
     assert marks[0].area == pytest.approx(0.2 * 2.0, abs=0.03)
     assert marks[1].area == pytest.approx(0.04, abs=0.002)
     assert len(result.reached) == 1
-    assert readout(Sketch(boundary=HALL), 0.3).impassable.is_empty
+    assert measure(Sketch(boundary=HALL), 0.3).impassable.is_empty
 
 
 def test_where_no_robot_fits_it_is_said():
-    result = readout(Sketch("n", boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 0.3), (0.0, 0.3))), 0.2)
+    result = measure(Sketch("n", boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 0.3), (0.0, 0.3))), 0.2)
     assert result.reached == ()
     assert result.impassable.area == pytest.approx(2.7)
     assert "no robot of radius 0.2 m fits anywhere" in [problem.words for problem in result.problems]
@@ -152,7 +152,7 @@ def test_where_no_robot_fits_it_is_said():
 @pytest.mark.parametrize("name", ["rooms", "office", "gaps", "cave", "museum"])
 def test_it_says_what_check_says(name):
     environment = load_map(name)
-    report, result = check_map(environment, 0.1), readout(Sketch.from_environment(environment), 0.1)
+    report, result = check_map(environment, 0.1), measure(Sketch.from_environment(environment), 0.1)
     assert result.free_area == report.free_area
     assert result.components == report.components
     assert result.gap == report.narrowest_gap
@@ -163,7 +163,7 @@ def test_it_says_what_check_says(name):
 @settings(max_examples=50)
 @given(drafts(), st.sampled_from([0.05, 0.3]))
 def test_every_draft_can_be_read_out(sketch, radius):
-    result = readout(sketch, radius)
+    result = measure(sketch, radius)
     assert isinstance(result.impassable, MultiPolygon)
     assert result.free_area == pytest.approx(sum(result.components))
     assert sum(result.reached) <= result.free_area + 1e-6
@@ -174,11 +174,11 @@ def test_every_draft_can_be_read_out(sketch, radius):
 
 
 def test_broken_parts_count_as_far_as_they_are_sound():
-    assert readout(Sketch()).free_area == 0.0
+    assert measure(Sketch()).free_area == 0.0
     bow_tie = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
-    result = readout(Sketch("n", boundary=HALL).added([bow_tie, WallObstacle((), 0.1)])[0])
+    result = measure(Sketch("n", boundary=HALL).added([bow_tie, WallObstacle((), 0.1)])[0])
     assert result.free_area == pytest.approx(96.0 - 2.0)
-    crossing = readout(Sketch("n", boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))))
+    crossing = measure(Sketch("n", boundary=((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))))
     assert crossing.components == pytest.approx((4.0, 4.0))
 
 
@@ -186,8 +186,8 @@ def test_broken_parts_count_as_far_as_they_are_sound():
 def test_sizes_that_no_map_has_are_measured(huge):
     shapes = [CircleObstacle((1.0, 1.0), huge), WallObstacle(((1.0, 1.0), (huge, 1.0)), huge)]
     sketch = Sketch("n", boundary=HALL, starts=(("a", DiscStart((huge, 1.0), huge)),)).added(shapes)[0]
-    result = readout(sketch)
+    result = measure(sketch)
     assert result.free_area == pytest.approx(96.0)
     assert len([problem for problem in result.problems if problem.grave]) >= 3
-    far = readout(replace(sketch, boundary=((0.0, 0.0), (huge, 0.0), (0.0, huge))))
+    far = measure(replace(sketch, boundary=((0.0, 0.0), (huge, 0.0), (0.0, huge))))
     assert far.free_area == 0.0

@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov_app.editor.edits import edits
-from robocov_app.editor.model import readout_process
-from robocov_app.editor.model.document import Sketch
-from robocov_app.editor.model.readout import readout
-from robocov_app.editor.model.readout_messages import Question
-from robocov_app.editor.model.readout_worker import ReadoutWorker
+from robocov_app.editor.edits import properties, transform
+from robocov_app.editor.model import measurement_worker
+from robocov_app.editor.model.measurement import measure
+from robocov_app.editor.model.measurement_worker import MeasurementWorker, Question
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.live.latest import Service
 
 PATIENCE = 60.0
@@ -48,7 +47,7 @@ def crowded(count: int) -> Sketch:
     return Sketch("crowded", boundary=((0.0, 0.0), (far, 0.0), (far, far), (0.0, far))).added(shapes)[0]
 
 
-def answered(worker: ReadoutWorker):
+def answered(worker: MeasurementWorker):
     end = time.monotonic() + PATIENCE
     result = None
     while time.monotonic() < end:
@@ -72,17 +71,17 @@ def same(a, b) -> bool:
 
 def test_it_says_what_the_function_says_after_every_change():
     history = [SKETCH]
-    history.append(edits.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)
+    history.append(transform.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)
     history.append(history[-1].added([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
     history.append(history[-1].without([0]))
-    history.append(edits.raised(history[-1], Selection.of(1), "top").sketch)
+    history.append(properties.raised(history[-1], Selection.of(1), "top").sketch)
     history.append(SKETCH)
-    with ReadoutWorker() as worker:
+    with MeasurementWorker() as worker:
         for sketch in history:
             worker.ask(sketch, 0.2)
             assert worker.busy
             result = answered(worker)
-            assert same(result, readout(sketch, 0.2))
+            assert same(result, measure(sketch, 0.2))
             assert worker.trouble == ""
         worker.ask(SKETCH, 0.2)
         assert not worker.busy, "asked about the same again"
@@ -93,7 +92,7 @@ def test_it_says_what_the_function_says_after_every_change():
 @settings(max_examples=20)
 @given(st.data())
 def test_what_has_changed_is_enough_to_know_the_whole(data):
-    measuring = readout_process.Measuring()
+    measuring = measurement_worker.Measuring()
     sketch, known = data.draw(sound_sketches(least=1)), {}
     questions = []
     for _ in range(4):
@@ -105,22 +104,24 @@ def test_what_has_changed_is_enough_to_know_the_whole(data):
         sketch = sketch if change is None else change.sketch
     measuring(questions[:2])
     answer = measuring(questions[2:])
-    assert answer.vertices == readout(last, 0.2).vertices
-    assert answer.free_area == readout(last, 0.2).free_area
+    assert answer.vertices == measure(last, 0.2).vertices
+    assert answer.free_area == measure(last, 0.2).free_area
 
 
 def test_only_the_newest_question_counts():
     sketch = crowded(100)
-    with ReadoutWorker() as worker:
+    with MeasurementWorker() as worker:
         for k in range(200):
-            worker.ask(edits.moved(sketch, Selection.of(0), 0.001 * k, 0.0).sketch, 0.2)
+            worker.ask(transform.moved(sketch, Selection.of(0), 0.001 * k, 0.0).sketch, 0.2)
         result = answered(worker)
-        assert result.free_area == readout(edits.moved(sketch, Selection.of(0), 0.199, 0.0).sketch).free_area
+        assert (
+            result.free_area == measure(transform.moved(sketch, Selection.of(0), 0.199, 0.0).sketch).free_area
+        )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_process_that_was_killed_comes_back():
-    with ReadoutWorker() as worker:
+    with MeasurementWorker() as worker:
         worker.ask(SKETCH, 0.2)
         first = answered(worker)
         worker.ask(replace(SKETCH, name="other"), 0.2)
@@ -139,8 +140,8 @@ def test_a_process_that_was_killed_comes_back():
 
 
 def test_what_fails_is_said_and_the_next_goes_on(monkeypatch, capsys):
-    service = Service(readout_process.Measuring(), "the map could not be measured")
-    monkeypatch.setattr(readout_process, "readout", lambda sketch, radius: 1 / 0)
+    service = Service(measurement_worker.Measuring(), "the map could not be measured")
+    monkeypatch.setattr(measurement_worker, "measure", lambda sketch, radius: 1 / 0)
     reply = service.reply([(1, Question.about(SKETCH, 0.2, {}))])
     assert (reply.number, reply.answer) == (1, None)
     assert reply.trouble == "the map could not be measured: division by zero"
@@ -149,11 +150,11 @@ def test_what_fails_is_said_and_the_next_goes_on(monkeypatch, capsys):
     known = {item.key: item for item in SKETCH.obstacles}
     reply = service.reply([(2, Question.about(SKETCH, 0.2, known))])
     assert (reply.number, reply.trouble) == (2, "")
-    assert reply.answer.vertices == readout(SKETCH, 0.2).vertices
+    assert reply.answer.vertices == measure(SKETCH, 0.2).vertices
 
 
 def test_nothing_is_there_before_one_asks():
-    worker = ReadoutWorker()
+    worker = MeasurementWorker()
     assert worker.poll() is None
     assert not worker.busy
     worker.close()
@@ -166,12 +167,12 @@ def test_asked_among_many_obstacles_is_only_what_changed(monkeypatch):
     monkeypatch.setattr(Question, "about", lambda *what: sent.append(about(*what)) or sent[-1])
     sketch = crowded(400)
     keys = [item.key for item in sketch.obstacles]
-    with ReadoutWorker() as worker:
+    with MeasurementWorker() as worker:
         worker.ask(sketch)
         answered(worker)
         first = len(sent)
         for k in range(60):
-            sketch = edits.moved(sketch, Selection.of(keys[k]), 0.001, 0.0).sketch
+            sketch = transform.moved(sketch, Selection.of(keys[k]), 0.001, 0.0).sketch
             worker.ask(sketch)
             worker.poll()
         result = answered(worker)

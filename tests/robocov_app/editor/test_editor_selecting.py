@@ -7,9 +7,9 @@ import pytest
 from driven_editor import Hands, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.model.document import BOUNDARY
 from robocov_app.editor.model.selection import Selection, Vertex
-from robocov_app.editor.tools.grips import grip_at, grips, handled
+from robocov_app.editor.model.sketch import BOUNDARY
+from robocov_app.editor.tools.handles import handle_at, handled, handles
 
 SQUARE = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -23,9 +23,9 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
         yield driver
 
 
-def grip(hands: Hands, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
-    """Return the pixel of a grip."""
-    (found,) = (each for each in hands.desk.grips if each.kind == kind and each.side == side)
+def handle(hands: Hands, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
+    """Return the pixel of a handle."""
+    (found,) = (each for each in hands.desk.handles if each.kind == kind and each.side == side)
     return hands.pixel(found.at)
 
 
@@ -62,7 +62,7 @@ def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
     assert hands.shapes[0].name == "box" and hands.desk.selection == Selection.of(0)
     hands.key("ctrl+z")
     assert hands.shapes[0] == SQUARE
-    assert not hands.desk.paper.history.can_undo
+    assert not hands.desk.document.history.can_undo
     hands.key("ctrl+y")
     assert hands.shapes[0].vertices[0] == (4, 2)
 
@@ -144,7 +144,7 @@ def test_the_rim_of_a_circle_and_of_a_start_are_dragged(hands: Hands) -> None:
 
 def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
     hands.select(2)
-    x, y = grip(hands, "turn")
+    x, y = handle(hands, "turn")
     hands.press(x, y)
     hands.move(x + 60, y + 20, held=1)
     hands.type("90")
@@ -161,7 +161,7 @@ def test_the_knob_turns_and_takes_degrees(hands: Hands) -> None:
 
 def test_shift_turns_in_steps(hands: Hands) -> None:
     hands.select(0)
-    x, y = grip(hands, "turn")
+    x, y = handle(hands, "turn")
     hands.hold("shift")
     cx, cy = hands.pixel((3, 3))
     hands.drag((x, y), (cx + 40, cy - 60), (cx + 100, cy - 97))
@@ -176,11 +176,11 @@ def test_shift_turns_in_steps(hands: Hands) -> None:
 
 def test_corners_and_sides_of_the_box_scale(hands: Hands) -> None:
     hands.select(0)
-    x, y = grip(hands, "scale", (1, 0))
+    x, y = handle(hands, "scale", (1, 0))
     one = hands.pixel((1, 0))[0] - hands.pixel((0, 0))[0]
     hands.drag((x, y), (x + one / 2, y), (x + one, y))
     assert hands.shapes[0].vertices == ((2, 2), (5, 2), (5, 4), (2, 4))
-    x, y = grip(hands, "scale", (1, 1))
+    x, y = handle(hands, "scale", (1, 1))
     hands.hold("shift")
     hands.drag((x, y), (x + one, y - one), (x + 1.5 * one, y - one))
     hands.hold()
@@ -191,7 +191,7 @@ def test_corners_and_sides_of_the_box_scale(hands: Hands) -> None:
 
 def test_a_circle_stays_a_circle_when_it_is_scaled(hands: Hands) -> None:
     hands.select(1)
-    x, y = grip(hands, "scale", (1, 0))
+    x, y = handle(hands, "scale", (1, 0))
     hands.drag((x, y), (x + 20, y), (x + 40, y + 5))
     assert isinstance(hands.shapes[1], CircleObstacle) and hands.shapes[1].radius > 1.0
 
@@ -221,12 +221,12 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
 
 
 def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
-    from robocov_app.editor.edits import edits
-    from robocov_app.editor.tools import drags
+    from robocov_app.editor.edits import transform
+    from robocov_app.editor.tools import select
 
-    ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(drags.MANY_POINTS + 10))
+    ring = tuple((1 + 0.5 * k / 300, 1 + (k % 2) * 0.2) for k in range(select.MANY_POINTS + 10))
     with opened_editor(tmp_path, sheet(WallObstacle(ring, 0.01), SQUARE)) as hands:
-        wanted = edits.moved(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
+        wanted = transform.moved(hands.sketch, Selection.of(0, 1), 1.0, 0.5).sketch
         hands.select(0, 1)
         hands.press(*hands.pixel((3, 3)))
         hands.go((3.5, 3.2), (4, 3.5), held=1)
@@ -239,11 +239,11 @@ def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
     assert handled(Selection()) == () and handled(Selection.of(0, 1)) == ()
     assert handled(Selection.of(2)) == (2,)
     assert handled(Selection(vertices=frozenset({Vertex(1, 0, 0)}))) == (1,)
-    found = grips(hands.sketch, Selection.of(0), 0.01)
+    found = handles(hands.sketch, Selection.of(0), 0.01)
     assert sum(each.kind == "vertex" for each in found) == 4
     assert sum(each.kind == "scale" for each in found) == 8
-    assert grip_at(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
-    assert grip_at(found, (3, 3), 0.2) is None
+    assert handle_at(found, (4, 4), 0.2).vertex == Vertex(0, 0, 2)
+    assert handle_at(found, (3, 3), 0.2) is None
 
 
 def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
@@ -255,5 +255,5 @@ def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
     hands.select(0)
     hands.go((3, 3.01))
     assert selector.shape_of_cursor(hands.desk) == "move"
-    hands.move(*grip(hands, "scale", (1, 1)))
+    hands.move(*handle(hands, "scale", (1, 1)))
     assert selector.shape_of_cursor(hands.desk) == "rising"

@@ -16,23 +16,18 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.model.document import BOUNDARY, Sketch
+from robocov_app.editor.model.hit_test import edge_at, in_box, owner_at, owners_at, vertex_at, vertices_in_box
 from robocov_app.editor.model.selection import (
     Edge,
     Selection,
     Vertex,
-    called,
-    edge_at,
-    in_box,
-    owner_at,
-    owners_at,
+    display_name,
     place_of,
     points_of,
     ring_points,
     rings_of,
-    vertex_at,
-    vertices_in_box,
 )
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 LOW = PolygonObstacle(
     ((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)), (((2.0, 2.0), (3.0, 2.0), (3.0, 3.0)),)
@@ -177,7 +172,7 @@ def test_selections_in_words(sketch):
     }
     for expected, selection in words.items():
         assert selection.words(sketch) == expected
-    assert called(sketch, BOUNDARY) == "boundary"
+    assert display_name(sketch, BOUNDARY) == "boundary"
 
 
 def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):

@@ -16,7 +16,7 @@ from PIL import Image
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.drawn_rings import Outlines, name_place, outline_of
 from robocov_app.editor.canvas.sheet import Sheet, View, beyond, grid_steps, outside_colour
-from robocov_app.editor.edits import edits
+from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
 from robocov_app.render.camera import Camera
@@ -67,15 +67,15 @@ def test_patches_and_scrolling_give_the_same_page_as_drawing_anew(steps, dark: b
         if kind == 0:
             center = center[0] + x / 28.0, center[1] + y / 28.0
         elif kind == 1:
-            sketch = edits.moved(sketch, Selection.of(y % 4), x / 40, y / 40).sketch
+            sketch = transform.moved(sketch, Selection.of(y % 4), x / 40, y / 40).sketch
         elif kind == 2:
-            sketch = edits.circle_drawn(sketch, (5 + x / 10, 5 + y / 10), 0.5).sketch
+            sketch = create.circle_drawn(sketch, (5 + x / 10, 5 + y / 10), 0.5).sketch
         elif kind == 3 and len(sketch.obstacles) > 4:
-            sketch = edits.deleted(sketch, Selection.of(sketch.obstacles[-1].key)).sketch
+            sketch = properties.deleted(sketch, Selection.of(sketch.obstacles[-1].key)).sketch
         elif kind == 4:
             lifted = frozenset({x % 4})
         else:
-            sketch = edits.moved(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
+            sketch = transform.moved(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
         at = view(center, theme=theme)
         page = drawn(kept.page(at, sketch, lifted), at)
         anew = drawn(Sheet().page(at, sketch, lifted), at)
@@ -90,7 +90,7 @@ def test_only_what_changed_is_drawn_anew() -> None:
     page.page(view(), sketch)
     assert (page.full, page.patched, page.scrolled) == (1, 0, 0)
     page.page(view(), sketch)
-    moved = edits.moved(sketch, Selection.of(1), 0.1, 0.0).sketch
+    moved = transform.moved(sketch, Selection.of(1), 0.1, 0.0).sketch
     page.page(view(), moved)
     assert page.full == 1 and page.patched == 1
     page.page(view((5.0 + 3 / 28.0, 5.0)), moved)
@@ -187,7 +187,7 @@ def test_names_stand_where_there_is_room() -> None:
 def test_outlines_are_made_once_for_each_obstacle() -> None:
     outlines, sketch = Outlines(), sheet(*SHAPES)
     first = outlines.of(sketch.obstacles[0])
-    moved = edits.moved(sketch, Selection.of(1), 1, 0).sketch
+    moved = transform.moved(sketch, Selection.of(1), 1, 0).sketch
     assert outlines.of(moved.obstacles[0]) is first and first.has_holes
     assert len(outlines.touching(moved, (0.9, 0.9, 1.1, 1.1))) == 1
     line = outline_of(shapely.LineString([(0, 0), (1, 1)]))

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.simplifying import simplified, straightened
-from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.edits.simplify import simplified, straightened
 from robocov_app.editor.model.selection import Selection, ring_points
+from robocov_app.editor.model.sketch import Sketch
 
 
 def wobbly(count: int, seed: int, radius: float = 3.0, noise: float = 0.05):

@@ -4,16 +4,16 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.tools.tool import (
     ANGLE,
-    Aim,
+    PointerEvent,
     Tool,
-    apart,
+    at_round_angle,
     bearing_words,
-    held,
+    constrained_point,
     length_words,
-    straightened,
-    swept,
+    ring_area,
 )
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
@@ -22,8 +22,8 @@ POINTS = st.tuples(NUMBERS, NUMBERS)
 
 @given(POINTS, POINTS)
 def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, point) -> None:
-    to = straightened(origin, point)
-    if apart(origin, to) > 1e-3:
+    to = at_round_angle(origin, point)
+    if distance(origin, to) > 1e-3:
         angle = np.degrees(np.arctan2(to[1] - origin[1], to[0] - origin[0]))
         assert abs(angle / ANGLE - round(angle / ANGLE)) < 1e-3
     # no other line at a round angle comes nearer
@@ -31,15 +31,15 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
     across = np.abs(
         (point[0] - origin[0]) * np.sin(directions) - (point[1] - origin[1]) * np.cos(directions)
     ).min()
-    assert apart(point, to) <= across + 1e-6
+    assert distance(point, to) <= across + 1e-6
 
 
 def test_shift_holds_the_angle_and_nothing_else_does() -> None:
-    aim = Aim((3.0, 0.2), (3.0, 0.1), 0.1)
-    assert held(aim, (0.0, 0.0)) == (3.0, 0.2)
-    shifted = Aim((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
-    assert held(shifted, (0.0, 0.0)) == (3.0, 0.0)
-    assert held(shifted, None) == (3.0, 0.2)
+    aim = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
+    assert constrained_point(aim, (0.0, 0.0)) == (3.0, 0.2)
+    shifted = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
+    assert constrained_point(shifted, (0.0, 0.0)) == (3.0, 0.0)
+    assert constrained_point(shifted, None) == (3.0, 0.2)
 
 
 def test_lengths_and_angles_are_told_as_people_write_them() -> None:
@@ -51,9 +51,9 @@ def test_lengths_and_angles_are_told_as_people_write_them() -> None:
 
 @given(st.lists(POINTS, min_size=3, max_size=8))
 def test_the_area_of_a_ring_does_not_depend_on_where_it_begins_or_which_way_it_runs(ring) -> None:
-    area = swept(ring)
-    assert abs(swept(ring[1:] + ring[:1]) - area) < 1e-6 * (1 + area)
-    assert abs(swept(ring[::-1]) - area) < 1e-6 * (1 + area)
+    area = ring_area(ring)
+    assert abs(ring_area(ring[1:] + ring[:1]) - area) < 1e-6 * (1 + area)
+    assert abs(ring_area(ring[::-1]) - area) < 1e-6 * (1 + area)
 
 
 def test_a_plain_tool_does_nothing() -> None:

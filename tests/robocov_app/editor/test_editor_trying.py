@@ -7,9 +7,9 @@ import pygame
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.editor.edits import edits
-from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.trying import brought_back
 
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -79,7 +79,7 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
 
 def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(PILLAR)) as hands:
-        hands.desk.change(edits.noted(hands.sketch, Selection.of(0), "old oak"))
+        hands.desk.change(properties.noted(hands.sketch, Selection.of(0), "old oak"))
         trial = tried(hands)
         hands.key("c")
         x, y = trial.arena.to_pixel((3.0, 3.0))

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.model.document import BOUNDARY, Sketch
 from robocov_app.editor.model.selection import (
     Edge,
     Selection,
@@ -20,6 +19,7 @@ from robocov_app.editor.model.selection import (
     ring_points,
     rings_of,
 )
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
 HOLE = ((2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0))
 FRAME = PolygonObstacle(((1.0, 1.0), (5.0, 1.0), (5.0, 5.0), (1.0, 5.0)), (HOLE,), "frame")

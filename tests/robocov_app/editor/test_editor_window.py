@@ -9,9 +9,9 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.editor.edits.edits import circle_drawn, polygon_drawn
-from robocov_app.editor.model.document import Sketch
+from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.actions import told_actions
 from robocov_app.editor.ui.panel import TABS
 from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
@@ -38,7 +38,7 @@ def test_every_button_does_what_its_action_does(hands: Hands) -> None:
     hands.select(0)
     hands.turn("object")
     hands.push("rotate:left")
-    assert hands.desk.paper.history.can_undo
+    assert hands.desk.document.history.can_undo
     hands.push("undo")
     assert hands.shapes[0] == BOX
     hands.push("help")
@@ -52,7 +52,7 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
     assert hands.sketch.name == "Our office"
     hands.write("radius", "0.25")
     hands.key("return")
-    assert hands.desk.radius == 0.25 and hands.desk.readout.radius == 0.25
+    assert hands.desk.radius == 0.25 and hands.desk.measurement.radius == 0.25
     hands.write("robots", "nine")
     hands.key("return")
     assert hands.desk.trouble and hands.desk.robots == 6
@@ -258,7 +258,7 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.key("ctrl+k")
     hands.type("mirror left")
     hands.key("return")
-    assert hands.desk.paper.history.can_undo
+    assert hands.desk.document.history.can_undo
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")

@@ -32,12 +32,12 @@ from robocov_app.editor.canvas.handles import (
 )
 from robocov_app.editor.canvas.sheet import Sheet, View
 from robocov_app.editor.canvas.strips import Strips
-from robocov_app.editor.edits.paths import goes, moving
-from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.edits.motion_path import goes, moving
+from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.drags import Moving
-from robocov_app.editor.tools.grips import KNOB, box_of, grips
-from robocov_app.editor.tools.tool import apart
+from robocov_app.editor.model.sketch import BOUNDARY
+from robocov_app.editor.tools.handles import KNOB, box_of, handles
+from robocov_app.editor.tools.select import Moving
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.layers import READABLE
@@ -46,9 +46,9 @@ from robocov_app.render.theme import mix
 
 if TYPE_CHECKING:
     from robocov.environment import Point
-    from robocov_app.editor.model.document import Owner, Sketch
-    from robocov_app.editor.model.problems import Problem
     from robocov_app.editor.model.selection import Selection
+    from robocov_app.editor.model.sketch import Owner, Sketch
+    from robocov_app.editor.model.validation import Problem
     from robocov_app.editor.ui.desk import Desk
     from robocov_app.editor.ui.team import Team
     from robocov_app.render.canvas import Canvas
@@ -108,7 +108,7 @@ class Arena:
 
     def fit_selection(self) -> None:
         """Show what is selected, or all."""
-        from robocov_app.editor.edits.edits import bounds_of
+        from robocov_app.editor.edits.transform import bounds_of
 
         self._show(bounds_of(self.desk.sketch, self.desk.selection) or self.desk.sketch.bounds or EMPTY)
 
@@ -179,7 +179,7 @@ class Arena:
         if "problems" not in self.desk.shown:
             return None
         for problem, at in badge_places(self.desk.problems, self._view()):
-            if apart(at, pixel) < 10 * self.layout.scale:
+            if distance(at, pixel) < 10 * self.layout.scale:
                 return problem
         return None
 
@@ -187,7 +187,7 @@ class Arena:
 
     def _view(self) -> View:
         desk = self.desk
-        folder = desk.paper.path.parent if desk.paper.path is not None else desk.folder
+        folder = desk.document.path.parent if desk.document.path is not None else desk.folder
         return View(
             self.camera,
             self.theme,
@@ -235,19 +235,19 @@ class Arena:
         elif now is not base:
             new = [item for item in now.obstacles if item.key not in base.places]
             self.sheet.draw_items(canvas, new, mix(self.theme.obstacle, accent(self.theme), 0.22))
-        if "impassable" in shown and desk.readout is not None:
-            self._hatching.draw(screen, view, desk.readout)
-            if desk.readout.gap is not None:
-                draw_gap(canvas, desk.readout.gap, desk.readout.radius)
+        if "impassable" in shown and desk.measurement is not None:
+            self._hatching.draw(screen, view, desk.measurement)
+            if desk.measurement.gap is not None:
+                draw_gap(canvas, desk.measurement.gap, desk.measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         self._draw_starts(canvas, now)
         if self.team is not None and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
             self._draw_selection(canvas, now, pending.selection if pending is not None else desk.selection)
-        if "impassable" in shown and desk.readout is not None and desk.readout.gap is not None:
+        if "impassable" in shown and desk.measurement is not None and desk.measurement.gap is not None:
             busy = desk.tool is not desk.selector or drag is not None
-            tag_gap(canvas, desk.readout.gap, desk.readout.radius, self.at if busy else None)
+            tag_gap(canvas, desk.measurement.gap, desk.measurement.radius, self.at if busy else None)
         if "problems" in shown:
             draw_problems(canvas, view, desk.problems, desk.problem, self.hovered)
         self._draw_tool(canvas)
@@ -335,7 +335,7 @@ class Arena:
         box = box_of(sketch, selection, desk.pixel)
         if box is not None:
             draw_box(canvas, box, mix(theme.background, accent(theme), 0.6))
-        found = desk.grips if sketch is desk.sketch else grips(sketch, selection, desk.pixel)
+        found = desk.handles if sketch is desk.sketch else handles(sketch, selection, desk.pixel)
         draw_grips(canvas, found, frozenset(selection.vertices), selector.near, KNOB * canvas.scale)
 
     def _draw_owner(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from robocov.arrays import Array
-    from robocov_app.editor.model.document import Item, Sketch
+    from robocov_app.editor.model.sketch import Item, Sketch
 
 _FORGOTTEN = 4
 """How many times more outlines than obstacles are kept, those of what was undone among them."""

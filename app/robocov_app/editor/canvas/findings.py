@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
     from robocov.environment import Gap
     from robocov_app.editor.canvas.sheet import View
-    from robocov_app.editor.model.problems import Problem
-    from robocov_app.editor.model.readout import Readout
+    from robocov_app.editor.model.measurement import Measurement
+    from robocov_app.editor.model.validation import Problem
     from robocov_app.render.theme import Colour, Theme
 
 HATCH = 7
@@ -54,24 +54,24 @@ class Hatching:
         self._key: tuple[object, ...] = ()
         self._patch: tuple[pygame.Surface, pygame.Rect] | None = None
 
-    def draw(self, screen: pygame.Surface, view: View, readout: Readout) -> None:
+    def draw(self, screen: pygame.Surface, view: View, measurement: Measurement) -> None:
         """Hatch where robots do not pass, and what is cut off."""
-        key = (readout, view.camera, view.theme.name, view.scale, view.size)
+        key = (measurement, view.camera, view.theme.name, view.scale, view.size)
         if len(self._key) != len(key) or any(
             a is not b and a != b for a, b in zip(self._key, key, strict=True)
         ):
-            self._key, self._patch = key, self._made(view, readout)
+            self._key, self._patch = key, self._made(view, measurement)
         if self._patch is not None:
             patch, box = self._patch
             screen.blit(patch, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     @staticmethod
-    def _made(view: View, readout: Readout) -> tuple[pygame.Surface, pygame.Rect] | None:
+    def _made(view: View, measurement: Measurement) -> tuple[pygame.Surface, pygame.Rect] | None:
         parts = [
             (each, colour)
             for areas, colour in (
-                (readout.sealed, sealed_colour(view.theme)),
-                (readout.impassable, narrow_colour(view.theme)),
+                (measurement.sealed, sealed_colour(view.theme)),
+                (measurement.impassable, narrow_colour(view.theme)),
             )
             for each in shapely.get_parts(areas)
             if isinstance(each, shapely.Polygon) and not each.is_empty
@@ -235,7 +235,9 @@ def draw_badge(canvas: Canvas, x: float, y: float, *, grave: bool) -> None:
     )
 
 
-def legend_entries(readout: Readout | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
+def legend_entries(
+    measurement: Measurement | None, *, starts: bool, team: bool, unfree: bool
+) -> list[LegendEntry]:
     """Return what the legend explains."""
     entries = [LegendEntry("obstacle", _obstacle_glyph), LegendEntry("boundary", _boundary_glyph)]
     if unfree:
@@ -244,12 +246,12 @@ def legend_entries(readout: Readout | None, *, starts: bool, team: bool, unfree:
         entries.append(LegendEntry("start", _start_glyph))
     if team:
         entries.append(LegendEntry("robot", _robot_glyph))
-    if readout is not None:
-        if not readout.impassable.is_empty:
+    if measurement is not None:
+        if not measurement.impassable.is_empty:
             entries.append(LegendEntry("too narrow for a robot", partial(_hatch_glyph, narrow=True)))
-        if not readout.sealed.is_empty:
+        if not measurement.sealed.is_empty:
             entries.append(LegendEntry("cut off", partial(_hatch_glyph, narrow=False)))
-        if readout.problems:
+        if measurement.problems:
             entries.append(LegendEntry("problem", partial(draw_badge_glyph, grave=True)))
     return entries
 

@@ -11,7 +11,8 @@ import pygame
 
 from robocov.environment import DiscStart, PointsStart
 from robocov_app.editor.canvas.drawn_rings import outline_of
-from robocov_app.editor.tools.tool import apart, length_words
+from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.tools.tool import length_words
 from robocov_app.render import sprites
 from robocov_app.render.theme import mix
 from robocov_app.viewer.overlays import tag
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov.environment import ObstaclePath, Point, StartSpec
-    from robocov_app.editor.tools.grips import Grip
+    from robocov_app.editor.tools.handles import Handle
     from robocov_app.editor.tools.snapping import Guide
     from robocov_app.editor.tools.tool import Preview
     from robocov_app.render.canvas import Canvas
@@ -69,22 +70,22 @@ def draw_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Col
 
 
 def draw_grips(
-    canvas: Canvas, found: tuple[Grip, ...], chosen: frozenset[object], near: Grip | None, stem: float
+    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[object], near: Handle | None, stem: float
 ) -> None:
     """Draw the handles; `stem` is how far the knob is from the box, px."""
     theme = canvas.theme
-    places = pixels(canvas, (grip.at for grip in found)).tolist()
-    for grip, (x, y) in zip(found, places, strict=True):
-        if grip.kind == "turn":
+    places = pixels(canvas, (handle.at for handle in found)).tolist()
+    for handle, (x, y) in zip(found, places, strict=True):
+        if handle.kind == "turn":
             canvas.line((x, y), (x, y + stem), accent(theme), canvas.width(1.0))
-            radius = (5.5 if grip == near else 4.5) * canvas.scale
+            radius = (5.5 if handle == near else 4.5) * canvas.scale
             fill, edge = theme.background, accent(theme)
             canvas.stamp(partial(sprites.disc, radius, fill, edge, 1.6 * canvas.scale, edge, ""), (x, y))
-        elif grip.kind == "scale":
-            _square(canvas, x, y, theme.background, accent(theme), large=grip == near)
+        elif handle.kind == "scale":
+            _square(canvas, x, y, theme.background, accent(theme), large=handle == near)
         else:
-            fill = accent(theme) if grip.vertex in chosen else theme.background
-            _square(canvas, x, y, fill, accent(theme), large=grip == near, round_ones=True)
+            fill = accent(theme) if handle.vertex in chosen else theme.background
+            _square(canvas, x, y, fill, accent(theme), large=handle == near, round_ones=True)
 
 
 def _square(
@@ -235,7 +236,7 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
     ink = mix(canvas.theme.background, canvas.theme.ink, 0.85)
     for a, b in edges:
         ends = pixels(canvas, (a, b))
-        words = length_words(apart(a, b))
+        words = length_words(distance(a, b))
         if float(np.hypot(*(ends[1] - ends[0]))) < canvas.text_width(words, canvas.theme.small_text):
             continue
         along = ends[1] - ends[0]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov_app.editor.canvas.drawn_rings import Outline
-    from robocov_app.editor.model.document import Item, Sketch
+    from robocov_app.editor.model.sketch import Item, Sketch
     from robocov_app.render.camera import Camera
     from robocov_app.render.theme import Colour, Theme
 

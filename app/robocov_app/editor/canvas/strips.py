@@ -65,7 +65,7 @@ class Strips:
         desk = self._desk
         self._entries = self._found(team)
         rows = max(len(legend_rows(canvas, self._entries)), 1)
-        key = (canvas.surface.get_width(), canvas.scale, desk.paper, "legend" in desk.shown)
+        key = (canvas.surface.get_width(), canvas.scale, desk.document, "legend" in desk.shown)
         self._rows = max(rows, self._rows) if key == self._rows_for else rows
         self._rows_for = key
 
@@ -77,8 +77,8 @@ class Strips:
             geometry = beyond(sketch)
             self._unfree = sketch.boundary, geometry is not None and geometry.area > 1e-6
         standing = "robots" in shown and team is not None and bool(team.places)
-        readout = self._desk.readout if "impassable" in shown else None
-        found = legend_entries(readout, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
+        measurement = self._desk.measurement if "impassable" in shown else None
+        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary:
             x, y = zip(*sketch.boundary, strict=True)
@@ -108,15 +108,15 @@ class Strips:
 
 def map_words(desk: Desk) -> str:
     """Return what the strip below the sheet says: whose map it is, and what it is like."""
-    sketch, readout = desk.sketch, desk.readout
+    sketch, measurement = desk.sketch, desk.measurement
     count = len(sketch.obstacles)
     said = [
-        f"{'● ' if desk.paper.unsaved else ''}{desk.paper.title}",
+        f"{'● ' if desk.document.unsaved else ''}{desk.document.title}",
         f"{count} obstacle{'' if count == 1 else 's'}",
     ]
-    if readout is not None:
-        said.append(f"{readout.free_area:.2f} m² free")
-        grave = sum(problem.grave for problem in readout.problems)
+    if measurement is not None:
+        said.append(f"{measurement.free_area:.2f} m² free")
+        grave = sum(problem.grave for problem in measurement.problems)
         if grave:
             said.append(f"draft: {grave} problem{'' if grave == 1 else 's'}")
     return "   ·   ".join(said)

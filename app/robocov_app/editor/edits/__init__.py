@@ -1,1 +1,1 @@
-"""Pure edits: a sketch in, a sketch out."""
+"""Edits: pure functions from a sketch to a `Change`; a MapError, one sentence, where it cannot be done."""

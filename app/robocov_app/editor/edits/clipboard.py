@@ -15,11 +15,11 @@ from robocov.files.strictjson import parse
 from robocov.mapfile import dump_document
 from robocov.mapfile.models import FORMAT as MAP_FORMAT
 from robocov.mapfile.models import VERSION
-from robocov_app.editor.edits.adding import free_name
-from robocov_app.editor.edits.affine import Affine
-from robocov_app.editor.edits.placing import bounds_of, moved
-from robocov_app.editor.model.document import Sketch, draft_document, sketch_of
+from robocov_app.editor.edits.create import free_name
+from robocov_app.editor.edits.transform import Affine, bounds_of, moved
+from robocov_app.editor.model.parser import sketch_of
 from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch, draft_document
 
 if TYPE_CHECKING:
     from robocov.environment import Point

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from robocov.errors import MapError
-from robocov_app.editor.model.plane import cos_sin
+from robocov_app.editor.model.geometry import cos_sin
 
 if TYPE_CHECKING:
     from robocov.environment import Point

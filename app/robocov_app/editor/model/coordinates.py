@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, shown
 from robocov.mapfile.models import FARTHEST, LARGEST
-from robocov_app.editor.model.plane import cos_sin
+from robocov_app.editor.model.geometry import cos_sin
 
 if TYPE_CHECKING:
     from robocov.environment import Point

@@ -1,339 +1,207 @@
-"""What is edited: a sketch of a map, valid or not, and the map document that holds it.
-
-A sketch is a value: every edit makes another one, and what did not change is shared, so that
-remembering all of them costs little.
-"""
+"""The document that is open: its history, its file, and the copy that is kept aside. Knows no pygame."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from dataclasses import replace
+from pathlib import Path
 
-import numpy as np
-import shapely
-from shapely import GeometryCollection, LineString, Polygon
+from robocov.errors import MapError
+from robocov.mapfile import bundled_maps
+from robocov_app.editor.edits.properties import titled
+from robocov_app.editor.model import file
+from robocov_app.editor.model.autosave import Autosave, Autosaver
+from robocov_app.editor.model.file import OnDisk, State
+from robocov_app.editor.model.history import History
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch
 
-from robocov.environment import CircleObstacle, DiscStart, Environment, PointsStart, WallObstacle
-from robocov.errors import MapError, one_line
-from robocov.files.strictjson import check_header, located, parse, require_json
-from robocov.mapfile import density_of, dump_document, from_json, to_json
-from robocov.mapfile.models import FARTHEST, FORMAT, LARGEST, VERSION
-from robocov_app.editor.model.annotations import annotated, taken_apart
-from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.plane import DECIMALS as DECIMALS
-from robocov_app.editor.model.plane import rounded as rounded
-from robocov_app.editor.model.reading import PartReader
+FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+"""The boundary of a new map, m."""
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
+SUFFIX = ".json"
 
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.density import Density
-    from robocov.environment import Obstacle, Point, Ring, StartSpec
-
-BOUNDARY: Final = -1
-"""Stands for the boundary where obstacles have their keys."""
-
-_KEYS = (
-    *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
-    *("density", "extra"),
-)
-
-FIRST: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""What a raster of a map without a boundary covers, m, unless it says so itself."""
-
-Owner: TypeAlias = int | str
-"""What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+_LOOKED_AGAIN = 1.0
+"""Seconds between two looks at the file."""
 
 
-@dataclass(frozen=True)
-class Item:
-    """An obstacle of a sketch.
+class Document:
+    """A sketch with its history, its file, and the draft that survives whatever happens.
 
-    Attributes
+    Parameters
     ----------
-    key : int
-        Who it is, whatever it looks like: stays the same through every edit. Not in the file.
-    shape : Obstacle
-        As `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners.
-    note : str
-        What people wrote about it.
+    sketch : Sketch
+    drafts : Path or None
+        Where drafts are kept; None for nowhere.
+    path : Path or None
+        Its file; None if it never had one.
+    disk : OnDisk or None
+        What the file was like.
+    draft : Autosave or None
+        The work that goes on.
+    saved : bool
+        Whether losing it would lose nothing.
+    stem : str
+        What a file of it would be called.
     """
 
-    key: int
-    shape: Obstacle
-    note: str = ""
-
-    @cached_property
-    def geometry(self) -> BaseGeometry:
-        """What it covers, as a valid shapely geometry, m: a line or a point where it covers nothing."""
-        return geometry_of(self.shape)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out what can be derived again."""
-        return {"key": self.key, "shape": replace(self.shape), "note": self.note}
-
-
-@dataclass(frozen=True)
-class Sketch:
-    """A map in the making. Immutable; equal when the content is equal, the keys of obstacles included.
-
-    Attributes
-    ----------
-    name, description : str
-    boundary : ring of (x, y), m, or None
-    obstacles : tuple of Item
-        From the bottom to the top.
-    starts : tuple of (name, StartSpec)
-        The first is the default.
-    background : Background or None
-    extra : dict
-        Free keys of the file, without what the editor keeps there itself.
-    schema : str or None
-        The file's ``$schema``.
-    density : Density or None
-        How much each place counts; pictures are read when the map is.
-    """
-
-    name: str = "Untitled"
-    description: str = ""
-    boundary: Ring | None = None
-    obstacles: tuple[Item, ...] = ()
-    starts: tuple[tuple[str, StartSpec], ...] = ()
-    background: Background | None = None
-    extra: Mapping[str, Any] = field(default_factory=dict)
-    schema: str | None = None
-    density: Density | None = None
-
-    def __hash__(self) -> int:
-        return hash((self.name, self.boundary, self.obstacles))
+    def __init__(
+        self,
+        sketch: Sketch,
+        drafts: Path | None,
+        path: Path | None = None,
+        disk: OnDisk | None = None,
+        *,
+        draft: Autosave | None = None,
+        saved: bool = True,
+        stem: str = "",
+    ) -> None:
+        self.history = History(sketch, saved=saved)
+        self.path, self.disk, self.stem = path, disk, stem
+        self.state: State = "same"
+        self._keeper = Autosaver(drafts, path, disk, draft)
+        self._kept: Sketch | None = sketch if saved else None
+        self._looked = 0.0
+        self._over = False
+        self.keep()
 
     @classmethod
-    def from_environment(cls, environment: Environment) -> Sketch:
-        """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        return sketch_of(to_json(environment), environment.name)
+    def new(cls, drafts: Path | None, path: Path | None = None) -> Document:
+        """Return an empty sheet with the boundary that is offered; `path` is not there yet."""
+        return cls(Sketch(boundary=FIRST_SHEET), drafts, path)
 
-    def environment(self, where: str = "map") -> Environment:
-        """Return the map that can be simulated.
+    @classmethod
+    def opened(cls, path: Path, drafts: Path | None) -> Document:
+        """Return the map in a file; one that comes with robocov as a copy, which has no file yet.
 
         Raises
         ------
         MapError
-            When it breaks a rule, as `robocov.load_map` on the saved file would.
+            When it cannot be read.
         """
-        return from_json(draft_document(self), where)
+        sketch, disk = file.opened(path)
+        if is_bundled(path):
+            return cls(sketch, drafts, stem=path.stem)
+        return cls(sketch, drafts, path.resolve(), disk)
 
-    def unchecked(self) -> Environment:
-        """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
-        names = [item.shape.name for item in self.obstacles]
-        notes = {place: item.note for place, item in enumerate(self.obstacles) if item.note}
-        return Environment(
-            name=self.name,
-            boundary=self.boundary or (),
-            obstacles=tuple(item.shape for item in self.obstacles),
-            starts=dict(self.starts),
-            description=self.description,
-            extra=annotated(self.extra, notes, names, self.background),
-            schema=self.schema,
-            density=self.density,
-        )
+    @classmethod
+    def recovered(cls, draft: Autosave, drafts: Path | None) -> Document:
+        """Return work that was left behind, unsaved still.
 
-    def item(self, key: int) -> Item:
-        """Return the obstacle with a key; a KeyError where there is none."""
-        return self.obstacles[self.places[key]]
-
-    def start(self, name: str) -> StartSpec:
-        """Return the start of that name; a KeyError where there is none."""
-        return dict(self.starts)[name]
-
-    @cached_property
-    def places(self) -> Mapping[int, int]:
-        """Where in `obstacles` each key is."""
-        return {item.key: place for place, item in enumerate(self.obstacles)}
-
-    @cached_property
-    def geometries(self) -> Any:
-        """What the obstacles cover, in their order: an array of shapely geometries."""
-        geometries = np.empty(len(self.obstacles), dtype=object)
-        geometries[:] = [item.geometry for item in self.obstacles]
-        return geometries
-
-    @cached_property
-    def tree(self) -> shapely.STRtree:
-        """An index of `geometries`."""
-        return shapely.STRtree(self.geometries)
+        Raises
+        ------
+        MapError
+            When it cannot be read.
+        """
+        return cls(draft.sketch(), drafts, draft.path, draft.disk, draft=draft, saved=False)
 
     @property
-    def fresh_key(self) -> int:
-        """A key that no obstacle has."""
-        return max((item.key for item in self.obstacles), default=-1) + 1
-
-    def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
-        """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
-        key = self.fresh_key
-        items: list[Item] = []
-        for each in shapes:
-            shape, note = each if isinstance(each, tuple) else (each, "")
-            items.append(Item(key + len(items), shape, note))
-        return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
-
-    def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
-        """Return the sketch with other shapes for some keys; what stays equal stays the same object."""
-        items = tuple(
-            replace(item, shape=shapes[item.key])
-            if item.key in shapes and shapes[item.key] != item.shape
-            else item
-            for item in self.obstacles
-        )
-        return replace(self, obstacles=items)
-
-    def with_start(self, name: str, spec: StartSpec) -> Sketch:
-        """Return the sketch with a start changed in its place, or added as the last."""
-        return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
-
-    def without(self, keys: Iterable[int]) -> Sketch:
-        """Return the sketch without some obstacles."""
-        gone = frozenset(keys)
-        return replace(self, obstacles=tuple(item for item in self.obstacles if item.key not in gone))
-
-    def renumbered(self) -> Sketch:
-        """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
-        items = tuple(replace(item, key=key) for key, item in enumerate(self.obstacles))
-        return replace(self, obstacles=items)
+    def unsaved(self) -> bool:
+        """Whether something would be lost."""
+        return self.history.unsaved
 
     @property
-    def bounds(self) -> tuple[float, float, float, float] | None:
-        """Smallest x, smallest y, largest x, largest y of boundary, obstacles, starts and picture, m.
+    def title(self) -> str:
+        """What the document is called: by its file, or else by its name."""
+        return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
-        None where there is nothing.
+    def suggested(self, folder: Path) -> Path:
+        """Return where it would be saved."""
+        if self.path is not None:
+            return self.path
+        stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
+        stem = "".join(char for char in stem if char.isalnum() or char in "-_.") or "map"
+        target, k = folder / f"{stem}{SUFFIX}", 1
+        while target.exists():
+            target, k = folder / f"{stem}-{k}{SUFFIX}", k + 1
+        return target
+
+    def save(self, path: Path, *, over: bool = False) -> str:
+        """Write the file; return what to tell.
+
+        Raises
+        ------
+        ChangedError
+            When something else has changed the file since, or another file would be lost, unless `over`.
+        OutputError
+            When it cannot be written.
         """
-        points = list(self.boundary or ())
-        if self.background is not None and self.background.shown:
-            points += self.background.corners
-        for _, spec in self.starts:
-            if isinstance(spec, PointsStart):
-                points += spec.positions
-            elif isinstance(spec, DiscStart):
-                (x, y), r = spec.center, abs(spec.radius)
-                points += [(x - r, y - r), (x + r, y + r)]
-        boxes = shapely.bounds(self.geometries).reshape(-1, 4)
-        corners = np.concatenate([np.array(points, dtype=float).reshape(-1, 2), boxes[:, :2], boxes[:, 2:]])
-        corners = corners[np.isfinite(corners).all(axis=1)]
-        if not len(corners):
-            return None
-        (low_x, low_y), (high_x, high_y) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-        return low_x, low_y, high_x, high_y
+        path = path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
+        if is_bundled(path):
+            raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")
+        sketch, named = self.history.sketch, None
+        if sketch.name == Sketch.name:  # nobody has named it: the file does
+            named = replace(titled(sketch, path.stem), selection=self.history.selection)
+            sketch = named.sketch
+        before = self.disk if path == self.path else None
+        self.disk = file.saved(sketch, path, before, over=over or (self._over and path == self.path))
+        if named is not None:
+            self.history.do(named)
+        self.path, self.state, self._over = path, "same", False
+        self.history.mark_saved()
+        self._kept = sketch
+        self._keeper.settle(path, self.disk)
+        return f"saved: {path}"
+
+    def keep(self) -> None:
+        """Keep aside what is not saved, if it is not what was kept last."""
+        sketch = self.history.sketch
+        if not self.unsaved:
+            if self._kept is not sketch:
+                self._kept = sketch
+                self._keeper.settle(self.path, self.disk)
+        elif self._kept is not sketch:
+            self._kept = sketch
+            self._keeper.keep(sketch)
+
+    @property
+    def trouble(self) -> str:
+        """What keeps it from keeping a draft, in words."""
+        return self._keeper.trouble
+
+    def look(self, now: float) -> State:
+        """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""
+        if self.disk is None or now - self._looked < _LOOKED_AGAIN:
+            return "same"
+        self._looked = now
+        state = file.state_of(self.disk)
+        news, self.state = state != self.state, state
+        if news and state != "same":
+            self.history.mark_unsaved()
+            return state
+        return "same"
+
+    def reload(self) -> None:
+        """Take the document as its file is now; that is an edit, which can be undone.
+
+        Raises
+        ------
+        MapError
+            When it cannot be read.
+        """
+        assert self.path is not None
+        sketch, self.disk = file.opened(self.path)
+        self.state, self._over = "same", False
+        self.history.do(Change(sketch, Selection(), "read again from the file"))
+        self.history.mark_saved()
+        self._kept = sketch
+        self._keeper.settle(self.path, self.disk)
+
+    def keep_mine(self) -> None:
+        """Take no notice of what is on the disk: saving replaces it."""
+        self._over = True
+
+    def flush(self) -> None:
+        """Wait until the draft is on the disk."""
+        self._keeper.flush()
+
+    def close(self, *, discard: bool) -> None:
+        """End; discard what was kept aside, or leave it to be offered at the next start."""
+        self._keeper.close(discard=discard)
 
 
-def draft_document(sketch: Sketch) -> dict[str, Any]:
-    """Return the map document of a sketch, whether it can be simulated or not.
-
-    `sketch_of` turns it into an equal sketch, keys aside. Of a sketch that breaks no rule it is the
-    document of its map; notes and the picture are under ``extra``.
-    """
-    document = to_json(sketch.unchecked())
-    if sketch.boundary is None:
-        del document["boundary"]
-    return document
-
-
-def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
-    """Return the sketch in a parsed map document; what breaks the rules of maps is kept as it is.
-
-    A density is read as strictly as in a map; `folder` holds its picture.
-
-    Raises
-    ------
-    MapError
-        When it is not made as maps are: not a map, another version, an unknown key or kind, something
-        that is not a number; the message names the place.
-    """
-    where = one_line(where)
-    require_json(document, where)
-    check_header(document, where, FORMAT, VERSION)
-    reader = PartReader(where)
-    members = reader.members(document, (), _KEYS)
-    boundary = members.get("boundary")
-    obstacles = reader.items(members.get("obstacles", []), ("obstacles",), "obstacles")
-    shapes = [reader.obstacle(value, ("obstacles", k)) for k, value in enumerate(obstacles)]
-    starts = reader.object(members.get("starts", {}), ("starts",))
-    extra = reader.object(members.get("extra", {}), ("extra",))
-    notes, background, others = taken_apart(extra, [shape.name for shape in shapes])
-    schema = members.get("$schema")
-    boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
-    density = members.get("density")
-    return Sketch(
-        name=reader.text(members.get("name", ""), ("name",)),
-        description=reader.text(members.get("description", ""), ("description",)),
-        boundary=boundary,
-        obstacles=tuple(Item(k, shape, notes.get(k, "")) for k, shape in enumerate(shapes)),
-        starts=tuple((name, reader.start(value, ("starts", name))) for name, value in starts.items()),
-        background=background,
-        extra=others,
-        schema=None if schema is None else reader.text(schema, ("$schema",)),
-        density=None if density is None else density_of(density, boundary or FIRST, where, folder),
-    )
-
-
-def sketch_text(sketch: Sketch) -> str:
-    """Return the text of the file of a sketch, as `robocov.mapfile.dump_map` has it."""
-    return dump_document(draft_document(sketch))
-
-
-def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
-    """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures.
-
-    Raises
-    ------
-    MapError
-        As `sketch_of`, and when the text is not JSON.
-    """
-    document = parse(text, where)
+def is_bundled(path: Path) -> bool:
+    """Return whether a file is one of the maps that come with robocov; what cannot be a file is none."""
     try:
-        return sketch_of(document, where, folder)
-    except MapError as error:
-        raise located(error, text, where) from None
-
-
-def geometry_of(shape: Obstacle) -> BaseGeometry:
-    """Return what an obstacle covers as a valid geometry, whatever the obstacle is like.
-
-    What is too large for a map, or too far away, covers nothing: computing with it may take for ever.
-    """
-    if isinstance(shape, CircleObstacle):
-        if not _is_near([shape.center]):
-            return GeometryCollection()
-        return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
-    points = shape.points if isinstance(shape, WallObstacle) else shape.vertices
-    if not _is_near(points):
-        return GeometryCollection()
-    line = _line(points)
-    if isinstance(shape, WallObstacle):
-        return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
-    if len(points) < 3:
-        return line
-    polygon = (
-        shape.polygon
-        if all(map(_is_ring, shape.holes))
-        else Polygon(points, list(filter(_is_ring, shape.holes)))
-    )
-    return polygon if polygon.is_valid else shapely.make_valid(polygon)
-
-
-def _is_near(points: Iterable[Point]) -> bool:
-    return all(abs(x) <= FARTHEST and abs(y) <= FARTHEST for x, y in points)
-
-
-def _is_ring(points: Ring) -> bool:
-    return len(points) >= 3 and _is_near(points)
-
-
-def _line(points: Ring) -> BaseGeometry:
-    """Return a line through points, or what is left of one."""
-    if not points:
-        return GeometryCollection()
-    return LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
+        return path.resolve() in {each.resolve() for each in bundled_maps().values()}
+    except (OSError, ValueError, RuntimeError):
+        return False

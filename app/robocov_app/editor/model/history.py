@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from robocov_app.editor.model.document import Sketch
 from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 import shapely
 
-from robocov_app.editor.model.plane import cos_sin
-from robocov_app.editor.tools.targets import Targets as Targets
+from robocov_app.editor.model.geometry import cos_sin
+from robocov_app.editor.tools.snap_targets import Targets
 
 if TYPE_CHECKING:
     from robocov.environment import Point

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from robocov.errors import MapError
+from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.tools.handles import Handle
+from robocov_app.editor.tools.snap_targets import Snapper
+from robocov_app.editor.tools.snapping import Snap, Snapping
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from robocov.environment import Obstacle, Point, Ring, StartSpec
     from robocov_app.editor.tools.snapping import Guide
-    from robocov_app.editor.ui.desk import Desk
 
 ANGLE = 15.0
 """Degrees: with Shift, lines are drawn at multiples of this."""
 
 
 @dataclass(frozen=True)
-class Aim:
+class PointerEvent:
     """Where the mouse points, and what is held down with it.
 
     Attributes
@@ -86,6 +91,50 @@ class Preview:
     chosen: int | None = None
 
 
+class ToolContext(Protocol):
+    """What tools ask of the editor that they work in, and what they tell it."""
+
+    grid: float
+    snap_angle: float
+    snaps: set[str]
+    snapper: Snapper
+    pixel: float
+    wall_width: float
+
+    @property
+    def sketch(self) -> Sketch:
+        """The map as it is now."""
+
+    @property
+    def selection(self) -> Selection:
+        """What is selected."""
+
+    @property
+    def handles(self) -> tuple[Handle, ...]:
+        """What of the selection can be dragged."""
+
+    @property
+    def handled(self) -> tuple[Owner, ...]:
+        """Whose vertices are shown."""
+
+    def snapping(self, reach: float) -> Snapping:
+        """Return what to snap to within `reach` metres."""
+
+    def snapped(
+        self, raw: Point, reach: float, origin: Point | None = None, more: tuple[Point, ...] = ()
+    ) -> Snap:
+        """Return the snapped place of a point."""
+
+    def change(self, change: Change) -> None:
+        """Make a change."""
+
+    def select(self, selection: Selection) -> None:
+        """Select something else."""
+
+    def say(self, words: str) -> None:
+        """Show a message."""
+
+
 class Tool:
     """A tool that does nothing; the others are like it.
 
@@ -123,32 +172,32 @@ class Tool:
         """What has been drawn so far, to snap to."""
         return ()
 
-    def press(self, desk: Desk, aim: Aim) -> None:
+    def press(self, context: ToolContext, event: PointerEvent) -> None:
         """Take a press of the left button."""
 
-    def twice(self, desk: Desk, aim: Aim) -> None:
+    def twice(self, context: ToolContext, event: PointerEvent) -> None:
         """Take the second press of a double click; by default it finishes."""
-        self.finish(desk)
+        self.finish(context)
 
-    def move(self, desk: Desk, aim: Aim) -> None:
+    def move(self, context: ToolContext, event: PointerEvent) -> None:
         """Take a move of the mouse, pressed or not."""
 
-    def release(self, desk: Desk, aim: Aim, *, clicked: bool) -> None:
+    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Take the button's release; `clicked` if it has not moved since it was pressed."""
 
-    def finish(self, desk: Desk) -> bool:
+    def finish(self, context: ToolContext) -> bool:
         """Take Enter; say whether there was something to finish."""
         return False
 
-    def back(self, desk: Desk) -> bool:
+    def back(self, context: ToolContext) -> bool:
         """Take Backspace: the last point goes; say whether there was one."""
         return False
 
-    def cancel(self, desk: Desk) -> bool:
+    def cancel(self, context: ToolContext) -> bool:
         """Take Escape; say whether there was something to give up."""
         return False
 
-    def enter(self, desk: Desk, text: str) -> None:
+    def enter(self, context: ToolContext, text: str) -> None:
         """Take what was typed.
 
         Raises
@@ -158,24 +207,19 @@ class Tool:
         """
         raise MapError(f"“{text}”: there is nothing to type here")
 
-    def preview(self, desk: Desk) -> Preview | None:
+    def preview(self, context: ToolContext) -> Preview | None:
         """Return what to show."""
         return None
 
-    def shape_of_cursor(self, desk: Desk) -> str:
+    def shape_of_cursor(self, context: ToolContext) -> str:
         """Return what the cursor looks like over the sheet: arrow, cross, hand, move, ..."""
         return "cross"
 
 
-def apart(a: Point, b: Point) -> float:
-    """Return the distance of two points, m."""
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
-
-
-def straightened(origin: Point, point: Point) -> Point:
+def at_round_angle(origin: Point, point: Point) -> Point:
     """Return the point on the nearest line at a multiple of `ANGLE` degrees through another.
 
-    >>> straightened((0.0, 0.0), (3.0, 0.1))
+    >>> at_round_angle((0.0, 0.0), (3.0, 0.1))
     (3.0, 0.0)
     """
     dx, dy = point[0] - origin[0], point[1] - origin[1]
@@ -194,7 +238,7 @@ def bearing_words(a: Point, b: Point) -> str:
     """
     angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
     shown = 0.0 if abs(angle) < 0.05 else angle
-    return f"{length_words(apart(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
+    return f"{length_words(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
 
 
 def length_words(metres: float) -> str:
@@ -218,10 +262,10 @@ def place_words(point: Point) -> str:
     return f"({x:.2f}, {y:.2f}) m"
 
 
-def swept(points: Sequence[Point]) -> float:
+def ring_area(points: Sequence[Point]) -> float:
     """Return the area of a ring, m².
 
-    >>> swept([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
+    >>> ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
     2.0
     """
     ring = np.asarray(points)
@@ -229,8 +273,8 @@ def swept(points: Sequence[Point]) -> float:
     return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
 
 
-def held(aim: Aim, origin: Point | None) -> Point:
+def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
     """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
-    if aim.shift and origin is not None:
-        return straightened(origin, aim.raw)
-    return aim.point
+    if event.shift and origin is not None:
+        return at_round_angle(origin, event.raw)
+    return event.point

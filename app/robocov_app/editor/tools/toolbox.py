@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robocov_app.editor.tools.drawing import Boundary, Measure, Places, Polygon, Wall
-from robocov_app.editor.tools.leading import Leading
-from robocov_app.editor.tools.selecting import Pan, Select
-from robocov_app.editor.tools.stretching import Circle, Disc, Rectangle
-from robocov_app.editor.tools.underlay import Underlay
-from robocov_app.editor.tools.weighing import Weighing
+from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.draw import Boundary, Circle, Disc, Measure, Places, Polygon, Rectangle, Wall
+from robocov_app.editor.tools.motion_path import MotionPathTool
+from robocov_app.editor.tools.reference_image import ReferenceImageTool
+from robocov_app.editor.tools.select import Pan, Select
 
 if TYPE_CHECKING:
     from robocov_app.editor.tools.tool import Tool
@@ -28,8 +27,8 @@ def toolbox() -> dict[str, Tool]:
         Measure(),
         Disc(),
         Places(),
-        Weighing(),
-        Leading(),
-        Underlay(),
+        DensityTool(),
+        MotionPathTool(),
+        ReferenceImageTool(),
     ]
     return {tool.name: tool for tool in tools}

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 
 from robocov.environment import WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import arranging, booleans, edits, paths, simplifying, vertices
+from robocov_app.editor.edits import boolean, create, motion_path, properties, simplify, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
-from robocov_app.editor.model.document import BOUNDARY
 from robocov_app.editor.model.selection import Selection, place_of
-from robocov_app.editor.tools.grips import things
+from robocov_app.editor.model.sketch import BOUNDARY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Point
-    from robocov_app.editor.model.document import Owner
     from robocov_app.editor.model.selection import Change, Vertex
+    from robocov_app.editor.model.sketch import Owner
     from robocov_app.editor.ui.desk import Desk
 
 FAR = 10
@@ -44,7 +43,7 @@ def deeds(desk: Desk) -> dict[str, Callable[[], object]]:
         "copy": lambda: copy(desk),
         "paste": lambda: paste(desk, desk.cursor),
         "paste:there": lambda: paste(desk, None),
-        "duplicate": lambda: _do(desk, edits.duplicated, desk.grid * FAR / 2, -desk.grid * FAR / 2),
+        "duplicate": lambda: _do(desk, transform.duplicated, desk.grid * FAR / 2, -desk.grid * FAR / 2),
         "delete": lambda: delete(desk),
         "back": lambda: back(desk),
         "finish": lambda: desk.tool.finish(desk),
@@ -54,47 +53,47 @@ def deeds(desk: Desk) -> dict[str, Callable[[], object]]:
         "select:previous": lambda: select_next(desk, -1),
         **{name: partial(nudge, desk, x, y) for name, (x, y) in _NUDGES.items()},
         **{f"{name}:far": partial(nudge, desk, FAR * x, FAR * y) for name, (x, y) in _NUDGES.items()},
-        "rotate:left": lambda: _do(desk, edits.rotated, 90.0),
-        "rotate:right": lambda: _do(desk, edits.rotated, -90.0),
-        "mirror:x": lambda: _do(desk, edits.mirrored, "x"),
-        "mirror:y": lambda: _do(desk, edits.mirrored, "y"),
+        "rotate:left": lambda: _do(desk, transform.rotated, 90.0),
+        "rotate:right": lambda: _do(desk, transform.rotated, -90.0),
+        "mirror:x": lambda: _do(desk, transform.mirrored, "x"),
+        "mirror:y": lambda: _do(desk, transform.mirrored, "y"),
         **{
-            f"align:{side}": partial(_do, desk, arranging.aligned, side, single=True)
-            for side in arranging.SIDES
+            f"align:{side}": partial(_do, desk, transform.aligned, side, single=True)
+            for side in transform.SIDES
         },
-        "distribute:x": lambda: _do(desk, arranging.distributed, "x"),
-        "distribute:y": lambda: _do(desk, arranging.distributed, "y"),
-        "raise": lambda: _do(desk, edits.raised, "top"),
-        "lower": lambda: _do(desk, edits.raised, "bottom"),
-        "unite": lambda: _do(desk, booleans.united),
-        "subtract": lambda: _do(desk, booleans.subtracted),
-        "intersect": lambda: _do(desk, booleans.intersected),
-        "divide": lambda: _do(desk, booleans.divided),
-        "clip": lambda: desk.change(booleans.clipped(desk.sketch, things(desk.selection))),
-        "repair": lambda: _do(desk, booleans.repaired),
+        "distribute:x": lambda: _do(desk, transform.distributed, "x"),
+        "distribute:y": lambda: _do(desk, transform.distributed, "y"),
+        "raise": lambda: _do(desk, properties.raised, "top"),
+        "lower": lambda: _do(desk, properties.raised, "bottom"),
+        "unite": lambda: _do(desk, boolean.united),
+        "subtract": lambda: _do(desk, boolean.subtracted),
+        "intersect": lambda: _do(desk, boolean.intersected),
+        "divide": lambda: _do(desk, boolean.divided),
+        "clip": lambda: desk.change(boolean.clipped(desk.sketch, desk.selection.without_vertices())),
+        "repair": lambda: _do(desk, boolean.repaired),
         "join": lambda: _do(desk, vertices.joined),
-        "polygons": lambda: _do(desk, edits.made_polygons),
-        "boundary:of": lambda: _do(desk, edits.made_boundary),
+        "polygons": lambda: _do(desk, properties.made_polygons),
+        "boundary:of": lambda: _do(desk, properties.made_boundary),
         "bevel": lambda: bevel(desk, 2 * desk.grid),
         "round": lambda: round_corners(desk, 2 * desk.grid),
         "split": lambda: desk.change(vertices.split(desk.sketch, one_vertex(desk))),
         "extend": lambda: extend(desk),
         "fill": lambda: fill(desk),
-        "simplify": lambda: simplify(desk, TOLERANCE),
-        "straighten": lambda: _do(desk, simplifying.straightened),
+        "simplify": lambda: simplify_outlines(desk, TOLERANCE),
+        "straighten": lambda: _do(desk, simplify.straightened),
         "wider": lambda: widen(desk, WIDER),
         "narrower": lambda: widen(desk, 1.0 / WIDER),
         "grid:finer": lambda: desk.change_grid(-1),
         "grid:coarser": lambda: desk.change_grid(1),
-        "start:uniform": lambda: desk.change(edits.uniform_start_added(desk.sketch)),
+        "start:uniform": lambda: desk.change(create.uniform_start_added(desk.sketch)),
         "start:next": lambda: next_start(desk),
         "start:default": lambda: make_default(desk),
         "more": lambda: desk.set_robots(min(desk.robots + 1, 1000)),
         "fewer": lambda: desk.set_robots(max(desk.robots - 1, 1)),
-        "background:none": lambda: desk.change(edits.underlaid(desk.sketch, None)),
+        "background:none": lambda: desk.change(properties.underlaid(desk.sketch, None)),
         "problem:next": lambda: next_problem(desk),
-        "path:repeat": lambda: _do(desk, paths.path_turned),
-        "path:none": lambda: _do(desk, paths.path_removed),
+        "path:repeat": lambda: _do(desk, motion_path.path_turned),
+        "path:none": lambda: _do(desk, motion_path.path_removed),
         "path:play": lambda: play(desk),
     }
 
@@ -111,7 +110,7 @@ def _do(desk: Desk, edit: Callable[..., Change], *rest: object, single: bool = F
 
 def whole(selection: Selection) -> Selection:
     """Return the selected things; of selected vertices, what they belong to."""
-    return things(selection).plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
+    return selection.without_vertices().plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
 
 
 def play(desk: Desk) -> str:
@@ -125,7 +124,7 @@ def play(desk: Desk) -> str:
     if desk.moves_since is not None:
         desk.moves_since = None
         return "obstacles stand as they are at time zero"
-    if not paths.moving(desk.sketch):
+    if not motion_path.moving(desk.sketch):
         raise MapError("no obstacle moves: the tool Path gives one a path")
     desk.moves_since = desk.now
     return "obstacles move as they will; L ends it"
@@ -142,7 +141,7 @@ def delete(desk: Desk) -> None:
     selection = desk.selection
     if not selection:
         raise MapError("nothing is selected: click something first")
-    act = vertices.deleted if selection.vertices else edits.deleted
+    act = vertices.deleted if selection.vertices else properties.deleted
     single = Selection(vertices=selection.vertices)
     desk.change(act(desk.sketch, single if selection.vertices else selection))
 
@@ -157,7 +156,7 @@ def copy(desk: Desk) -> str:
 def cut(desk: Desk) -> None:
     """Copy what is selected, and delete it."""
     copy(desk)
-    desk.change(edits.deleted(desk.sketch, whole(desk.selection)))
+    desk.change(properties.deleted(desk.sketch, whole(desk.selection)))
 
 
 def paste(desk: Desk, at: Point | None) -> None:
@@ -173,7 +172,7 @@ def nudge(desk: Desk, x: int, y: int) -> None:
     selection = desk.selection
     if not selection:
         raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
-    act = vertices.moved if selection.vertices else edits.moved
+    act = vertices.moved if selection.vertices else transform.moved
     single = Selection(vertices=selection.vertices) if selection.vertices else selection
     desk.change(act(desk.sketch, single, x * desk.grid, y * desk.grid), drag=("nudge", selection))
 
@@ -238,9 +237,9 @@ def round_corners(desk: Desk, radius: float) -> None:
     desk.change(vertices.rounded_off(desk.sketch, corners(desk), radius))
 
 
-def simplify(desk: Desk, tolerance: float) -> None:
+def simplify_outlines(desk: Desk, tolerance: float) -> None:
     """Leave vertices out of what is selected."""
-    _do(desk, simplifying.simplified, tolerance)
+    _do(desk, simplify.simplified, tolerance)
 
 
 def extend(desk: Desk) -> None:
@@ -266,7 +265,9 @@ def widen(desk: Desk, factor: float) -> None:
     widths = [shape.width for shape in walls.values() if isinstance(shape, WallObstacle)]
     width = round(max((widths[0] if widths else desk.wall_width) * factor, 0.01), 3)
     if widths and not desk.tool.busy:
-        desk.change(edits.widened(desk.sketch, whole(desk.selection), width), drag=("width", desk.selection))
+        desk.change(
+            properties.widened(desk.sketch, whole(desk.selection), width), drag=("width", desk.selection)
+        )
     desk.set_wall_width(width)
     desk.say(f"walls are {width:g} m wide")
 
@@ -288,7 +289,7 @@ def make_default(desk: Desk) -> None:
     if len(desk.selection.starts) != 1:
         raise MapError("select one start first")
     (name,) = desk.selection.starts
-    desk.change(edits.start_first(desk.sketch, name))
+    desk.change(properties.start_first(desk.sketch, name))
 
 
 def next_problem(desk: Desk) -> None:
@@ -296,7 +297,7 @@ def next_problem(desk: Desk) -> None:
     found = desk.problems
     if not found:
         desk.problem = None
-        desk.say("nothing is wrong with the map" if desk.readout is not None else "not looked at yet")
+        desk.say("nothing is wrong with the map" if desk.measurement is not None else "not looked at yet")
         return
     place = found.index(desk.problem) + 1 if desk.problem in found else 0
     desk.problem = found[place % len(found)]

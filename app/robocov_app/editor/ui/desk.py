@@ -9,8 +9,8 @@ from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.tools.grips import Grip, grips, handled
-from robocov_app.editor.tools.snapper import Snapper, vertex_count
+from robocov_app.editor.tools.handles import Handle, handled, handles
+from robocov_app.editor.tools.snap_targets import Snapper, vertex_count
 from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, snapping_for
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     from robocov.environment import Point
-    from robocov_app.editor.model.document import Owner, Sketch
-    from robocov_app.editor.model.paper import Paper
-    from robocov_app.editor.model.problems import Problem
-    from robocov_app.editor.model.readout import Readout
+    from robocov_app.editor.model.document import Document
+    from robocov_app.editor.model.measurement import Measurement
     from robocov_app.editor.model.selection import Change
-    from robocov_app.editor.tools.selecting import Select
+    from robocov_app.editor.model.sketch import Owner, Sketch
+    from robocov_app.editor.model.validation import Problem
+    from robocov_app.editor.tools.select import Select
     from robocov_app.editor.tools.tool import Tool
     from robocov_app.editor.ui.asking import ListQuestion, Question
     from robocov_app.editor.ui.importing import ImportQuestion
@@ -56,12 +56,12 @@ class Pasteboard(Protocol):
 
 
 class Readings(Protocol):
-    """Who measures sketches, as `robocov_app.editor.model.readout_worker.ReadoutWorker` does."""
+    """Who measures sketches, as `robocov_app.editor.model.measurement_worker.MeasurementWorker` does."""
 
     def ask(self, sketch: Sketch, radius: float) -> None:
         """Ask about a sketch."""
 
-    def poll(self) -> Readout | None:
+    def poll(self) -> Measurement | None:
         """Return the newest answer, if there is one."""
 
     @property
@@ -74,7 +74,7 @@ class Desk:
 
     Parameters
     ----------
-    paper : Paper
+    document : Document
     readings : Readings
     pasteboard : Pasteboard
     folder : Path
@@ -99,8 +99,8 @@ class Desk:
         The one that is shown with its words.
     """
 
-    def __init__(self, paper: Paper, readings: Readings, pasteboard: Pasteboard, folder: Path) -> None:
-        self.paper, self.readings, self.pasteboard, self.folder = paper, readings, pasteboard, folder
+    def __init__(self, document: Document, readings: Readings, pasteboard: Pasteboard, folder: Path) -> None:
+        self.document, self.readings, self.pasteboard, self.folder = document, readings, pasteboard, folder
         self.tools = toolbox()
         self.tool: Tool = self.tools["select"]
         self.version = 0
@@ -113,7 +113,7 @@ class Desk:
         self.radius, self.robots, self.seed = DEFAULT_RADIUS, 6, 0
         self.start: str | None = None
         self.recent: list[str] = []
-        self.readout: Readout | None = None
+        self.measurement: Measurement | None = None
         self.problem: Problem | None = None
         self.asked: Question | ListQuestion | ImportQuestion | None = None
         self.message = ""
@@ -125,7 +125,7 @@ class Desk:
         self.moves_since: float | None = None
         self._said = 0.0
         self.snapper = Snapper()
-        self._grips: tuple[object, tuple[Grip, ...]] = (None, ())
+        self._grips: tuple[object, tuple[Handle, ...]] = (None, ())
         self._about: tuple[object, float] | None = None
 
     # what there is
@@ -133,12 +133,12 @@ class Desk:
     @property
     def sketch(self) -> Sketch:
         """The map as it is now."""
-        return self.paper.history.sketch
+        return self.document.history.sketch
 
     @property
     def selection(self) -> Selection:
         """What is selected."""
-        return self.paper.history.selection
+        return self.document.history.selection
 
     @property
     def selector(self) -> Select:
@@ -163,7 +163,7 @@ class Desk:
         return handled(self.selection)
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def handles(self) -> tuple[Handle, ...]:
         """What of the selection can be taken hold of."""
         key = (self.sketch, self.selection, self.pixel)
         before = self._grips[0]
@@ -172,13 +172,13 @@ class Desk:
             or any(a is not b for a, b in zip(before[:2], key[:2], strict=True))
             or (before[2] != key[2])
         ):
-            self._grips = key, grips(self.sketch, self.selection, self.pixel)
+            self._grips = key, handles(self.sketch, self.selection, self.pixel)
         return self._grips[1]
 
     @property
     def problems(self) -> tuple[Problem, ...]:
         """What is wrong, as far as is known."""
-        return self.readout.problems if self.readout is not None else ()
+        return self.measurement.problems if self.measurement is not None else ()
 
     @property
     def start_names(self) -> list[str]:
@@ -219,14 +219,14 @@ class Desk:
 
     def change(self, change: Change, *, drag: Hashable | None = None) -> None:
         """Make a change, and tell what it was."""
-        if self.paper.history.do(change, drag=drag):
+        if self.document.history.do(change, drag=drag):
             self.say(change.words)
         self._changed()
 
     def _changed(self) -> None:
         self.version += 1
         self.problem = None
-        self.paper.keep()
+        self.document.keep()
         self.ask_readings()
 
     def ask_readings(self) -> None:
@@ -242,33 +242,33 @@ class Desk:
     def select(self, selection: Selection) -> None:
         """Select something else."""
         if selection != self.selection:
-            self.paper.history.selection = selection
+            self.document.history.selection = selection
             self.version += 1
 
     def undo(self) -> None:
         """Take the newest change back."""
-        change = self.paper.history.undo()
+        change = self.document.history.undo()
         self.say(f"undone: {change.words}" if change else "nothing to undo")
         self._changed()
 
     def redo(self) -> None:
         """Do again what was undone last."""
-        change = self.paper.history.redo()
+        change = self.document.history.redo()
         self.say(f"done again: {change.words}" if change else "nothing to do again")
         self._changed()
 
     def travel(self, steps: int) -> None:
         """Undo so many changes, or with a negative number do them again."""
-        history = self.paper.history
+        history = self.document.history
         for _ in range(abs(steps)):
             if (history.undo if steps > 0 else history.redo)() is None:
                 break
         self._changed()
 
-    def put(self, paper: Paper) -> None:
+    def put(self, document: Document) -> None:
         """Put another document on the desk."""
-        self.paper = paper
-        self.readout, self._about = None, None
+        self.document = document
+        self.measurement, self._about = None, None
         self.selector.cancel(self)
         self.choose("select", tell=False)
         self._changed()
@@ -306,7 +306,7 @@ class Desk:
             self.message = ""
         answer = self.readings.poll()
         if answer is not None:
-            self.readout = answer
+            self.measurement = answer
             self.version += 1
 
     def command(self, text: str) -> None:

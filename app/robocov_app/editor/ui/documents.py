@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
-from robocov_app.editor.edits.edits import underlaid
+from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model.autosave import opened_elsewhere
 from robocov_app.editor.model.background import picture_laid
-from robocov_app.editor.model.document import Sketch
-from robocov_app.editor.model.drafts import opened_elsewhere
-from robocov_app.editor.model.files import ChangedError
-from robocov_app.editor.model.paper import SUFFIX, Paper
+from robocov_app.editor.model.document import SUFFIX, Document
+from robocov_app.editor.model.file import ChangedError
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui import import_process
 from robocov_app.editor.ui.asking import Answer, FileQuestion, Picker, Question
 from robocov_app.editor.ui.importing import ImportQuestion
@@ -23,7 +23,7 @@ from robocov_app.live.latest import DirectWorker, LatestWorker
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.editor.model.drafts import Draft
+    from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.ui.desk import Desk
     from robocov_app.editor.ui.import_process import Imported
     from robocov_app.editor.ui.importing import Worker
@@ -78,10 +78,10 @@ class Documents:
 
     def leave(self, then: Callable[[], object]) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
-        paper = self.desk.paper
-        if not paper.unsaved:
+        document = self.desk.document
+        if not document.unsaved:
             then()
-            paper.close(discard=True)
+            document.close(discard=True)
             return
 
         def save() -> None:
@@ -89,9 +89,9 @@ class Documents:
 
         def discard() -> None:
             then()
-            paper.close(discard=True)
+            document.close(discard=True)
 
-        words = f"“{paper.title}” has changes that are in no file."
+        words = f"“{document.title}” has changes that are in no file."
         answers = (
             Answer("Save", "s", save),
             Answer("Discard", "d", discard),
@@ -106,18 +106,18 @@ class Documents:
     def _leave_for_good(self) -> None:
         self.leaving = True
 
-    def _put(self, paper: Paper, words: str = "") -> None:
-        self.desk.put(paper)
+    def _put(self, document: Document, words: str = "") -> None:
+        self.desk.put(document)
         self._fit()
-        if paper.path is not None:
-            self.remember(paper.path)
+        if document.path is not None:
+            self.remember(document.path)
         self.desk.say(words)
 
     # opening
 
     def new(self) -> str:
         """Put an empty sheet on the desk."""
-        self._put(Paper.new(self.drafts))
+        self._put(Document.new(self.drafts))
         return "a new map: 10 x 10 m; B draws another boundary"
 
     def ask_file(self) -> None:
@@ -150,14 +150,14 @@ class Documents:
         RobocovError
             When it cannot be read; what is open stays.
         """
-        own = self.desk.paper.path
+        own = self.desk.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
         if opened_elsewhere(self.drafts, path):
             raise MapError(f"{path.name}: another editor has it open")
         found = opened(path, self.drafts)
-        if isinstance(found, Paper):
+        if isinstance(found, Document):
             self.leave(lambda: self._put(found, heading(found)))
         else:
             self.ask_import(path, found)
@@ -167,8 +167,8 @@ class Documents:
 
         def put(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
-            paper = Paper(sketch, self.drafts, saved=False, stem=path.stem)
-            self.leave(lambda: self._put(paper, f"imported: {path.name}, not saved yet"))
+            document = Document(sketch, self.drafts, saved=False, stem=path.stem)
+            self.leave(lambda: self._put(document, f"imported: {path.name}, not saved yet"))
 
         self.desk.asked = ImportQuestion(path, importer, self._import_worker(), put)
 
@@ -177,7 +177,7 @@ class Documents:
             return DirectWorker(import_process.SERVICE)
         return LatestWorker("robocov_app.editor.ui.import_process", "imports", patience=_PATIENCE)
 
-    def recover(self, draft: Draft) -> None:
+    def recover(self, draft: Autosave) -> None:
         """Go on with work that was left behind.
 
         Raises
@@ -185,7 +185,7 @@ class Documents:
         RobocovError
             When it cannot be read, or another editor goes on with it.
         """
-        self._put(Paper.recovered(draft, self.drafts))
+        self._put(Document.recovered(draft, self.drafts))
         self.desk.say(f"recovered: {draft.words()}")
 
     def remember(self, path: Path) -> None:
@@ -197,14 +197,14 @@ class Documents:
 
     def save(self, then: Callable[[], object] | None = None) -> str | None:
         """Save to the document's file; ask for one if it has none."""
-        if self.desk.paper.path is None:
+        if self.desk.document.path is None:
             self.ask_name(then)
             return None
-        return self._save(self.desk.paper.path, then)
+        return self._save(self.desk.document.path, then)
 
     def ask_name(self, then: Callable[[], object] | None = None) -> None:
         """Ask where to save."""
-        suggested = self.desk.paper.suggested(self.desk.folder)
+        suggested = self.desk.document.suggested(self.desk.folder)
         text = str(suggested)
         if suggested.parent == self.desk.folder:
             text = suggested.name
@@ -217,7 +217,7 @@ class Documents:
     def _save(self, path: Path, then: Callable[[], object] | None, *, over: bool = False) -> str | None:
         desk = self.desk
         try:
-            words = desk.paper.save(path, over=over)
+            words = desk.document.save(path, over=over)
         except ChangedError as error:
             answers = (
                 Answer("Save as…", "a", lambda: self.ask_name(then)),
@@ -226,8 +226,8 @@ class Documents:
             )
             desk.asked = Question("Replace the file?", str(error), answers)
             return None
-        assert desk.paper.path is not None
-        self.remember(desk.paper.path)
+        assert desk.document.path is not None
+        self.remember(desk.document.path)
         grave = [problem for problem in desk.problems if problem.grave]
         if grave:
             words += f", as a draft: {grave[0].words}"
@@ -254,7 +254,7 @@ class Documents:
             return self._export(Path(text))
 
         title = f"Export to a file ending in {', '.join(suffixes)}"
-        name = Path(self.desk.paper.suggested(self.desk.folder).name).stem
+        name = Path(self.desk.document.suggested(self.desk.folder).name).stem
         self.desk.asked = FileQuestion(
             title, self.desk.folder, chosen, suffixes, text=f"{name}.svg", saves=True
         )
@@ -289,26 +289,26 @@ class Documents:
             desk.attempt(lambda: asked.call(imported))
         if desk.asked is not None:
             return
-        state = desk.paper.look(desk.now)
+        state = desk.document.look(desk.now)
         if state == "gone":
-            desk.say(f"{desk.paper.title} is no longer there; Ctrl S writes it again", trouble=True)
+            desk.say(f"{desk.document.title} is no longer there; Ctrl S writes it again", trouble=True)
         elif state == "changed":
             answers = (
                 Answer("Reload", "r", self.reload),
-                Answer("Keep mine", "k", desk.paper.keep_mine),
+                Answer("Keep mine", "k", desk.document.keep_mine),
             )
-            words = f"Something else has changed {desk.paper.title}. Reloading can be undone."
+            words = f"Something else has changed {desk.document.title}. Reloading can be undone."
             desk.asked = Question("The file has changed", words, answers)
 
     def reload(self) -> str:
         """Read the file again."""
-        if self.desk.paper.path is None:
+        if self.desk.document.path is None:
             raise MapError("the map has no file yet")
-        self.desk.paper.reload()
-        self.desk.readout = None
+        self.desk.document.reload()
+        self.desk.measurement = None
         self.desk.version += 1
         self.desk.ask_readings()
-        return f"read again: {self.desk.paper.title}"
+        return f"read again: {self.desk.document.title}"
 
     # the picture under the map
 
@@ -349,7 +349,7 @@ def lay_under(desk: Desk, path: Path) -> None:
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
         raise MapError(f"{path}: not a picture that can be read") from None
     bounds = desk.sketch.bounds
-    laid = picture_laid(_from_map(path, desk.paper.path), pixels)
+    laid = picture_laid(_from_map(path, desk.document.path), pixels)
     if bounds is not None and desk.sketch.background is None:
         laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
     desk.change(underlaid(desk.sketch, laid))
@@ -368,7 +368,7 @@ def _from_map(path: Path, of: Path | None) -> str:
     return path.as_posix()
 
 
-def opened(path: Path, drafts: Path | None) -> Paper | Importer:
+def opened(path: Path, drafts: Path | None) -> Document | Importer:
     """Return the document of a file; or the format of one that has to be imported.
 
     Raises
@@ -377,9 +377,9 @@ def opened(path: Path, drafts: Path | None) -> Paper | Importer:
         When it cannot be read.
     """
     if path.suffix.lower() == SUFFIX and not path.exists():
-        return Paper.new(drafts, path)
+        return Document.new(drafts, path)
     try:
-        return Paper.opened(path, drafts)
+        return Document.opened(path, drafts)
     except MapError as error:
         if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
             from robocov_app.importers import detect
@@ -392,13 +392,13 @@ def opened(path: Path, drafts: Path | None) -> Paper | Importer:
         raise error from None
 
 
-def heading(paper: Paper) -> str:
+def heading(document: Document) -> str:
     """Return what is said of a document that was opened."""
-    if paper.path is None:
-        return f"{paper.title}: opened as a copy"
-    if not paper.path.exists():
-        return f"a new map, {paper.path.name}: 10 x 10 m; B draws another boundary"
-    return f"opened: {paper.title}"
+    if document.path is None:
+        return f"{document.title}: opened as a copy"
+    if not document.path.exists():
+        return f"a new map, {document.path.name}: 10 x 10 m; B draws another boundary"
+    return f"opened: {document.title}"
 
 
 def _is_map(path: Path) -> bool:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, DiscStart, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import edits, vertices
-from robocov_app.editor.edits.edits import bounds_of, underlaid
+from robocov_app.editor.edits import properties, transform, vertices
+from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import place_of
 from robocov_app.editor.ui.deeds import whole
@@ -95,7 +96,7 @@ def _put(desk: Desk, axis: int, text: str) -> None:
     by = coordinate(text, now[axis]) - now[axis]
     selection = desk.selection
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
-    act = vertices.moved if selection.vertices else edits.moved
+    act = vertices.moved if selection.vertices else transform.moved
     desk.change(act(desk.sketch, selection, dx, dy))
 
 
@@ -114,7 +115,7 @@ def _resize(desk: Desk, axis: int, text: str) -> None:
     now = bounds[2] - bounds[0], bounds[3] - bounds[1]
     to = length_of(text, now=now[axis])
     wide, high = (to, now[1]) if axis == 0 else (now[0], to)
-    desk.change(edits.resized(desk.sketch, selection, wide or None, high or None))
+    desk.change(transform.resized(desk.sketch, selection, wide or None, high or None))
 
 
 def _shown_name(desk: Desk) -> str:
@@ -130,7 +131,7 @@ def _shown_name(desk: Desk) -> str:
 def _rename(desk: Desk, text: str) -> None:
     (owner,) = whole(desk.selection).owners
     if text.strip() != _shown_name(desk):
-        desk.change(edits.renamed(desk.sketch, owner, text.strip()))
+        desk.change(properties.renamed(desk.sketch, owner, text.strip()))
 
 
 def _shown_note(desk: Desk) -> str:
@@ -139,7 +140,7 @@ def _shown_note(desk: Desk) -> str:
 
 
 def _note(desk: Desk, text: str) -> None:
-    desk.change(edits.noted(desk.sketch, whole(desk.selection), text.strip()))
+    desk.change(properties.noted(desk.sketch, whole(desk.selection), text.strip()))
 
 
 def _wall_width(desk: Desk) -> str:
@@ -151,7 +152,7 @@ def _wall_width(desk: Desk) -> str:
 def _set_width(desk: Desk, text: str) -> None:
     now = _wall_width(desk)
     width = length_of(text, now=float(now) if now else None)
-    desk.change(edits.widened(desk.sketch, whole(desk.selection), width))
+    desk.change(properties.widened(desk.sketch, whole(desk.selection), width))
 
 
 def _radius(desk: Desk) -> str:
@@ -171,7 +172,7 @@ def _radius(desk: Desk) -> str:
 def _set_radius(desk: Desk, text: str) -> None:
     now = _radius(desk)
     radius = length_of(text, now=float(now) if now else None)
-    desk.change(edits.sized(desk.sketch, whole(desk.selection), radius))
+    desk.change(properties.sized(desk.sketch, whole(desk.selection), radius))
 
 
 def _picture(desk: Desk) -> Background:
@@ -215,12 +216,12 @@ def _or_empty(text: Callable[[Desk], str]) -> Callable[[Desk], str]:
 FIELDS: dict[str, Field] = {
     "title": Field(
         lambda desk: desk.sketch.name,
-        lambda desk, text: desk.change(edits.titled(desk.sketch, name=text.strip())),
+        lambda desk, text: desk.change(properties.titled(desk.sketch, name=text.strip())),
         "The map's name, for people",
     ),
     "description": Field(
         lambda desk: desk.sketch.description,
-        lambda desk, text: desk.change(edits.titled(desk.sketch, description=text.strip())),
+        lambda desk, text: desk.change(properties.titled(desk.sketch, description=text.strip())),
         "A sentence about the map",
     ),
     "radius": Field(

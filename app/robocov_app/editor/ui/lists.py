@@ -9,8 +9,8 @@ import numpy as np
 import pygame
 
 from robocov_app.editor.canvas.findings import draw_badge
-from robocov_app.editor.model.problems import Problem
 from robocov_app.editor.model.selection import Selection, Vertex, place_of, points_of
+from robocov_app.editor.model.validation import Problem
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened
 from robocov_app.render.theme import mix
@@ -185,7 +185,7 @@ class ProblemList(PanelList):
 
     def empty_words(self) -> str:
         """Return that all is well, or that nobody knows yet."""
-        return "Nothing is wrong with the map." if self._desk.readout is not None else "Being looked at …"
+        return "Nothing is wrong with the map." if self._desk.measurement is not None else "Being looked at …"
 
     def chosen(self, row: Row) -> bool:
         """Return whether the problem is the one that is shown."""
@@ -216,12 +216,12 @@ class HistoryList(PanelList):
 
     def key(self) -> object:
         """Return what there is now: every edit makes another sketch."""
-        history = self._desk.paper.history
+        history = self._desk.document.history
         return history, id(history.sketch), history.can_redo
 
     def rows(self, wide: float) -> list[Row]:
         """Return a line for each edit, about how many are to be undone to be there."""
-        history = self._desk.paper.history
+        history = self._desk.document.history
         future, past = history.future[:MOST_ROWS], history.past[:MOST_ROWS]
         steps = [(words, k - len(future)) for k, words in enumerate(reversed(future))]
         steps += [(words, k) for k, words in enumerate(past)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov.environment import PolygonObstacle, WallObstacle
-from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.deeds import whole
 
 if TYPE_CHECKING:

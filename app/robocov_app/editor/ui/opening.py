@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
-from robocov_app.editor.model.drafts import discarded, drafts_folder, left_behind, opened_elsewhere
-from robocov_app.editor.model.paper import Paper
-from robocov_app.editor.model.readout import readout
-from robocov_app.editor.model.readout_worker import ReadoutWorker
+from robocov_app.editor.model.autosave import autosave_folder, discard, opened_elsewhere, recoverable
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.measurement import measure
+from robocov_app.editor.model.measurement_worker import MeasurementWorker
 from robocov_app.editor.ui.asking import Answer, Question
 from robocov_app.editor.ui.desk import Desk
 from robocov_app.editor.ui.documents import heading, lay_under, opened
@@ -22,9 +22,9 @@ from robocov_app.viewer.settings import loaded, save_settings, settings_file
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from robocov_app.editor.model.document import Sketch
-    from robocov_app.editor.model.drafts import Draft
-    from robocov_app.editor.model.readout import Readout
+    from robocov_app.editor.model.autosave import Autosave
+    from robocov_app.editor.model.measurement import Measurement
+    from robocov_app.editor.model.sketch import Sketch
     from robocov_app.editor.ui.window import EditorWindow
 
 NO_DISPLAY = (
@@ -39,13 +39,13 @@ class DirectReadings:
     busy = False
 
     def __init__(self) -> None:
-        self._answer: Readout | None = None
+        self._answer: Measurement | None = None
 
     def ask(self, sketch: Sketch, radius: float) -> None:
         """Measure."""
-        self._answer = readout(sketch, radius)
+        self._answer = measure(sketch, radius)
 
-    def poll(self) -> Readout | None:
+    def poll(self) -> Measurement | None:
         """Return the answer."""
         answer, self._answer = self._answer, None
         return answer
@@ -94,26 +94,28 @@ class EditorOpening:
         InputError
             When there is no display, or the map cannot be read.
         """
-        drafts = None if self.headless else drafts_folder()
+        drafts = None if self.headless else autosave_folder()
         if self.path is not None and not self.headless and opened_elsewhere(drafts, self.path):
             raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
         # what is wrong with the file is told before a window flashes up
-        found = Paper.new(drafts) if self.path is None else opened(self.path, drafts)
-        paper = found if isinstance(found, Paper) else Paper.new(drafts)
+        found = Document.new(drafts) if self.path is None else opened(self.path, drafts)
+        document = found if isinstance(found, Document) else Document.new(drafts)
         ended = False
-        readings = DirectReadings() if self.headless else ReadoutWorker()
+        readings = DirectReadings() if self.headless else MeasurementWorker()
         try:
             with display(headless=self.headless, otherwise=NO_DISPLAY):
                 file = None if self.headless else settings_file(FILE)
                 settings, trouble = loaded(EditorSettings, file)
-                desk = self._desk(paper, readings, settings)
+                desk = self._desk(document, readings, settings)
                 window = self._opened(desk, settings, drafts)
-                desk.say(trouble or (heading(paper) if self.path is not None and paper is found else ""))
-                if paper.path is not None:
-                    window.documents.remember(paper.path)
+                desk.say(
+                    trouble or (heading(document) if self.path is not None and document is found else "")
+                )
+                if document.path is not None:
+                    window.documents.remember(document.path)
                 if not self.headless:
-                    offer(window, left_behind(drafts))
-                if self.path is not None and not isinstance(found, Paper):
+                    offer(window, recoverable(drafts))
+                if self.path is not None and not isinstance(found, Document):
                     window.documents.ask_import(self.path, found)
                 try:
                     yield window
@@ -122,17 +124,19 @@ class EditorOpening:
                 finally:
                     window.close()
                     # what was not saved stays to be offered, unless it was decided about
-                    desk.paper.close(discard=ended and window.documents.leaving)
+                    desk.document.close(discard=ended and window.documents.leaving)
         except BaseException:
             if not ended:
-                paper.close(discard=False)
+                document.close(discard=False)
             raise
         finally:
             readings.close()
 
-    def _desk(self, paper: Paper, readings: DirectReadings | ReadoutWorker, settings: EditorSettings) -> Desk:
+    def _desk(
+        self, document: Document, readings: DirectReadings | MeasurementWorker, settings: EditorSettings
+    ) -> Desk:
         pasteboard = OwnPasteboard() if self.headless else SystemPasteboard()
-        desk = Desk(paper, readings, pasteboard, self.folder)
+        desk = Desk(document, readings, pasteboard, self.folder)
         desk.theme = self.theme or settings.theme
         desk.shown = set(settings.shown) & set(SHOWN)
         desk.snaps = set(settings.snaps) & set(SNAPS)
@@ -156,7 +160,7 @@ class EditorOpening:
         return window
 
 
-def offer(window: EditorWindow, found: tuple[Draft, ...]) -> None:
+def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
     """Offer work that was left behind, the newest first."""
     if not found:
         return
@@ -166,13 +170,13 @@ def offer(window: EditorWindow, found: tuple[Draft, ...]) -> None:
     def recover() -> None:
         window.documents.leave(lambda: window.documents.recover(draft))
 
-    def discard() -> None:
-        discarded(draft)
+    def throw_away() -> None:
+        discard(draft)
         offer(window, rest)
 
     answers = (
         Answer("Recover", "r", recover),
-        Answer("Discard", "d", discard),
+        Answer("Discard", "d", throw_away),
         Answer("Later", "l", lambda: None),
     )
     words = f"An editor ended without saving: {draft.words()}."

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.edits.densities import density_words
-from robocov_app.editor.model.document import BOUNDARY
+from robocov_app.editor.edits.density import density_words
+from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.actions import all_actions
 from robocov_app.editor.ui.deeds import whole
 from robocov_app.editor.ui.fields import FIELDS
@@ -305,7 +305,7 @@ def history_page(widgets: Widgets, top: float) -> None:
 
 def facts(desk: Desk) -> dict[str, str]:
     """Return what the map page says of the map."""
-    sketch, readout = desk.sketch, desk.readout
+    sketch, measurement = desk.sketch, desk.measurement
     said = dict.fromkeys(FACTS, "…")
     said["density"] = density_words(sketch.density)
     ring = sketch.boundary
@@ -314,15 +314,15 @@ def facts(desk: Desk) -> dict[str, str]:
         said["size"] = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
     else:
         said["size"] = "no boundary yet: B draws one"
-    if readout is not None:
-        said["free"] = f"{readout.free_area:.2f} m²"
-        parts, reached = len(readout.components), len(readout.reached)
+    if measurement is not None:
+        said["free"] = f"{measurement.free_area:.2f} m²"
+        parts, reached = len(measurement.components), len(measurement.reached)
         said["parts"] = f"{parts}" if parts == reached else f"{parts}; {reached} for a robot"
-        gap = readout.gap
-        sign = "" if gap is None else "≥" if gap.width >= 2 * readout.radius else "<"
-        said["gap"] = "none" if gap is None else f"{gap.width:.3f} m {sign} {2 * readout.radius:.2f} m"
+        gap = measurement.gap
+        sign = "" if gap is None else "≥" if gap.width >= 2 * measurement.radius else "<"
+        said["gap"] = "none" if gap is None else f"{gap.width:.3f} m {sign} {2 * measurement.radius:.2f} m"
         count = len(sketch.obstacles)
-        said["count"] = f"{count} obstacle{'' if count == 1 else 's'}, {readout.vertices} vertices"
+        said["count"] = f"{count} obstacle{'' if count == 1 else 's'}, {measurement.vertices} vertices"
     return said
 
 

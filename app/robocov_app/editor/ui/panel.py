@@ -105,8 +105,8 @@ class Panel(Paged):
         """Let the widgets say what the desk says."""
         desk = self.desk
         self._mark_tabs(widgets)
-        paper = desk.paper
-        words = f"{paper.title}{', not saved' if paper.unsaved else ''}"
+        document = desk.document
+        words = f"{document.title}{', not saved' if document.unsaved else ''}"
         widgets.say("label", "title", shortened(words, round(11 * widgets.scale), WIDE * widgets.scale, True))
         for name in desk.tools:
             widgets.mark(f"tool:{name}", desk.tool.name == name, ("#chosen_tab", "#small"))

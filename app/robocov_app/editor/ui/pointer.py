@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov_app.editor.tools.tool import Aim
+from robocov_app.editor.tools.tool import PointerEvent
 from robocov_app.viewer.layout import inside
 from robocov_app.viewer.mouse import DOUBLE, Mouse
 
@@ -53,7 +53,7 @@ class Pointer(Mouse):
         """Whether the sheet is panned by the left button, for as long as a key is held."""
         self._moved_off = False
 
-    def aim(self, pixel: tuple[int, int]) -> Aim:
+    def aim(self, pixel: tuple[int, int]) -> PointerEvent:
         """Return where a pixel means, with what is held down on the keyboard."""
         raw, reach = self._arena.to_world(pixel), self._arena.reach
         held = pygame.key.get_mods()
@@ -65,7 +65,7 @@ class Pointer(Mouse):
             point, tool_guides = (raw, ()) if snap is None else (snap.point, snap.guides)
             tool.guides = tool_guides
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
-        return Aim(point, raw, reach, shift, alt, ctrl)
+        return PointerEvent(point, raw, reach, shift, alt, ctrl)
 
     def _panel_box(self) -> Box:
         return self._arena.layout.panel
@@ -137,7 +137,7 @@ class Pointer(Mouse):
         if drag == "tool":
             aim = self.aim(event.pos)
             desk.attempt(lambda: desk.tool.release(desk, aim, clicked=not self._moved_off))
-            desk.paper.history.break_drag()
+            desk.document.history.break_drag()
         elif event.button == 3 and not self._moved_off:
             if desk.tool.busy:
                 desk.attempt(lambda: desk.tool.finish(desk))

@@ -10,7 +10,7 @@ from robocov.errors import RobocovError
 
 if TYPE_CHECKING:
     from robocov.environment import Point
-    from robocov_app.editor.model.document import Sketch
+    from robocov_app.editor.model.sketch import Sketch
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import pygame
 
 from robocov.controllers import controller_kinds
 from robocov.environment import Environment
-from robocov_app.editor.model.document import Item, Sketch
 from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
 from robocov_app.viewer.costs import LATTICE, DirectCosts, WorkerCosts
 from robocov_app.viewer.keyboard import key_of
@@ -110,7 +110,7 @@ def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) ->
     costs: Costs = DirectCosts(LATTICE) if patient else WorkerCosts(LATTICE)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
-        demo = TrialDesk(session, costs, shown, desk.folder, desk.paper.title)
+        demo = TrialDesk(session, costs, shown, desk.folder, desk.document.title)
         demo.theme = desk.theme
         trial = Trial(demo, screen, scale, patient=patient)
     except BaseException:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, unknown_name
-from robocov_app.editor.edits import booleans, densities, edits, paths, vertices
-from robocov_app.editor.edits.edits import bounds_of
+from robocov_app.editor.edits import boolean, motion_path, properties, transform, vertices
+from robocov_app.editor.edits import density as density_edits
+from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
-from robocov_app.editor.ui.deeds import bevel, round_corners, simplify, whole
+from robocov_app.editor.ui.deeds import bevel, round_corners, simplify_outlines, whole
 from robocov_app.viewer.typed import parted
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def _move(desk: Desk, text: str) -> None:
     selection = desk.selection
     if not selection:
         _selected(desk)
-    act = vertices.moved if selection.vertices else edits.moved
+    act = vertices.moved if selection.vertices else transform.moved
     desk.change(act(desk.sketch, selection, dx, dy))
 
 
@@ -92,11 +93,11 @@ def _place(desk: Desk, text: str) -> None:
     selection = _selected(desk)
     bounds = bounds_of(desk.sketch, selection)
     x, y = point_of(text, last=bounds[:2] if bounds else None)
-    desk.change(edits.placed(desk.sketch, selection, x, y))
+    desk.change(transform.placed(desk.sketch, selection, x, y))
 
 
 def _rotate(desk: Desk, text: str) -> None:
-    desk.change(edits.rotated(desk.sketch, _selected(desk), angle_of(text)))
+    desk.change(transform.rotated(desk.sketch, _selected(desk), angle_of(text)))
 
 
 def _scale(desk: Desk, text: str) -> None:
@@ -105,44 +106,44 @@ def _scale(desk: Desk, text: str) -> None:
     if bounds is None:
         raise MapError("there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
-    desk.change(edits.scaled(desk.sketch, selection, factor))
+    desk.change(transform.scaled(desk.sketch, selection, factor))
 
 
 def _size(desk: Desk, text: str) -> None:
     width, height = size_of(text)
-    desk.change(edits.resized(desk.sketch, _selected(desk), width, height))
+    desk.change(transform.resized(desk.sketch, _selected(desk), width, height))
 
 
 def _width(desk: Desk, text: str) -> None:
-    desk.change(edits.widened(desk.sketch, _selected(desk), length_of(text)))
+    desk.change(properties.widened(desk.sketch, _selected(desk), length_of(text)))
 
 
 def _circle(desk: Desk, text: str) -> None:
-    desk.change(edits.sized(desk.sketch, _selected(desk), length_of(text)))
+    desk.change(properties.sized(desk.sketch, _selected(desk), length_of(text)))
 
 
 def _name(desk: Desk, text: str) -> None:
     owners = sorted(whole(desk.selection).owners, key=str)
     if len(owners) != 1:
         raise MapError("select one obstacle or start first")
-    desk.change(edits.renamed(desk.sketch, owners[0], text))
+    desk.change(properties.renamed(desk.sketch, owners[0], text))
 
 
 def _note(desk: Desk, text: str) -> None:
-    desk.change(edits.noted(desk.sketch, _selected(desk), text))
+    desk.change(properties.noted(desk.sketch, _selected(desk), text))
 
 
 def _title(desk: Desk, text: str) -> None:
-    desk.change(edits.titled(desk.sketch, name=text))
+    desk.change(properties.titled(desk.sketch, name=text))
 
 
 def _offset(desk: Desk, text: str) -> None:
     sign = -1.0 if text.strip().startswith("-") else 1.0
-    desk.change(booleans.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
+    desk.change(boolean.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
 
 
 def _set_floor(desk: Desk, text: str) -> None:
-    desk.change(densities.floor_set(desk.sketch, _weight("floor", text)))
+    desk.change(density_edits.floor_set(desk.sketch, _weight("floor", text)))
 
 
 def _set_weight(desk: Desk, text: str) -> None:
@@ -150,13 +151,13 @@ def _set_weight(desk: Desk, text: str) -> None:
 
 
 def _set_speed(desk: Desk, text: str) -> None:
-    desk.change(paths.path_paced(desk.sketch, _selected(desk), paths.speed_of(text)))
+    desk.change(motion_path.path_paced(desk.sketch, _selected(desk), motion_path.speed_of(text)))
 
 
 def _set_density(desk: Desk, text: str) -> None:
     if text.strip() != "none":
         raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
-    desk.change(densities.density_removed(desk.sketch))
+    desk.change(density_edits.density_removed(desk.sketch))
 
 
 def _weight(word: str, text: str) -> float:
@@ -172,7 +173,7 @@ def _array(desk: Desk, text: str) -> None:
         raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
     columns, rows = (_whole_number("array", each) for each in parts[:2])
     dx, dy = (length_of(each.lstrip("-")) * (-1.0 if each.startswith("-") else 1.0) for each in parts[2:])
-    desk.change(edits.arrayed(desk.sketch, _selected(desk), columns, rows, dx, dy))
+    desk.change(transform.arrayed(desk.sketch, _selected(desk), columns, rows, dx, dy))
 
 
 COMMANDS: dict[str, Callable[[Desk, str], None]] = {
@@ -191,7 +192,7 @@ COMMANDS: dict[str, Callable[[Desk, str], None]] = {
     "circle": _circle,
     "bevel": lambda desk, text: bevel(desk, length_of(text)),
     "round": lambda desk, text: round_corners(desk, length_of(text)),
-    "simplify": lambda desk, text: simplify(desk, length_of(text)),
+    "simplify": lambda desk, text: simplify_outlines(desk, length_of(text)),
     "floor": _set_floor,
     "weight": _set_weight,
     "density": _set_density,

@@ -10,7 +10,8 @@ import pygame
 
 from robocov.files.atomic import written
 from robocov_app.editor.canvas.arena import Arena
-from robocov_app.editor.model.selection import Selection, owners_at
+from robocov_app.editor.model.hit_test import owners_at
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.ui.actions import GROUPS, all_actions, told_actions
 from robocov_app.editor.ui.deeds import deeds
 from robocov_app.editor.ui.dialogs import Commands, Dialogs, Menu
@@ -140,15 +141,15 @@ class EditorWindow:
             self._ask_team()
         if not (self.pointer.dragging and desk.readings.busy):
             desk.ask_readings()
-        if desk.paper.trouble:
-            desk.say(desk.paper.trouble, trouble=True)
+        if desk.document.trouble:
+            desk.say(desk.document.trouble, trouble=True)
         if self.documents.leaving:
             self.closed = True
             return
         self._arrange()
         self._update_panel(seconds)
         self.pointer.show()
-        caption = f"{'● ' if desk.paper.unsaved else ''}{desk.paper.title} · {_CAPTION}"
+        caption = f"{'● ' if desk.document.unsaved else ''}{desk.document.title} · {_CAPTION}"
         if caption != self._caption:
             self._caption = caption
             pygame.display.set_caption(caption)

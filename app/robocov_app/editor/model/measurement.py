@@ -1,29 +1,24 @@
 """What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass.
 
-All of it may take longer than a frame: a window asks a `ReadoutWorker`, which works in a process of its own.
+Takes longer than a frame: a window asks a `MeasurementWorker`, which has a process of its own.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
+from robocov.arrays import Array, IntArray
 from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.document import BOUNDARY, Sketch
-from robocov_app.editor.model.faults import place_words
-from robocov_app.editor.model.problems import Problem, examined
 from robocov_app.editor.model.selection import rings_of
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.arrays import Array, IntArray
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch
+from robocov_app.editor.model.validation import Problem, examined, place_words
 
 _TOUCHING = 1e-5
 """Metres within which an edge lies on a wall."""
@@ -36,7 +31,7 @@ _MOST_GAPS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Readout:
+class Measurement:
     """What a sketch is like, for robots of some radius.
 
     Attributes
@@ -75,7 +70,7 @@ class Readout:
     seconds: float
 
 
-def readout(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Readout:
+def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     """Measure a sketch; one that has no boundary, or a broken one, has as much free space as can be made out.
 
     Parameters
@@ -92,7 +87,7 @@ def readout(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Readout:
     impassable = shapely.union_all([*map(_disc_in, narrow), untouched]) & free
     marks = _polygons(impassable)
     owners = [BOUNDARY, *(item.key for item in sketch.obstacles)]
-    return Readout(
+    return Measurement(
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in reached),

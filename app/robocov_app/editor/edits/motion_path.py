@@ -1,25 +1,18 @@
-"""Edits of the paths along which obstacles move: way points, speed, and what happens at the end.
-
-As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for people.
-"""
+"""Edits of the paths along which obstacles move: way points, speed, and what happens at the end."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from robocov.environment import ObstaclePath, Repeat
+from robocov.environment import Obstacle, ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
-from robocov_app.editor.model.plane import nearest_on, ring_near
-from robocov_app.editor.model.selection import Change, Selection, called
-
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle, Point
-    from robocov_app.editor.model.document import Item, Sketch
+from robocov_app.editor.model.geometry import nearest_on, ring_near
+from robocov_app.editor.model.selection import Change, Selection, display_name
+from robocov_app.editor.model.sketch import Item, Sketch
 
 FIRST_SPEED = 0.5
 """Metres a second of a new path, until another speed is typed."""
@@ -218,4 +211,6 @@ def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
     if extent < SMALLEST or shapely.LineString(path.points).length < SMALLEST:
         raise MapError("the way points lie in one place: click somewhere else")
     shape = replace(sketch.item(key).shape, path=path)
-    return Change(sketch.with_shapes({key: shape}), Selection.of(key), f"{called(sketch, key)}: {words}")
+    return Change(
+        sketch.with_shapes({key: shape}), Selection.of(key), f"{display_name(sketch, key)}: {words}"
+    )

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from robocov.environment import Point
 from robocov.errors import MapError
-from robocov_app.editor.edits.edits import underlaid
-from robocov_app.editor.model.background import to_scale
+from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model.background import Background, to_scale
 from robocov_app.editor.model.coordinates import length_of
-from robocov_app.editor.tools.tool import Preview, Tool, apart, length_words
-
-if TYPE_CHECKING:
-    from robocov.environment import Point
-    from robocov_app.editor.model.background import Background
-    from robocov_app.editor.tools.tool import Aim
-    from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
 
 
-class Underlay(Tool):
+class ReferenceImageTool(Tool):
     """Scales and moves the picture."""
 
     name = "picture"
@@ -43,22 +38,22 @@ class Underlay(Tool):
         """The picture where it is being dragged to."""
         return self._laid
 
-    def press(self, desk: Desk, aim: Aim) -> None:
+    def press(self, context: ToolContext, event: PointerEvent) -> None:
         """Begin to drag, or to click."""
-        if desk.sketch.background is None:
+        if context.sketch.background is None:
             raise MapError("there is no picture under the map: Ctrl B takes one")
-        self._from = aim.raw
+        self._from = event.raw
 
-    def move(self, desk: Desk, aim: Aim) -> None:
+    def move(self, context: ToolContext, event: PointerEvent) -> None:
         """Drag."""
-        self._at = aim.raw
-        background = desk.sketch.background
-        if self._from is None or background is None or apart(self._from, aim.raw) < 0.25 * aim.reach:
+        self._at = event.raw
+        background = context.sketch.background
+        if self._from is None or background is None or distance(self._from, event.raw) < 0.25 * event.reach:
             return
-        dx, dy = aim.raw[0] - self._from[0], aim.raw[1] - self._from[1]
+        dx, dy = event.raw[0] - self._from[0], event.raw[1] - self._from[1]
         self._laid = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
 
-    def release(self, desk: Desk, aim: Aim, *, clicked: bool) -> None:
+    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Let the picture lie there, or take the point that was clicked."""
         begun, laid = self._from, self._laid
         self._from = self._laid = None
@@ -66,41 +61,43 @@ class Underlay(Tool):
             return
         if laid is not None and not clicked:
             corner = round(laid.corner[0], 4), round(laid.corner[1], 4)
-            desk.change(underlaid(desk.sketch, replace(laid, corner=corner)))
+            context.change(underlaid(context.sketch, replace(laid, corner=corner)))
             return
-        self._points = [*self._points[-1:], aim.raw] if len(self._points) == 2 else [*self._points, aim.raw]
+        self._points = (
+            [*self._points[-1:], event.raw] if len(self._points) == 2 else [*self._points, event.raw]
+        )
         if len(self._points) == 2:
-            desk.say("type how many metres apart these two points are, then Enter")
+            context.say("type how many metres apart these two points are, then Enter")
 
-    def twice(self, desk: Desk, aim: Aim) -> None:
+    def twice(self, context: ToolContext, event: PointerEvent) -> None:
         """Take no notice: two points in one place mean nothing."""
 
-    def enter(self, desk: Desk, text: str) -> None:
+    def enter(self, context: ToolContext, text: str) -> None:
         """Scale the picture."""
-        if len(self._points) != 2 or desk.sketch.background is None:
+        if len(self._points) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
         a, b = self._points
-        laid = to_scale(desk.sketch.background, a, b, length_of(text))
+        laid = to_scale(context.sketch.background, a, b, length_of(text))
         self._points = []
-        desk.change(underlaid(desk.sketch, laid))
+        context.change(underlaid(context.sketch, laid))
 
-    def back(self, desk: Desk) -> bool:
+    def back(self, context: ToolContext) -> bool:
         """Take the last point back."""
         return bool(self._points and self._points.pop())
 
-    def cancel(self, desk: Desk) -> bool:
+    def cancel(self, context: ToolContext) -> bool:
         """Forget the points."""
         had = bool(self._points or self._from)
         self._points, self._from, self._laid = [], None, None
         return had
 
-    def preview(self, desk: Desk) -> Preview | None:
+    def preview(self, context: ToolContext) -> Preview | None:
         """Show the two points."""
         if not self._points:
             return None
         if len(self._points) == 1:
             return Preview(
-                (self._points[0], self._at), words=f"now {length_words(apart(self._points[0], self._at))}"
+                (self._points[0], self._at), words=f"now {length_words(distance(self._points[0], self._at))}"
             )
-        words = f"now {length_words(apart(*self._points))}; type how far apart they are"
+        words = f"now {length_words(distance(*self._points))}; type how far apart they are"
         return Preview(tuple(self._points), words=words)

@@ -1,19 +1,20 @@
-"""Points and angles of the plane: to the tenth of a millimetre, exact at right angles, within reach."""
+"""Points, angles and outlines of the plane: to the tenth of a millimetre, within reach."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import LinearRing
 
+from robocov.arrays import Array
+from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.errors import MapError
-from robocov.mapfile.models import FARTHEST
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.environment import Point, Ring
+from robocov.mapfile.models import FARTHEST, SMALLEST
 
 DECIMALS = 4
 """Digits after the decimal point of what the editor writes: a tenth of a millimetre."""
@@ -59,6 +60,11 @@ def nearest_on(starts: Array, ends: Array, point: Array) -> Array:
     return np.asarray(starts + np.clip(part, 0.0, 1.0)[:, None] * along)
 
 
+def distance(a: Point, b: Point) -> float:
+    """Return the distance of two points, m."""
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+
+
 def cos_sin(degrees: float) -> tuple[float, float]:
     """Return cosine and sine of an angle, exact at quarters of a turn.
 
@@ -69,3 +75,31 @@ def cos_sin(degrees: float) -> tuple[float, float]:
     if rest == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
     return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+
+
+def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
+    """Return the polygons of a valid geometry, the largest first, with their holes.
+
+    Vertices come to lie on a grid of a tenth of a millimetre by shapely's snap rounding, so that no outline
+    crosses itself afterwards; vertices in line with their neighbours go, and so do parts and holes
+    smaller than a millimetre either way.
+    """
+    snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
+    parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
+    parts.sort(key=lambda part: (-part.area, part.bounds))
+    return tuple(
+        PolygonObstacle(
+            _ring(part.exterior), tuple(_ring(hole) for hole in part.interiors if not _is_crumb(hole)), name
+        )
+        for part in map(shapely.orient_polygons, parts)
+    )
+
+
+def _ring(ring: LinearRing) -> Ring:
+    return tuple(rounded(point) for point in ring.coords[:-1])
+
+
+def _is_crumb(part: BaseGeometry) -> bool:
+    low_x, low_y, high_x, high_y = part.bounds
+    # of what is empty these are no numbers
+    return not min(high_x - low_x, high_y - low_y) >= SMALLEST

@@ -1,32 +1,158 @@
-"""Where what is selected lies: moved, turned, scaled, mirrored, copied.
-
-As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for people.
-"""
+"""Edits of where things are: moved, turned, scaled, mirrored, copied, aligned, distributed."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, DiscStart, PointsStart
+from robocov.arrays import Array
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Obstacle,
+    Point,
+    PointsStart,
+    PolygonObstacle,
+    Ring,
+    StartSpec,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.edits.adding import free_name
-from robocov_app.editor.edits.affine import Affine
+from robocov_app.editor.edits.create import free_name
 from robocov_app.editor.edits.vertices import with_places
-from robocov_app.editor.model.document import BOUNDARY, Sketch
-from robocov_app.editor.model.plane import rounded
+from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenths
 from robocov_app.editor.model.selection import Change, Selection, place_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+_ALIKE = 1e-12
+"""Relative difference of what is the same but for rounding."""
 
-    from robocov.environment import Point
-    from robocov_app.editor.model.document import Owner
+
+@dataclass(frozen=True)
+class Affine:
+    """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0).
+
+    Examples
+    --------
+    >>> Affine.turn(90.0, about=(1.0, 0.0)).point((2.0, 0.0))
+    (1.0, 1.0)
+    """
+
+    xx: float = 1.0
+    xy: float = 0.0
+    yx: float = 0.0
+    yy: float = 1.0
+    x0: float = 0.0
+    y0: float = 0.0
+
+    @classmethod
+    def shift(cls, dx: float, dy: float) -> Affine:
+        """Return the map that moves by (dx, dy) m."""
+        return cls(x0=dx, y0=dy)
+
+    @classmethod
+    def turn(cls, degrees: float, about: Point) -> Affine:
+        """Return the map that turns counter-clockwise about a point, exactly at quarters of a turn."""
+        cos, sin = cos_sin(degrees)
+        return cls(cos, -sin, sin, cos)._about(about)
+
+    @classmethod
+    def stretch(cls, fx: float, fy: float, about: Point) -> Affine:
+        """Return the map that scales along x and y about a point."""
+        return cls(fx, 0.0, 0.0, fy)._about(about)
+
+    @classmethod
+    def mirror(cls, a: Point, b: Point) -> Affine:
+        """Return the map that mirrors across the line through two points, which are not the same."""
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        length = math.hypot(dx, dy)
+        cos, sin = dx / length, dy / length
+        double = cos * cos - sin * sin, 2.0 * cos * sin
+        return cls(double[0], double[1], double[1], -double[0])._about(a)
+
+    @property
+    def factor(self) -> float | None:
+        """By how much it scales all lengths alike; None where it stretches some more than others."""
+        a, b = math.hypot(self.xx, self.yx), math.hypot(self.xy, self.yy)
+        skew = abs(self.xx * self.xy + self.yx * self.yy)
+        if abs(a - b) > _ALIKE * max(a, b) or skew > _ALIKE * a * b:
+            return None
+        return 1.0 if abs(a - 1.0) <= _ALIKE else a
+
+    def points(self, points: Array) -> Array:
+        """Return where (n, 2) points go."""
+        x, y = points[:, 0], points[:, 1]
+        return np.column_stack([self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0])
+
+    def ring(self, ring: Iterable[Point]) -> Ring:
+        """Return where points go, to the tenth of a millimetre.
+
+        Raises
+        ------
+        MapError
+            When that is farther away than maps reach.
+        """
+        moved = self.points(np.array(list(ring), dtype=float).reshape(-1, 2))
+        return ring_near(moved)
+
+    def point(self, point: Point) -> Point:
+        """Return where a point goes, to the tenth of a millimetre."""
+        return self.ring([point])[0]
+
+    def shape(self, shape: Obstacle) -> Obstacle:
+        """Return where an obstacle goes.
+
+        Radii and the widths of walls grow with it where all lengths do; where they do not, a circle becomes
+        a polygon, and a wall keeps its width. The path of one that moves goes with it, its speed stays.
+        """
+        factor = self.factor
+        path = None if shape.path is None else replace(shape.path, points=self.ring(shape.path.points))
+        if isinstance(shape, PolygonObstacle):
+            holes = tuple(self.ring(hole) for hole in shape.holes)
+            return replace(shape, vertices=self.ring(shape.vertices), holes=holes, path=path)
+        if isinstance(shape, WallObstacle):
+            width = _times(shape.width, factor or 1.0)
+            return replace(shape, points=self.ring(shape.points), width=width, path=path)
+        if factor is None:
+            outline = shape.polygon.exterior.coords[:-1]
+            return PolygonObstacle(self.ring(outline), (), shape.name, path)
+        radius = _times(shape.radius, factor)
+        return replace(shape, center=self.point(shape.center), radius=radius, path=path)
+
+    def start(self, spec: StartSpec) -> StartSpec:
+        """Return where a start goes; one in the whole free space stays.
+
+        Raises
+        ------
+        MapError
+            When a disc would become an ellipse.
+        """
+        if isinstance(spec, PointsStart):
+            return PointsStart(self.ring(spec.positions))
+        if isinstance(spec, DiscStart):
+            factor = self.factor
+            if factor is None:
+                raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
+            return DiscStart(self.point(spec.center), _times(spec.radius, factor))
+        return spec
+
+    def _about(self, point: Point) -> Affine:
+        """Return the map with the same matrix that leaves a point where it is."""
+        x, y = point
+        return replace(
+            self, x0=x - self.xx * x - self.xy * y + self.x0, y0=y - self.yx * x - self.yy * y + self.y0
+        )
+
+
+def _times(length: float, factor: float) -> float:
+    return length if factor == 1.0 else tenths(length * factor)
+
 
 _MOST_COPIES = 10_000
 
@@ -251,3 +377,115 @@ def _bounds(sketch: Sketch, selection: Selection) -> tuple[float, float, float, 
 def _middle(sketch: Sketch, selection: Selection) -> Point:
     bounds = _bounds(sketch, selection)
     return rounded(((bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2))
+
+
+Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
+Axis: TypeAlias = Literal["x", "y"]
+Box: TypeAlias = tuple[float, float, float, float]
+
+SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
+"""Left, centre and right move along x; top, middle and bottom along y."""
+
+_ALONG_X = SIDES[:3]
+
+
+def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bool = False) -> Change:
+    """Align the selected obstacles and starts with the side of their common bounding box, or the boundary's.
+
+    The boundary itself stays: when it is selected too, the others align with it. Of single vertices alone:
+    gives them the same x or y.
+    """
+    if side not in SIDES:
+        raise MapError(f"one of {', '.join(SIDES)} was wanted")
+    if selection.vertices and not selection.owners:
+        return _aligned_vertices(sketch, selection, side)
+    boxes = _boxes(sketch, selection)
+    if to_boundary or selection.boundary:
+        frame = box_of(sketch, BOUNDARY)
+        if frame is None:
+            raise MapError("there is no boundary to align with")
+        if not boxes:
+            raise MapError("select obstacles or starts to align")
+    else:
+        if len(boxes) < 2:
+            raise MapError("select two or more obstacles or starts to align")
+        low_x, low_y, high_x, high_y = zip(*boxes.values(), strict=True)
+        frame = min(low_x), min(low_y), max(high_x), max(high_y)
+    by: dict[Owner, Point] = {}
+    for owner, box in boxes.items():
+        off = _level(frame, side) - _level(box, side)
+        by[owner] = (off, 0.0) if side in _ALONG_X else (0.0, off)
+    words = f"{Selection.of(*boxes).words(sketch)} aligned {_words(side)}"
+    return Change(each_moved(sketch, by), selection, words)
+
+
+def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float | None = None) -> Change:
+    """Spread three or more selected things so that the gaps between their boxes are equal.
+
+    The first and the last stay where they are; with a `gap` in metres, the first only.
+    """
+    a = _axis(axis)
+    boxes = _in_order(sketch, selection, 3 if gap is None else 2, lambda box: (box[a], box[a + 2]))
+    if gap is None:
+        room = boxes[-1][1][a + 2] - boxes[0][1][a]
+        gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
+    by: dict[Owner, Point] = {}
+    low = boxes[0][1][a]
+    for owner, box in boxes:
+        by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
+        low += box[a + 2] - box[a] + gap
+    return _spread(sketch, selection, by)
+
+
+def _aligned_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
+    places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
+    if len(places) < 2:
+        raise MapError("select two or more vertices to align")
+    xs, ys = zip(*places.values(), strict=True)
+    level = _level((min(xs), min(ys), max(xs), max(ys)), side)
+    moved = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
+    words = f"{selection.words(sketch)} aligned {_words(side)}"
+    return Change(with_places(sketch, moved), selection, words)
+
+
+def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
+    """Return the boxes of the selected obstacles and starts, in the order of the sketch."""
+    owners: list[Owner] = [item.key for item in sketch.obstacles if item.key in selection.items]
+    owners += [name for name, _ in sketch.starts if name in selection.starts]
+    return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}
+
+
+def _in_order(
+    sketch: Sketch, selection: Selection, least: int, rank: Callable[[Box], tuple[float, float]]
+) -> list[tuple[Owner, Box]]:
+    boxes = _boxes(sketch, selection)
+    if len(boxes) < least:
+        count = {2: "two", 3: "three"}[least]
+        raise MapError(f"select {count} or more obstacles or starts to distribute")
+    return sorted(boxes.items(), key=lambda pair: rank(pair[1]))
+
+
+def _spread(sketch: Sketch, selection: Selection, by: dict[Owner, Point]) -> Change:
+    return Change(each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
+
+
+def _axis(axis: Axis) -> int:
+    if axis not in ("x", "y"):
+        raise MapError("an axis x or y was wanted")
+    return ("x", "y").index(axis)
+
+
+def _level(box: Box, side: Side) -> float:
+    low_x, low_y, high_x, high_y = box
+    return {
+        "left": low_x,
+        "centre": (low_x + high_x) / 2,
+        "right": high_x,
+        "top": high_y,
+        "middle": (low_y + high_y) / 2,
+        "bottom": low_y,
+    }[side]
+
+
+def _words(side: Side) -> str:
+    return {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")

@@ -1,8 +1,7 @@
 """Selected obstacles united, subtracted, intersected: by shapely, holes kept.
 
 Walls and circles become polygons. The result may be several obstacles; they take the place, the name and
-the note of the lowest. As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for
-people.
+the note of the lowest.
 """
 
 from __future__ import annotations
@@ -11,23 +10,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import shapely
 from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import GRID, CircleObstacle, PolygonObstacle
+from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.model.document import Item, Sketch
-from robocov_app.editor.model.outlines import outlines
-from robocov_app.editor.model.plane import tenths
-from robocov_app.editor.model.selection import Change, Selection, called, exchanged
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.environment import Obstacle
+from robocov_app.editor.model.geometry import outlines, tenths
+from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.sketch import Item, Sketch
 
 
 def united(sketch: Sketch, selection: Selection) -> Change:
@@ -41,7 +34,7 @@ def subtracted(sketch: Sketch, selection: Selection) -> Change:
     """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
     lowest, *uppers = _chosen(sketch, selection, "subtract")
     left = shapely.difference(lowest.geometry, _union(uppers), grid_size=GRID)
-    what = called(sketch, lowest.key)
+    what = display_name(sketch, lowest.key)
     cutters = counted(len(uppers), "obstacle")
     return _in_place(
         sketch, [lowest, *uppers], [left], f"{cutters} cut out of {what}", f"nothing is left of {what}"
@@ -62,7 +55,7 @@ def divided(sketch: Sketch, selection: Selection) -> Change:
     cutter = _union(uppers)
     outside = shapely.difference(lowest.geometry, cutter, grid_size=GRID)
     parts = [outside, _intersection(lowest.geometry, cutter)]
-    return _in_place(sketch, [lowest, *uppers], parts, f"{called(sketch, lowest.key)} divided")
+    return _in_place(sketch, [lowest, *uppers], parts, f"{display_name(sketch, lowest.key)} divided")
 
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
@@ -83,10 +76,10 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
             grown = outlines(buffered, item.shape.name)
         if not grown:
-            raise MapError(f"nothing would be left of the {called(sketch, item.key)}")
+            raise MapError(f"nothing would be left of the {display_name(sketch, item.key)}")
         shapes[item.key] = grown
     words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
-    return exchanged(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
+    return replace_obstacles(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
 
 
 def clipped(sketch: Sketch, selection: Selection) -> Change:
@@ -106,7 +99,7 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
             shapes[item.key] = outlines(_intersection(item.geometry, inside), item.shape.name)
     if not shapes:
         raise MapError("nothing sticks out of the boundary")
-    return exchanged(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
+    return replace_obstacles(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
 
 
 def repaired(sketch: Sketch, selection: Selection) -> Change:
@@ -130,7 +123,9 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
     count = len(shapes) + (boundary is not sketch.boundary)
     if not count:
         raise MapError("there is nothing to repair: no outline crosses itself")
-    change = exchanged(replace(sketch, boundary=boundary), shapes, f"{counted(count, 'outline')} repaired")
+    change = replace_obstacles(
+        replace(sketch, boundary=boundary), shapes, f"{counted(count, 'outline')} repaired"
+    )
     with_boundary = replace(
         change.selection, boundary=boundary is not sketch.boundary and boundary is not None
     )
@@ -152,7 +147,7 @@ def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
         raise MapError(f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
-            raise MapError(f"the {called(sketch, item.key)} covers nothing: repair or delete it first")
+            raise MapError(f"the {display_name(sketch, item.key)} covers nothing: repair or delete it first")
     return items
 
 
@@ -164,4 +159,4 @@ def _in_place(
     shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]
     if not shapes:
         raise MapError(empty or "nothing is left")
-    return exchanged(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)
+    return replace_obstacles(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)

@@ -22,8 +22,9 @@ from typing import Any
 from robocov.errors import MapError, OutputError, counted, one_line
 from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
-from robocov_app.editor.model.document import Sketch, draft_document, sketch_of, sketch_text
-from robocov_app.editor.model.files import OnDisk
+from robocov_app.editor.model.file import OnDisk
+from robocov_app.editor.model.parser import sketch_of
+from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
 
 FOLDER = "ROBOCOV_DRAFTS"
 """Environment variable with another folder for drafts; empty for none."""
@@ -48,7 +49,7 @@ _YOUNG = 60.0
 
 
 @dataclass(frozen=True)
-class Draft:
+class Autosave:
     """Work that an editor left behind.
 
     Attributes
@@ -93,7 +94,7 @@ class Draft:
         return f"{what}, {day} {self.when:%H:%M}, {where}"
 
 
-def drafts_folder() -> Path | None:
+def autosave_folder() -> Path | None:
     """Return where drafts are kept, None where they are not to be."""
     named = os.environ.get(FOLDER)
     if named is not None:
@@ -103,7 +104,7 @@ def drafts_folder() -> Path | None:
     return user_state_path("robocov", appauthor=False) / "drafts"
 
 
-def left_behind(folder: Path | None) -> tuple[Draft, ...]:
+def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
     """Return the work that editors left behind which live no more, the newest first.
 
     What its file holds already is none. Folders without work are removed; what cannot be read stays where
@@ -123,13 +124,13 @@ def left_behind(folder: Path | None) -> tuple[Draft, ...]:
     return tuple(sorted(found, key=lambda draft: draft.when, reverse=True))
 
 
-def discarded(draft: Draft) -> None:
+def discard(draft: Autosave) -> None:
     """Remove a draft for good."""
     shutil.rmtree(draft.folder, ignore_errors=True)
 
 
 def opened_elsewhere(folder: Path | None, path: Path) -> bool:
-    """Return whether a living editor has this file open; to be asked before one's own `DraftKeeper`."""
+    """Return whether a living editor has this file open; to be asked before one's own `Autosaver`."""
     wanted = path.resolve()
     for place in _places(folder):
         with suppress(MapError, OSError):
@@ -144,17 +145,17 @@ def opened_elsewhere(folder: Path | None, path: Path) -> bool:
     return False
 
 
-class DraftKeeper:
+class Autosaver:
     """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk.
 
     Parameters
     ----------
     folder : Path or None
-        `drafts_folder()`; None keeps nothing.
+        `autosave_folder()`; None keeps nothing.
     path : Path or None
         The document's file.
     disk : OnDisk or None
-    draft : Draft or None
+    draft : Autosave or None
         Work that was left behind and goes on: its folder is taken over, and so are path and disk.
 
     Raises
@@ -168,7 +169,7 @@ class DraftKeeper:
         folder: Path | None,
         path: Path | None = None,
         disk: OnDisk | None = None,
-        draft: Draft | None = None,
+        draft: Autosave | None = None,
     ) -> None:
         self._lock = ExitStack()
         self._place: Path | None = None
@@ -335,7 +336,7 @@ def _held(place: Path) -> dict[str, Any]:
     return held
 
 
-def _draft(place: Path) -> Draft | None:
+def _draft(place: Path) -> Autosave | None:
     """Return the work in a folder, None if there is none."""
     if not (place / _NAME).exists():
         return None
@@ -354,7 +355,7 @@ def _draft(place: Path) -> Draft | None:
         raise MapError(f"{place / _NAME}: is no whole draft: {error}") from None
     if path is not None and _holds(path, sketch):
         return None
-    return Draft(place, path, sketch.name, when, len(sketch.obstacles), disk)
+    return Autosave(place, path, sketch.name, when, len(sketch.obstacles), disk)
 
 
 def _holds(path: Path, sketch: Sketch) -> bool:

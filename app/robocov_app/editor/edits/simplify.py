@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
+from robocov.arrays import Array, BoolArray
+from robocov.environment import Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
-from robocov_app.editor.model.document import BOUNDARY, Sketch
-from robocov_app.editor.model.plane import ring_near
+from robocov_app.editor.model.geometry import ring_near
 from robocov_app.editor.model.selection import Change, Selection, ring_points, rings_of, with_rings
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array, BoolArray
-    from robocov.environment import Ring
-    from robocov_app.editor.model.document import Owner
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 _STEPS = 12
 """Tolerances that are tried, each half of the one before, until nothing crosses."""
@@ -42,7 +38,7 @@ def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change
     if not before:
         raise MapError("no vertex can be left out at that tolerance")
     words = "1 vertex left out" if before == 1 else f"{before} vertices left out"
-    return Change(after, _whole(selection), words)
+    return Change(after, selection.without_vertices(), words)
 
 
 def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
@@ -62,11 +58,7 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
             after = with_rings(after, owner, rings)
     if not count:
         raise MapError(f"no edge is within {degrees:g} degrees of level or upright, and not so already")
-    return Change(after, _whole(selection), f"{counted(count, 'outline')} straightened")
-
-
-def _whole(selection: Selection) -> Selection:
-    return Selection(selection.items, frozenset(), selection.starts, selection.boundary)
+    return Change(after, selection.without_vertices(), f"{counted(count, 'outline')} straightened")
 
 
 def _owners(sketch: Sketch, selection: Selection) -> list[Owner]:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
-from robocov_app.editor.edits.edits import bounds_of
-from robocov_app.editor.model.selection import Selection, points_of
-from robocov_app.editor.tools.tool import apart
-
-if TYPE_CHECKING:
-    from robocov.environment import Point
-    from robocov_app.editor.model.document import Owner, Sketch
-    from robocov_app.editor.model.selection import Vertex
+from robocov.environment import Point
+from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.model.selection import Selection, Vertex, points_of
+from robocov_app.editor.model.sketch import Owner, Sketch
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
 
@@ -23,14 +20,14 @@ KNOB = 24.0
 """Pixels at scale 1 that the knob is above the box."""
 
 ROOMY = 34.0
-"""Pixels at scale 1 that a side of the box has at least when there is a grip in its middle."""
+"""Pixels at scale 1 that a side of the box has at least when there is a handle in its middle."""
 
 MOST_VERTICES = 4000
 """Vertices that are shown at most: more could not be told apart."""
 
 
 @dataclass(frozen=True)
-class Grip:
+class Handle:
     """Something that can be taken hold of.
 
     Attributes
@@ -41,7 +38,7 @@ class Grip:
         Where it is shown.
     vertex : Vertex or None
     side : (x, y)
-        Of a grip that scales: -1, 0 or 1 along each axis.
+        Of a handle that scales: -1, 0 or 1 along each axis.
     """
 
     kind: Kind
@@ -68,9 +65,9 @@ def box_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, f
     return bounds[0] - far, bounds[1] - far, bounds[2] + far, bounds[3] + far
 
 
-def grips(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Grip, ...]:
-    """Return all grips, those that are taken first last."""
-    found: list[Grip] = []
+def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
+    """Return all handles, those that are taken first last."""
+    found: list[Handle] = []
     box = box_of(sketch, selection, pixel)
     if box is not None:
         low_x, low_y, high_x, high_y = box
@@ -83,26 +80,21 @@ def grips(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Grip, ...
             for y in (-1, 0, 1):
                 middle = (x == 0 and not roomy[0]) or (y == 0 and not roomy[1])
                 if (x or y) and not middle:
-                    found.append(Grip("scale", (xs[x], ys[y]), side=(x, y)))
-        found.append(Grip("turn", (xs[0], high_y + KNOB * pixel)))
+                    found.append(Handle("scale", (xs[x], ys[y]), side=(x, y)))
+        found.append(Handle("turn", (xs[0], high_y + KNOB * pixel)))
     for owner in handled(selection):
         points = points_of(sketch, owner)
-        found += [Grip("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
+        found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
     return tuple(found)
 
 
-def grip_at(found: tuple[Grip, ...], point: Point, reach: float) -> Grip | None:
-    """Return the grip within `reach` metres of a point: the nearest, a vertex before others."""
-    best: tuple[bool, float, Grip] | None = None
-    for grip in found:
-        far = apart(grip.at, point)
+def handle_at(found: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
+    """Return the handle within `reach` metres of a point: the nearest, a vertex before others."""
+    best: tuple[bool, float, Handle] | None = None
+    for handle in found:
+        far = distance(handle.at, point)
         if far <= reach:
-            rank = (grip.kind != "vertex", far)
+            rank = (handle.kind != "vertex", far)
             if best is None or rank < best[:2]:
-                best = (*rank, grip)
+                best = (*rank, handle)
     return best[2] if best else None
-
-
-def things(selection: Selection) -> Selection:
-    """Return the whole things of a selection, without single vertices."""
-    return Selection(selection.items, frozenset(), selection.starts, selection.boundary)

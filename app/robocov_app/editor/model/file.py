@@ -10,7 +10,8 @@ from typing import Literal, TypeAlias
 from robocov.errors import MapError, OutputError, one_line
 from robocov.files.atomic import writable, written
 from robocov.files.strictjson import read_bytes
-from robocov_app.editor.model.document import Sketch, parse_sketch, sketch_text
+from robocov_app.editor.model.parser import parse_sketch
+from robocov_app.editor.model.sketch import Sketch, sketch_text
 
 State: TypeAlias = Literal["same", "changed", "gone"]
 

@@ -10,83 +10,19 @@ What draws is in `adding`, what moves in `placing`; all of it can be had from he
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, StartSpec, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.edits.adding import (
-    boundary_drawn,
-    circle_drawn,
-    disc_start_drawn,
-    drawn,
+from robocov_app.editor.edits.create import (
     encodable,
-    free_name,
     label_of,
-    points_start_drawn,
-    polygon_drawn,
-    rectangle_drawn,
-    start_point_added,
-    uniform_start_added,
-    wall_drawn,
 )
-from robocov_app.editor.edits.placing import (
-    arrayed,
-    bounds_of,
-    duplicated,
-    mirrored,
-    mirrored_across,
-    moved,
-    placed,
-    resized,
-    rotated,
-    scaled,
-)
-from robocov_app.editor.model.document import BOUNDARY, Owner, Sketch
-from robocov_app.editor.model.outlines import outlines
-from robocov_app.editor.model.plane import tenths
-from robocov_app.editor.model.selection import Change, Selection, called, exchanged
-
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle, StartSpec
-    from robocov_app.editor.model.background import Background
-
-__all__ = [
-    "arrayed",
-    "boundary_drawn",
-    "bounds_of",
-    "circle_drawn",
-    "deleted",
-    "disc_start_drawn",
-    "drawn",
-    "duplicated",
-    "free_name",
-    "made_boundary",
-    "made_polygons",
-    "mirrored",
-    "mirrored_across",
-    "moved",
-    "noted",
-    "placed",
-    "points_start_drawn",
-    "polygon_drawn",
-    "raised",
-    "rectangle_drawn",
-    "renamed",
-    "resized",
-    "rotated",
-    "scaled",
-    "sized",
-    "start_first",
-    "start_point_added",
-    "start_replaced",
-    "titled",
-    "underlaid",
-    "uniform_start_added",
-    "wall_drawn",
-    "widened",
-]
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.geometry import outlines, tenths
+from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 _LONGEST_TEXT = 10_000
 
@@ -108,7 +44,7 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
 def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
     """Name an obstacle or a start; an empty name takes an obstacle's name away."""
     name = label_of(name)
-    before = called(sketch, owner)
+    before = display_name(sketch, owner)
     if owner == BOUNDARY:
         raise MapError("the boundary has no name; the map has one")
     if isinstance(owner, str):
@@ -243,8 +179,8 @@ def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     }
     for key, polygons in shapes.items():
         if not polygons:
-            raise MapError(f"the {called(sketch, key)} covers nothing: it cannot become a polygon")
-    change = exchanged(
+            raise MapError(f"the {display_name(sketch, key)} covers nothing: it cannot become a polygon")
+    change = replace_obstacles(
         sketch, shapes, f"{Selection(items=frozenset(chosen)).words(sketch)} turned into polygons"
     )
     return replace(change, selection=change.selection.plus(replace(selection, vertices=frozenset())))

@@ -1,27 +1,19 @@
-"""Edits of the density: Gaussian hot spots added, moved, sized, weighed and taken away, and their floor.
-
-As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for people.
-"""
+"""Edits of the density: Gaussian hot spots added, moved, sized, weighed and taken away, and their floor."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.density import HEAVIEST, Gaussian, Gaussians, Raster
+from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster
+from robocov.environment import Point
 from robocov.errors import MapError
 from robocov.mapfile.models import FARTHEST, LARGEST
-from robocov_app.editor.model.plane import ring_near, tenths
+from robocov_app.editor.model.geometry import ring_near, tenths
 from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.viewer.session.map_edits import SHORTEST
-
-if TYPE_CHECKING:
-    from robocov.density import Density
-    from robocov.environment import Point
-    from robocov_app.editor.model.document import Sketch
-
 
 LIGHTEST = 1e-6
 """Smallest weight of a hot spot, and of every place where there is none."""

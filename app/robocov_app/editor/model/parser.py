@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NoReturn
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NoReturn
 
 from robocov.environment import (
     REPEATS,
     CircleObstacle,
     DiscStart,
+    Obstacle,
     ObstaclePath,
+    Point,
     PointsStart,
     PolygonObstacle,
+    Ring,
+    StartSpec,
     UniformStart,
     WallObstacle,
 )
-from robocov.errors import MapError, Mistake, place, shown_json, unknown_name
+from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
+from robocov.files.strictjson import check_header, located, parse, require_json
+from robocov.mapfile import density_of
+from robocov.mapfile.models import FORMAT, VERSION
+from robocov_app.editor.model.annotations import taken_apart
+from robocov_app.editor.model.sketch import Item, Sketch
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+_MAP_KEYS = (
+    *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
+    *("density", "extra"),
+)
 
-    from robocov.environment import Obstacle, Point, Ring, StartSpec
-    from robocov.errors import JsonPath
+FIRST: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+"""What a raster of a map without a boundary covers, m, unless it says so itself."""
 
 _KEYS = {
     "polygon": ("kind", "name", "vertices", "holes", "path"),
@@ -159,3 +172,56 @@ class PartReader:
 
     def _number_at(self, members: Mapping[str, Any], path: JsonPath, key: str) -> float:
         return self.number(self._at(members, path, key), (*path, key))
+
+
+def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
+    """Return the sketch in a parsed map document; what breaks the rules of maps is kept as it is.
+
+    A density is read as strictly as in a map; `folder` holds its picture.
+
+    Raises
+    ------
+    MapError
+        When it is not made as maps are: not a map, another version, an unknown key or kind, something
+        that is not a number; the message names the place.
+    """
+    where = one_line(where)
+    require_json(document, where)
+    check_header(document, where, FORMAT, VERSION)
+    reader = PartReader(where)
+    members = reader.members(document, (), _MAP_KEYS)
+    boundary = members.get("boundary")
+    obstacles = reader.items(members.get("obstacles", []), ("obstacles",), "obstacles")
+    shapes = [reader.obstacle(value, ("obstacles", k)) for k, value in enumerate(obstacles)]
+    starts = reader.object(members.get("starts", {}), ("starts",))
+    extra = reader.object(members.get("extra", {}), ("extra",))
+    notes, background, others = taken_apart(extra, [shape.name for shape in shapes])
+    schema = members.get("$schema")
+    boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
+    density = members.get("density")
+    return Sketch(
+        name=reader.text(members.get("name", ""), ("name",)),
+        description=reader.text(members.get("description", ""), ("description",)),
+        boundary=boundary,
+        obstacles=tuple(Item(k, shape, notes.get(k, "")) for k, shape in enumerate(shapes)),
+        starts=tuple((name, reader.start(value, ("starts", name))) for name, value in starts.items()),
+        background=background,
+        extra=others,
+        schema=None if schema is None else reader.text(schema, ("$schema",)),
+        density=None if density is None else density_of(density, boundary or FIRST, where, folder),
+    )
+
+
+def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
+    """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures.
+
+    Raises
+    ------
+    MapError
+        As `sketch_of`, and when the text is not JSON.
+    """
+    document = parse(text, where)
+    try:
+        return sketch_of(document, where, folder)
+    except MapError as error:
+        raise located(error, text, where) from None

@@ -1,14 +1,10 @@
-"""What is drawn: obstacles, the boundary, starts.
-
-As in `robocov_app.editor.edits.edits`: a `Change`, or a MapError with a sentence for people.
-"""
+"""What is drawn: obstacles, the boundary, starts."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -16,20 +12,21 @@ import shapely
 from robocov.environment import (
     CircleObstacle,
     DiscStart,
+    Obstacle,
+    Point,
     PointsStart,
     PolygonObstacle,
+    Ring,
+    StartSpec,
     UniformStart,
     WallObstacle,
 )
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.model.document import Sketch
-from robocov_app.editor.model.plane import ring_near, tenths
-from robocov_app.editor.model.selection import Change, Selection, called
+from robocov_app.editor.model.geometry import ring_near, tenths
+from robocov_app.editor.model.selection import Change, Selection, display_name
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.viewer.session.map_edits import SHORTEST, words_for
-
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle, Point, Ring, StartSpec
 
 _LONGEST_NAME = 100
 
@@ -115,7 +112,7 @@ def start_point_added(sketch: Sketch, name: str, point: Point) -> Change:
     if place in spec.positions:
         raise MapError("there is a robot's place already")
     after = sketch.with_start(name, PointsStart((*spec.positions, place)))
-    return Change(after, Selection.of(name), f"place added to {called(sketch, name)}")
+    return Change(after, Selection.of(name), f"place added to {display_name(sketch, name)}")
 
 
 def free_name(sketch: Sketch, name: str) -> str:

@@ -1,0 +1,290 @@
+"""What is edited: a sketch of a map, valid or not, and the map document that holds it.
+
+A sketch is a value: every edit makes another one, and what did not change is shared, so that
+remembering all of them costs little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+import shapely
+from shapely import GeometryCollection, LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.density import Density
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    Obstacle,
+    Point,
+    PointsStart,
+    Ring,
+    StartSpec,
+    WallObstacle,
+)
+from robocov.mapfile import dump_document, from_json, to_json
+from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov_app.editor.model.annotations import annotated, taken_apart
+from robocov_app.editor.model.background import Background
+
+BOUNDARY: Final = -1
+"""Stands for the boundary where obstacles have their keys."""
+
+
+Owner: TypeAlias = int | str
+"""What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """An obstacle of a sketch.
+
+    Attributes
+    ----------
+    key : int
+        Who it is, whatever it looks like: stays the same through every edit. Not in the file.
+    shape : Obstacle
+        As `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners.
+    note : str
+        What people wrote about it.
+    """
+
+    key: int
+    shape: Obstacle
+    note: str = ""
+
+    @cached_property
+    def geometry(self) -> BaseGeometry:
+        """What it covers, as a valid shapely geometry, m: a line or a point where it covers nothing."""
+        return geometry_of(self.shape)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be derived again."""
+        return {"key": self.key, "shape": replace(self.shape), "note": self.note}
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A map in the making. Immutable; equal when the content is equal, the keys of obstacles included.
+
+    Attributes
+    ----------
+    name, description : str
+    boundary : ring of (x, y), m, or None
+    obstacles : tuple of Item
+        From the bottom to the top.
+    starts : tuple of (name, StartSpec)
+        The first is the default.
+    background : Background or None
+    extra : dict
+        Free keys of the file, without what the editor keeps there itself.
+    schema : str or None
+        The file's ``$schema``.
+    density : Density or None
+        How much each place counts; pictures are read when the map is.
+    """
+
+    name: str = "Untitled"
+    description: str = ""
+    boundary: Ring | None = None
+    obstacles: tuple[Item, ...] = ()
+    starts: tuple[tuple[str, StartSpec], ...] = ()
+    background: Background | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
+    schema: str | None = None
+    density: Density | None = None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.boundary, self.obstacles))
+
+    @classmethod
+    def from_environment(cls, environment: Environment) -> Sketch:
+        """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
+        document = to_json(environment)
+        shapes = environment.obstacles
+        notes, background, extra = taken_apart(document.get("extra", {}), [shape.name for shape in shapes])
+        return cls(
+            name=environment.name,
+            description=environment.description,
+            boundary=environment.boundary,
+            obstacles=tuple(Item(k, shape, notes.get(k, "")) for k, shape in enumerate(shapes)),
+            starts=tuple(environment.starts.items()),
+            background=background,
+            extra=extra,
+            schema=environment.schema,
+            density=environment.density,
+        )
+
+    def environment(self, where: str = "map") -> Environment:
+        """Return the map that can be simulated.
+
+        Raises
+        ------
+        MapError
+            When it breaks a rule, as `robocov.load_map` on the saved file would.
+        """
+        return from_json(draft_document(self), where)
+
+    def unchecked(self) -> Environment:
+        """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
+        names = [item.shape.name for item in self.obstacles]
+        notes = {place: item.note for place, item in enumerate(self.obstacles) if item.note}
+        return Environment(
+            name=self.name,
+            boundary=self.boundary or (),
+            obstacles=tuple(item.shape for item in self.obstacles),
+            starts=dict(self.starts),
+            description=self.description,
+            extra=annotated(self.extra, notes, names, self.background),
+            schema=self.schema,
+            density=self.density,
+        )
+
+    def item(self, key: int) -> Item:
+        """Return the obstacle with a key; a KeyError where there is none."""
+        return self.obstacles[self.places[key]]
+
+    def start(self, name: str) -> StartSpec:
+        """Return the start of that name; a KeyError where there is none."""
+        return dict(self.starts)[name]
+
+    @cached_property
+    def places(self) -> Mapping[int, int]:
+        """Where in `obstacles` each key is."""
+        return {item.key: place for place, item in enumerate(self.obstacles)}
+
+    @cached_property
+    def geometries(self) -> Any:
+        """What the obstacles cover, in their order: an array of shapely geometries."""
+        geometries = np.empty(len(self.obstacles), dtype=object)
+        geometries[:] = [item.geometry for item in self.obstacles]
+        return geometries
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """An index of `geometries`."""
+        return shapely.STRtree(self.geometries)
+
+    @property
+    def fresh_key(self) -> int:
+        """A key that no obstacle has."""
+        return max((item.key for item in self.obstacles), default=-1) + 1
+
+    def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
+        """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
+        key = self.fresh_key
+        items: list[Item] = []
+        for each in shapes:
+            shape, note = each if isinstance(each, tuple) else (each, "")
+            items.append(Item(key + len(items), shape, note))
+        return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
+
+    def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
+        """Return the sketch with other shapes for some keys; what stays equal stays the same object."""
+        items = tuple(
+            replace(item, shape=shapes[item.key])
+            if item.key in shapes and shapes[item.key] != item.shape
+            else item
+            for item in self.obstacles
+        )
+        return replace(self, obstacles=items)
+
+    def with_start(self, name: str, spec: StartSpec) -> Sketch:
+        """Return the sketch with a start changed in its place, or added as the last."""
+        return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
+
+    def without(self, keys: Iterable[int]) -> Sketch:
+        """Return the sketch without some obstacles."""
+        gone = frozenset(keys)
+        return replace(self, obstacles=tuple(item for item in self.obstacles if item.key not in gone))
+
+    def renumbered(self) -> Sketch:
+        """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
+        items = tuple(replace(item, key=key) for key, item in enumerate(self.obstacles))
+        return replace(self, obstacles=items)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float] | None:
+        """Smallest x, smallest y, largest x, largest y of boundary, obstacles, starts and picture, m.
+
+        None where there is nothing.
+        """
+        points = list(self.boundary or ())
+        if self.background is not None and self.background.shown:
+            points += self.background.corners
+        for _, spec in self.starts:
+            if isinstance(spec, PointsStart):
+                points += spec.positions
+            elif isinstance(spec, DiscStart):
+                (x, y), r = spec.center, abs(spec.radius)
+                points += [(x - r, y - r), (x + r, y + r)]
+        boxes = shapely.bounds(self.geometries).reshape(-1, 4)
+        corners = np.concatenate([np.array(points, dtype=float).reshape(-1, 2), boxes[:, :2], boxes[:, 2:]])
+        corners = corners[np.isfinite(corners).all(axis=1)]
+        if not len(corners):
+            return None
+        (low_x, low_y), (high_x, high_y) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return low_x, low_y, high_x, high_y
+
+
+def draft_document(sketch: Sketch) -> dict[str, Any]:
+    """Return the map document of a sketch, whether it can be simulated or not.
+
+    `sketch_of` turns it into an equal sketch, keys aside. Of a sketch that breaks no rule it is the
+    document of its map; notes and the picture are under ``extra``.
+    """
+    document = to_json(sketch.unchecked())
+    if sketch.boundary is None:
+        del document["boundary"]
+    return document
+
+
+def sketch_text(sketch: Sketch) -> str:
+    """Return the text of the file of a sketch, as `robocov.mapfile.dump_map` has it."""
+    return dump_document(draft_document(sketch))
+
+
+def geometry_of(shape: Obstacle) -> BaseGeometry:
+    """Return what an obstacle covers as a valid geometry, whatever the obstacle is like.
+
+    What is too large for a map, or too far away, covers nothing: computing with it may take for ever.
+    """
+    if isinstance(shape, CircleObstacle):
+        if not _is_near([shape.center]):
+            return GeometryCollection()
+        return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
+    points = shape.points if isinstance(shape, WallObstacle) else shape.vertices
+    if not _is_near(points):
+        return GeometryCollection()
+    line = _line(points)
+    if isinstance(shape, WallObstacle):
+        return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
+    if len(points) < 3:
+        return line
+    polygon = (
+        shape.polygon
+        if all(map(_is_ring, shape.holes))
+        else Polygon(points, list(filter(_is_ring, shape.holes)))
+    )
+    return polygon if polygon.is_valid else shapely.make_valid(polygon)
+
+
+def _is_near(points: Iterable[Point]) -> bool:
+    return all(abs(x) <= FARTHEST and abs(y) <= FARTHEST for x, y in points)
+
+
+def _is_ring(points: Ring) -> bool:
+    return len(points) >= 3 and _is_near(points)
+
+
+def _line(points: Ring) -> BaseGeometry:
+    """Return a line through points, or what is left of one."""
+    if not points:
+        return GeometryCollection()
+    return LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])

@@ -1,0 +1,546 @@
+"""The tool that selects and drags, and the one that moves the view."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.environment import Point
+from robocov.errors import MapError
+from robocov_app.editor.edits import transform, vertices
+from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of
+from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
+from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner
+from robocov_app.editor.tools.handles import Handle, handle_at
+from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
+from robocov_app.editor.tools.tool import (
+    ANGLE,
+    PointerEvent,
+    Preview,
+    Tool,
+    ToolContext,
+    at_round_angle,
+    bearing_words,
+    length_words,
+)
+
+MANY_POINTS = 1000
+"""Points of what is moved from which on it is moved as a picture."""
+
+SAME = 1e-9
+"""Metres below which nothing has moved."""
+
+FEW_POINTS = 60
+"""Points of what is moved that may snap; of more, a choice of them."""
+
+
+class Drag:
+    """Something that is dragged.
+
+    Attributes
+    ----------
+    change : Change or None
+        What letting go would make.
+    guides : tuple of Guide
+        Why it is where it is.
+    words : str
+        Beside the cursor.
+    """
+
+    def __init__(self) -> None:
+        self.change: Change | None = None
+        self.guides: tuple[Guide, ...] = ()
+        self.words = ""
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse."""
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """Take what was typed instead.
+
+        Raises
+        ------
+        MapError
+            When it means nothing.
+        """
+        raise MapError(f"“{text}”: there is nothing to type here")
+
+    def preview(self) -> Preview:
+        """Return what to show beside the change."""
+        return Preview(words=self.words)
+
+    def ended(self, context: ToolContext) -> None:
+        """Let go: what was changed is done."""
+        if self.change is not None:
+            context.change(self.change)
+
+
+class Moving(Drag):
+    """Moves whole things, or copies them.
+
+    Attributes
+    ----------
+    moving : Selection
+    copies : bool
+    offset : (dx, dy) or None, m
+        By how much, where it is too much to work the change out in every frame.
+    """
+
+    def __init__(self, context: ToolContext, selection: Selection, begun: Point) -> None:
+        super().__init__()
+        self.moving, self._begun, self._at = selection, begun, begun
+        points = [at for owner in selection.owners for _, at in points_of(context.sketch, owner)]
+        step = max(1, len(points) // FEW_POINTS)
+        self._points = points[::step]
+        self.offset = (0.0, 0.0) if len(points) > MANY_POINTS else None
+        self.copies = False
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse; with Alt copies move, with Shift at round angles, with Ctrl freely."""
+        self.copies = event.alt
+        to = at_round_angle(self._begun, event.raw) if event.shift else event.raw
+        dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
+        self.guides = ()
+        if not event.ctrl and not event.shift:
+            targets = context.snapper.targets(context.sketch, self.moving.owners)
+            if targets is not None:
+                snap = snapped_move(self._points, dx, dy, targets, context.snapping(event.reach))
+                self.guides = snap.guides
+                dx, dy = self._on_grid(context, (dx, dy), snap.point)
+        self._move(context, dx, dy)
+
+    def _on_grid(self, context: ToolContext, free: Point, snapped_to: Point) -> Point:
+        """Return the move, with the grid along an axis that nothing else counts for."""
+        by = list(snapped_to)
+        for axis in (0, 1):
+            if "grid" in context.snaps and abs(by[axis] - free[axis]) < SAME and self._points:
+                first = self._points[0][axis]
+                by[axis] = context.grid * round((first + by[axis]) / context.grid) - first
+        return by[0], by[1]
+
+    def _move(self, context: ToolContext, dx: float, dy: float) -> None:
+        self._at = self._begun[0] + dx, self._begun[1] + dy
+        if self.offset is None:
+            self.change = self._made(context, dx, dy)
+        else:
+            self.offset = (dx, dy)
+        self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {length_words(float(np.hypot(dx, dy)))}"
+
+    def _made(self, context: ToolContext, dx: float, dy: float) -> Change | None:
+        act = transform.duplicated if self.copies else transform.moved
+        still = dx == 0.0 and dy == 0.0
+        return None if still else act(context.sketch, self.moving, dx, dy)
+
+    def ended(self, context: ToolContext) -> None:
+        """Let go."""
+        if self.offset is not None:
+            self.change = self._made(context, *self.offset)
+        super().ended(context)
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """Move by a length towards the cursor, or by what was typed: ``0.5 -2`` or ``2<45``."""
+        text = text.strip()
+        two = len(text.split()) > 1 or "<" in text or ";" in text
+        if two and text[0] not in "@+":
+            text = f"@{text}"
+        to = next_point_of(text, self._begun, self._at)
+        self._move(context, to[0] - self._begun[0], to[1] - self._begun[1])
+
+
+class MovingVertices(Drag):
+    """Moves single vertices: the one that was taken, and those that are selected with it."""
+
+    def __init__(self, context: ToolContext, taken: Vertex, selection: Selection) -> None:
+        super().__init__()
+        self._selection = Selection(vertices=selection.vertices | {taken})
+        self._begun = self._at = place_of(context.sketch, taken)
+        self._origin = _neighbour(context, taken)
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
+        self.guides = ()
+        to = event.raw
+        if event.shift and self._origin is not None:
+            to = at_round_angle(self._origin, event.raw)
+        elif not event.ctrl:
+            targets = context.snapper.targets(context.sketch, self._selection.vertices)
+            if targets is not None:
+                snap = snapped(event.raw, targets, context.snapping(event.reach), self._origin)
+                to, self.guides = snap.point, snap.guides
+        self._put(context, to)
+
+    def _put(self, context: ToolContext, to: Point) -> None:
+        self._at = to
+        dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
+        still = dx == 0.0 and dy == 0.0
+        self.change = None if still else vertices.moved(context.sketch, self._selection, dx, dy)
+        self.words = f"({to[0]:.2f}, {to[1]:.2f}) m"
+        if self._origin is not None:
+            self.words += f"   {bearing_words(self._origin, to)}"
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """Put the vertex where it was typed: a length from the one before, or coordinates."""
+        self._put(context, next_point_of(text, self._origin or self._begun, self._at))
+
+
+def _neighbour(context: ToolContext, vertex: Vertex) -> Point | None:
+    """Return the vertex before one on its ring, or after a wall's first; None of circles and starts."""
+    same = {
+        other.index: at for other, at in points_of(context.sketch, vertex.of) if other.ring == vertex.ring
+    }
+    if isinstance(vertex.of, str) or not _is_line(context, vertex):
+        return None
+    before = vertex.index - 1
+    if before < 0:
+        shape = None if vertex.of == BOUNDARY else context.sketch.item(vertex.of).shape
+        before = 1 if hasattr(shape, "points") else len(same) - 1
+    return same.get(before)
+
+
+def _is_line(context: ToolContext, vertex: Vertex) -> bool:
+    if isinstance(vertex.of, str):
+        return False
+    return vertex.of == BOUNDARY or not hasattr(context.sketch.item(vertex.of).shape, "center")
+
+
+class Turning(Drag):
+    """Turns whole things about the middle of their box."""
+
+    def __init__(self, context: ToolContext, selection: Selection, begun: Point) -> None:
+        super().__init__()
+        low_x, low_y, high_x, high_y = bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
+        self.about = (low_x + high_x) / 2, (low_y + high_y) / 2
+        self._selection, self._from = selection, self._angle(begun)
+
+    def _angle(self, point: Point) -> float:
+        return float(np.degrees(np.arctan2(point[1] - self.about[1], point[0] - self.about[0])))
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse; with Shift in steps, with Ctrl freely."""
+        degrees = (self._angle(event.raw) - self._from + 180.0) % 360.0 - 180.0
+        if event.shift:
+            degrees = ANGLE * round(degrees / ANGLE)
+        elif not event.ctrl:
+            degrees = snapped_angle(degrees, context.snap_angle)
+        self._turn(context, degrees)
+
+    def _turn(self, context: ToolContext, degrees: float) -> None:
+        self.words = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
+        self.change = (
+            transform.rotated(context.sketch, self._selection, degrees, self.about) if degrees else None
+        )
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """Turn by so many degrees."""
+        self._turn(context, angle_of(text))
+
+
+class Scaling(Drag):
+    """Scales whole things by a corner or a side of their box; the opposite one stays."""
+
+    def __init__(self, context: ToolContext, selection: Selection, handle: Handle) -> None:
+        super().__init__()
+        self._selection, self._side = selection, handle.side
+        self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
+        self._offset = self._edge(1)
+        self._offset = handle.at[0] - self._offset[0], handle.at[1] - self._offset[1]
+        shapes = [context.sketch.item(key).shape for key in selection.items]
+        # a circle that is stretched would be a circle no more
+        self._even = bool(selection.starts) or (
+            bool(shapes) and all(hasattr(each, "center") for each in shapes)
+        )
+
+    def _edge(self, which: int) -> Point:
+        """Return the corner or the middle of the side that is dragged (1), or of the one that stays (-1)."""
+        low_x, low_y, high_x, high_y = self._bounds
+        xs, ys = (
+            {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x},
+            {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y},
+        )
+        return xs[which * self._side[0]], ys[which * self._side[1]]
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
+        to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
+        self.guides = ()
+        if not event.ctrl:
+            targets = context.snapper.targets(context.sketch, self._selection.owners)
+            if targets is not None:
+                snap = snapped(to, targets, context.snapping(event.reach))
+                to, self.guides = snap.point, snap.guides
+        low_x, low_y, high_x, high_y = self._bounds
+        about = ((low_x + high_x) / 2, (low_y + high_y) / 2) if event.alt else self._edge(-1)
+        taken = self._edge(1)
+        fx, fy = (
+            (to[k] - about[k]) / (taken[k] - about[k])
+            if self._side[k] and abs(taken[k] - about[k]) > 1e-9
+            else 1.0
+            for k in (0, 1)
+        )
+        if event.shift or self._even:
+            whole = [f for f, side in ((fx, self._side[0]), (fy, self._side[1])) if side]
+            fx = fy = max(whole, key=lambda f: abs(f - 1.0))
+        self._scale(context, fx, fy, about)
+
+    def _scale(self, context: ToolContext, fx: float, fy: float, about: Point) -> None:
+        wide, high = self._bounds[2] - self._bounds[0], self._bounds[3] - self._bounds[1]
+        fx, fy = (
+            f if abs(f) * max(size, 1e-3) >= 1e-3 else 1e-3 / max(size, 1e-3)
+            for f, size in ((fx, wide), (fy, high))
+        )
+        same = abs(fx - 1.0) < 1e-12 and abs(fy - 1.0) < 1e-12
+        self.change = None if same else transform.scaled(context.sketch, self._selection, fx, fy, about)
+        factor = f"{100 * fx:.0f} %" if abs(fx - fy) < 1e-9 else f"{100 * fx:.0f} % x {100 * fy:.0f} %"
+        self.words = f"{length_words(abs(wide * fx))} x {length_words(abs(high * fy))}   {factor}"
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """Scale to so many metres along the side that is dragged: ``2.5``, ``150%``, ``*2``."""
+        axis = 0 if self._side[0] else 1
+        now = self._bounds[2 + axis] - self._bounds[axis]
+        factor = length_of(text, now=now) / now
+        if factor <= 0.0:
+            raise MapError(f"“{text}”: a size above 0 was wanted")
+        both = self._even or (self._side[0] and self._side[1])
+        fx = factor if both or axis == 0 else 1.0
+        fy = factor if both or axis == 1 else 1.0
+        self._scale(context, fx, fy, self._edge(-1))
+
+
+class Box(Drag):
+    """Selects what lies in a box; drawn to the left also what it touches."""
+
+    def __init__(self, context: ToolContext, begun: Point, *, adds: bool) -> None:
+        super().__init__()
+        self._begun = self._at = begun
+        self._before = context.selection if adds else Selection()
+        self._adds = adds
+
+    def to(self, context: ToolContext, event: PointerEvent) -> None:
+        """Follow the mouse."""
+        self._at = event.raw
+
+    def found(self, context: ToolContext) -> Selection:
+        """Return what is in the box: whole things, or vertices where it holds some that are shown."""
+        sketch = context.sketch
+        shown = context.handled
+        inside = in_box(sketch, self._begun, self._at, touched=self._leftwards)
+        whole = Selection(inside.items - set(shown), frozenset(), inside.starts - set(shown), False)
+        if shown and not self._adds and not whole:
+            single = vertices_in_box(sketch, self._begun, self._at, shown)
+            if single.vertices and len(single.vertices) < sum(len(points_of(sketch, each)) for each in shown):
+                return single
+        return inside
+
+    @property
+    def _leftwards(self) -> bool:
+        return self._at[0] < self._begun[0]
+
+    def ended(self, context: ToolContext) -> None:
+        """Select."""
+        if distance(self._begun, self._at) > 0.0:
+            context.select(self._before.plus(self.found(context)))
+
+    def preview(self) -> Preview:
+        """Show the box."""
+        return Preview(box=(self._begun, self._at), touched=self._leftwards)
+
+
+NEAR = 0.6
+"""Part of a finger's width within which something is taken hold of."""
+
+ON_EDGE = 1e-5
+"""Metres within which a point lies on an edge."""
+
+_CURSORS = {
+    **dict.fromkeys(((-1, 0), (1, 0)), "sideways"),
+    **dict.fromkeys(((0, -1), (0, 1)), "updown"),
+    **dict.fromkeys(((-1, -1), (1, 1)), "rising"),
+    **dict.fromkeys(((-1, 1), (1, -1)), "falling"),
+}
+"""What the cursor looks like over handles that scale, by their sides."""
+
+
+class Select(Tool):
+    """Selects, and drags what is selected: whole, by its vertices, or by the box around it."""
+
+    name = "select"
+    title = "Select"
+    hint = "click or drag a box; drag to move, Alt-drag to copy; double click on an edge inserts a vertex"
+    snaps = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.hovered: Owner | None = None
+        self.near: Handle | None = None
+        self._drag: Drag | None = None
+        self._pressed: PointerEvent | None = None
+        self._grip: Handle | None = None
+        self._narrows = False
+        self._gone = False
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being dragged."""
+        return self._drag is not None
+
+    @property
+    def drag(self) -> Drag | None:
+        """What is being dragged."""
+        return self._drag
+
+    def press(self, context: ToolContext, event: PointerEvent) -> None:
+        """Take hold of a handle, or of what is there; else begin a box."""
+        self._pressed, self._drag, self._narrows, self._gone = event, None, False, False
+        self._grip = handle_at(context.handles, event.raw, NEAR * event.reach)
+        if self._grip is not None:
+            self._take(context, self._grip, event)
+            return
+        found = owners_at(context.sketch, event.raw, 0.5 * event.reach)
+        if not found:
+            return
+        # what is selected already is meant, also where something else lies above it
+        there = next((each for each in found if each in context.selection.owners), None)
+        if event.shift:
+            context.select(context.selection.without_vertices().toggled(Selection.of(found[0])))
+        elif there is None or context.selection.vertices:
+            context.select(Selection.of(there if there is not None else found[0]))
+        else:
+            self._narrows = True
+
+    def _take(self, context: ToolContext, handle: Handle, event: PointerEvent) -> None:
+        """Select the vertex that was pressed; the box's handles wait to be dragged."""
+        if handle.vertex is None:
+            return
+        own = Selection(vertices=frozenset({handle.vertex}))
+        if event.shift:
+            context.select(Selection(vertices=context.selection.vertices).toggled(own))
+        elif handle.vertex not in context.selection.vertices:
+            context.select(own)
+
+    def move(self, context: ToolContext, event: PointerEvent) -> None:
+        """Drag; or show what a press would take."""
+        if self._pressed is None:
+            self._hover(context, event)
+            return
+        if self._gone:
+            return
+        if self._drag is None and distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
+            self._drag = self._begun(context, self._pressed)
+        if self._drag is not None:
+            self._drag.to(context, event)
+            self.guides = self._drag.guides
+
+    def _begun(self, context: ToolContext, pressed: PointerEvent) -> Drag:
+        """Return the drag that the press has begun."""
+        handle = self._grip
+        if handle is not None and handle.vertex is not None:
+            return MovingVertices(context, handle.vertex, context.selection)
+        if handle is not None and handle.kind == "turn":
+            return Turning(context, context.selection.without_vertices(), pressed.raw)
+        if handle is not None:
+            return Scaling(context, context.selection.without_vertices(), handle)
+        found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
+        if any(each in context.selection.owners for each in found):
+            return Moving(context, context.selection.without_vertices(), pressed.raw)
+        return Box(context, pressed.raw, adds=pressed.shift)
+
+    def _hover(self, context: ToolContext, event: PointerEvent) -> None:
+        self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
+        found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
+        self.hovered = found[0] if found else None
+
+    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+        """Do what was dragged; a click selects what it is on, and again what lies below."""
+        pressed, drag, gone = self._pressed, self._drag, self._gone
+        self._pressed = self._drag = None
+        self.guides = ()
+        if gone or pressed is None:
+            return
+        if drag is not None:
+            drag.to(context, event)
+            drag.ended(context)
+            return
+        if self._grip is not None or event.shift:
+            return
+        found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
+        if not found:
+            context.select(Selection())
+        elif self._narrows:
+            self._narrow(context, found)
+
+    def _narrow(self, context: ToolContext, found: tuple[Owner, ...]) -> None:
+        """Select only one of what is selected; of one, what lies below it."""
+        chosen = context.selection.owners
+        if len(chosen) > 1:
+            context.select(Selection.of(next(each for each in found if each in chosen)))
+        elif len(found) > 1:
+            (one,) = chosen
+            context.select(Selection.of(found[(found.index(one) + 1) % len(found)]))
+
+    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+        """Insert a vertex where the edge of something was clicked twice; elsewhere it is one more press."""
+        owners = context.handled or owners_at(context.sketch, event.raw, 0.5 * event.reach)[:1]
+        edge = edge_at(context.sketch, event.raw, NEAR * event.reach, owners)
+        if edge is None or handle_at(context.handles, event.raw, NEAR * event.reach) is not None:
+            self.press(context, event)
+            return
+        self._pressed, self._drag, self._gone = event, None, True
+        if not event.ctrl:
+            # on the edge, but at a round place
+            to = context.snapped(edge.point, event.reach).point
+            edge = edge_at(context.sketch, to, ON_EDGE, [edge.of]) or edge
+        context.change(vertices.inserted(context.sketch, edge))
+
+    def enter(self, context: ToolContext, text: str) -> None:
+        """End the drag with what was typed."""
+        drag = self._drag
+        if drag is None:
+            super().enter(context, text)
+            return
+        drag.enter(context, text)
+        self._drag, self._gone, self.guides = None, True, ()
+        drag.ended(context)
+
+    def cancel(self, context: ToolContext) -> bool:
+        """Give up what is dragged; then select nothing."""
+        if self._drag is not None:
+            self._drag, self._gone, self.guides = None, True, ()
+            return True
+        if context.selection.vertices:
+            context.select(Selection.of(*{vertex.of for vertex in context.selection.vertices}))
+            return True
+        if context.selection:
+            context.select(Selection())
+            return True
+        return False
+
+    def preview(self, context: ToolContext) -> Preview | None:
+        """Show the box, or words."""
+        return self._drag.preview() if self._drag is not None else None
+
+    def shape_of_cursor(self, context: ToolContext) -> str:
+        """Tell by the cursor what a press would do."""
+        handle = self._grip if self._drag is not None else self.near
+        if isinstance(self._drag, Moving):
+            return "move"
+        if handle is not None:
+            return _CURSORS.get(handle.side, "hand")
+        if self.hovered is not None:
+            return "move" if self.hovered in context.selection.owners else "hand"
+        return "arrow"
+
+
+class Pan(Tool):
+    """Moves the sheet; the window does it, since cameras are its own."""
+
+    name = "pan"
+    title = "Pan"
+    hint = "drag the sheet; the right button does so with every tool, and Space while it is held down"
+    snaps = False
+    takes_numbers = False
+
+    def shape_of_cursor(self, context: ToolContext) -> str:
+        """Show that the sheet moves."""
+        return "move"
