@@ -16,12 +16,12 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.editor.edits import create
-from robocov_app.editor.model.autosave import FOLDER as DRAFTS
 from robocov_app.editor.model.autosave import recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.opening import EditorOpening, offer
+from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.viewer.settings import FOLDER
 
 

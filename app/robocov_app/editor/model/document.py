@@ -1,19 +1,19 @@
-"""The document that is open: its history, its file, and the copy that is kept aside. Knows no pygame."""
+"""The map that is open: its history, its file, and the copy that is kept aside."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps
-from robocov_app.editor.edits.properties import titled
+from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.model import file
-from robocov_app.editor.model.autosave import Autosave, Autosaver
+from robocov_app.editor.model.autosave import KIND, Autosave, content
 from robocov_app.editor.model.file import OnDisk, State
 from robocov_app.editor.model.history import History
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.toolkit.autosave import Autosaver
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 """The boundary of a new map, m."""
@@ -25,19 +25,19 @@ _LOOKED_AGAIN = 1.0
 
 
 class Document:
-    """A sketch with its history, its file, and the draft that survives whatever happens.
+    """A sketch with its history, its file, and the autosave that survives whatever happens.
 
     Parameters
     ----------
     sketch : Sketch
     drafts : Path or None
-        Where drafts are kept; None for nowhere.
+        Where maps are kept aside; None for nowhere.
     path : Path or None
         Its file; None if it never had one.
     disk : OnDisk or None
         What the file was like.
-    draft : Autosave or None
-        The work that goes on.
+    resumed : Path or None
+        The folder of the autosave whose work goes on.
     saved : bool
         Whether losing it would lose nothing.
     stem : str
@@ -51,14 +51,14 @@ class Document:
         path: Path | None = None,
         disk: OnDisk | None = None,
         *,
-        draft: Autosave | None = None,
+        resumed: Path | None = None,
         saved: bool = True,
         stem: str = "",
     ) -> None:
         self.history = History(sketch, saved=saved)
         self.path, self.disk, self.stem = path, disk, stem
         self.state: State = "same"
-        self._keeper = Autosaver(drafts, path, disk, draft)
+        self._autosaver = Autosaver(drafts, KIND, path, resumed)
         self._kept: Sketch | None = sketch if saved else None
         self._looked = 0.0
         self._over = False
@@ -66,33 +66,22 @@ class Document:
 
     @classmethod
     def new(cls, drafts: Path | None, path: Path | None = None) -> Document:
-        """Return an empty sheet with the boundary that is offered; `path` is not there yet."""
+        """Return an empty map with the boundary that is offered; `path` is not there yet."""
         return cls(Sketch(boundary=FIRST_SHEET), drafts, path)
 
     @classmethod
     def opened(cls, path: Path, drafts: Path | None) -> Document:
-        """Return the map in a file; one that comes with robocov as a copy, which has no file yet.
-
-        Raises
-        ------
-        MapError
-            When it cannot be read.
-        """
+        """Return the map in a file; one that comes with robocov as a copy, which has no file yet."""
         sketch, disk = file.opened(path)
         if is_bundled(path):
             return cls(sketch, drafts, stem=path.stem)
         return cls(sketch, drafts, path.resolve(), disk)
 
     @classmethod
-    def recovered(cls, draft: Autosave, drafts: Path | None) -> Document:
-        """Return work that was left behind, unsaved still.
-
-        Raises
-        ------
-        MapError
-            When it cannot be read.
-        """
-        return cls(draft.sketch(), drafts, draft.path, draft.disk, draft=draft, saved=False)
+    def recovered(cls, autosave: Autosave, drafts: Path | None) -> Document:
+        """Return work that was left behind, unsaved still."""
+        sketch = autosave.sketch()
+        return cls(sketch, drafts, autosave.path, autosave.disk, resumed=autosave.folder, saved=False)
 
     @property
     def unsaved(self) -> bool:
@@ -101,7 +90,7 @@ class Document:
 
     @property
     def title(self) -> str:
-        """What the document is called: by its file, or else by its name."""
+        """Its file's name, or else its own."""
         return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
     def suggested(self, folder: Path) -> Path:
@@ -115,8 +104,23 @@ class Document:
             target, k = folder / f"{stem}-{k}{SUFFIX}", k + 1
         return target
 
+    def spoils(self, path: Path) -> bool:
+        """Return whether saving there would replace a valid map by one that cannot run."""
+        try:
+            load_map(_with_suffix(path))
+        except MapError:
+            return False
+        try:
+            self.history.sketch.environment()
+        except MapError:
+            return True
+        return False
+
     def save(self, path: Path, *, over: bool = False) -> str:
         """Write the file; return what to tell.
+
+        A map that nobody has named is called like its file, at each of its steps: what was undone can be
+        redone after saving.
 
         Raises
         ------
@@ -125,38 +129,33 @@ class Document:
         OutputError
             When it cannot be written.
         """
-        path = path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
+        path = _with_suffix(path)
         if is_bundled(path):
             raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")
-        sketch, named = self.history.sketch, None
-        if sketch.name == Sketch.name:  # nobody has named it: the file does
-            named = replace(titled(sketch, path.stem), selection=self.history.selection)
-            sketch = named.sketch
+        named = self.history.sketch.named(path.stem)
         before = self.disk if path == self.path else None
-        self.disk = file.saved(sketch, path, before, over=over or (self._over and path == self.path))
-        if named is not None:
-            self.history.do(named)
+        self.disk = file.saved(named, path, before, over=over or (self._over and path == self.path))
+        if named is not self.history.sketch:
+            self.history.replace_all(lambda sketch: sketch.named(path.stem))
         self.path, self.state, self._over = path, "same", False
-        self.history.mark_saved()
-        self._kept = sketch
-        self._keeper.settle(path, self.disk)
+        self._settle()
         return f"saved: {path}"
 
     def keep(self) -> None:
         """Keep aside what is not saved, if it is not what was kept last."""
         sketch = self.history.sketch
-        if not self.unsaved:
-            if self._kept is not sketch:
-                self._kept = sketch
-                self._keeper.settle(self.path, self.disk)
-        elif self._kept is not sketch:
-            self._kept = sketch
-            self._keeper.keep(sketch)
+        if self._kept is sketch:
+            return
+        self._kept = sketch
+        if self.unsaved:
+            self._autosaver.keep(partial(content, sketch, self.disk))
+        else:
+            self._autosaver.settle(self.path)
 
     @property
     def trouble(self) -> str:
-        """What keeps it from keeping a draft, in words."""
-        return self._keeper.trouble
+        """Why nothing is kept aside, in words; empty if it is."""
+        return self._autosaver.trouble
 
     def look(self, now: float) -> State:
         """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""
@@ -171,32 +170,29 @@ class Document:
         return "same"
 
     def reload(self) -> None:
-        """Take the document as its file is now; that is an edit, which can be undone.
-
-        Raises
-        ------
-        MapError
-            When it cannot be read.
-        """
+        """Take the document as its file is now; that is an edit, which can be undone."""
         assert self.path is not None
         sketch, self.disk = file.opened(self.path)
         self.state, self._over = "same", False
         self.history.do(Change(sketch, Selection(), "read again from the file"))
-        self.history.mark_saved()
-        self._kept = sketch
-        self._keeper.settle(self.path, self.disk)
+        self._settle()
 
     def keep_mine(self) -> None:
         """Take no notice of what is on the disk: saving replaces it."""
         self._over = True
 
     def flush(self) -> None:
-        """Wait until the draft is on the disk."""
-        self._keeper.flush()
+        """Wait until the autosave is on the disk."""
+        self._autosaver.flush()
 
     def close(self, *, discard: bool) -> None:
         """End; discard what was kept aside, or leave it to be offered at the next start."""
-        self._keeper.close(discard=discard)
+        self._autosaver.close(discard=discard)
+
+    def _settle(self) -> None:
+        self.history.mark_saved()
+        self._kept = self.history.sketch
+        self._autosaver.settle(self.path)
 
 
 def is_bundled(path: Path) -> bool:
@@ -205,3 +201,7 @@ def is_bundled(path: Path) -> bool:
         return path.resolve() in {each.resolve() for each in bundled_maps().values()}
     except (OSError, ValueError, RuntimeError):
         return False
+
+
+def _with_suffix(path: Path) -> Path:
+    return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)

@@ -1,9 +1,9 @@
-"""What was done to a sketch, in words, and back again: without a limit."""
+"""Undo and redo of a sketch, without a limit: what it was is kept, not what was done."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, replace
 
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
@@ -11,8 +11,6 @@ from robocov_app.editor.model.sketch import Sketch
 
 @dataclass(frozen=True)
 class _Step:
-    """What was there before something was done, and after it."""
-
     before: Sketch
     selected_before: Selection
     after: Change
@@ -20,7 +18,7 @@ class _Step:
 
 
 class History:
-    """A sketch and all that it was; undo is exact, because what it was is kept, not what was done.
+    """A sketch and all that it was.
 
     Parameters
     ----------
@@ -45,7 +43,7 @@ class History:
         self._broken = False
 
     def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
-        """Take a change; say whether it changed anything. What had been undone cannot be done again then.
+        """Take a change; return whether it changed anything. What had been undone cannot be redone then.
 
         Changes one after another with the same `drag` become one, such as those of one drag, of keys
         pressed quickly, or of a field that is typed in. One that leads back to where they began is none.
@@ -67,10 +65,7 @@ class History:
         return True
 
     def undo(self) -> Change | None:
-        """Take the newest change back; return what was there before with the words of what was taken back.
-
-        None if there is nothing.
-        """
+        """Take the newest change back; return what was there before, in the words of what was taken back."""
         if not self._done:
             return None
         step = self._done.pop()
@@ -84,6 +79,24 @@ class History:
         step = self._undone.pop()
         self._done.append(step)
         return self._now(step.after)
+
+    def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
+        """Change the sketch as it is and at every step, without a step of its own."""
+        changed: dict[int, Sketch] = {}  # the same sketch stays the same in all steps
+
+        def new(sketch: Sketch) -> Sketch:
+            if id(sketch) not in changed:
+                changed[id(sketch)] = change(sketch)
+            return changed[id(sketch)]
+
+        for steps in (self._done, self._undone):
+            steps[:] = [
+                replace(
+                    step, before=new(step.before), after=replace(step.after, sketch=new(step.after.sketch))
+                )
+                for step in steps
+            ]
+        self.sketch = new(self.sketch)
 
     @property
     def can_undo(self) -> bool:

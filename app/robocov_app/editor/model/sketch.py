@@ -204,6 +204,11 @@ class Sketch:
         gone = frozenset(keys)
         return replace(self, obstacles=tuple(item for item in self.obstacles if item.key not in gone))
 
+    def named(self, name: str) -> Sketch:
+        """Return the sketch with a name if nobody has given it one."""
+        name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
+        return replace(self, name=name) if self.name == Sketch.name and name else self
+
     def renumbered(self) -> Sketch:
         """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
         items = tuple(replace(item, key=key) for key, item in enumerate(self.obstacles))

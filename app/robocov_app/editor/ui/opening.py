@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
-from robocov_app.editor.model.autosave import autosave_folder, discard, opened_elsewhere, recoverable
+from robocov_app.editor.model.autosave import opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.measurement_worker import MeasurementWorker
@@ -16,6 +16,7 @@ from robocov_app.editor.ui.desk import Desk
 from robocov_app.editor.ui.documents import heading, lay_under, opened
 from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
 from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
+from robocov_app.toolkit.autosave import autosave_folder, discard
 from robocov_app.viewer.opening import display, fitting, screen_scale
 from robocov_app.viewer.settings import loaded, save_settings, settings_file
 
@@ -171,7 +172,7 @@ def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
         window.documents.leave(lambda: window.documents.recover(draft))
 
     def throw_away() -> None:
-        discard(draft)
+        discard(draft.folder)
         offer(window, rest)
 
     answers = (

@@ -12,6 +12,7 @@ from robocov_app.editor.edits import create, properties
 from robocov_app.editor.model.autosave import recoverable
 from robocov_app.editor.model.document import FIRST_SHEET, Document
 from robocov_app.editor.model.file import ChangedError
+from robocov_app.editor.model.selection import Selection
 
 PILLAR = CircleObstacle((5, 5), 1.0)
 
@@ -135,3 +136,34 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
         document.save(tmp_path / "no-such-folder" / "plan.json")
     assert not document.unsaved
     assert document.trouble == ""
+
+
+def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):
+    document = Document.new(None)
+    changed(document)
+    changed(document, 2.0)
+    document.history.undo()
+    document.save(tmp_path / "plan.json")
+    assert document.history.sketch.name == "plan" and not document.unsaved
+    assert document.history.redo() is not None
+    assert len(document.history.sketch.obstacles) == 2 and document.history.sketch.name == "plan"
+    document.history.undo()
+    assert not document.unsaved
+    document.history.undo()
+    assert document.history.sketch.name == "plan"
+
+
+def test_a_file_with_a_long_or_strange_name_names_its_map_as_far_as_it_can(tmp_path):
+    document = Document.new(None)
+    document.save(tmp_path / ("a\tb" + 150 * "x"))
+    assert document.history.sketch.name == "a b" + 97 * "x"
+
+
+def test_a_map_that_cannot_run_would_spoil_a_valid_one(tmp_path):
+    document = Document.new(None)
+    document.save(tmp_path / "plan.json")
+    assert not document.spoils(tmp_path / "plan")
+    document.history.do(properties.deleted(document.history.sketch, Selection(boundary=True)))
+    assert document.spoils(tmp_path / "plan") and not document.spoils(tmp_path / "new.json")
+    document.save(tmp_path / "plan.json")
+    assert not document.spoils(tmp_path / "plan"), "there is nothing more to be lost"

@@ -1,0 +1,1 @@
+"""What both windows are built with; it knows no robots and no maps."""

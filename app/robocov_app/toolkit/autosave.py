@@ -1,0 +1,283 @@
+"""Work that survives a crash: kept aside while it is edited, and found again at the next start.
+
+Each open document has a folder of its own in the user's folder for states, locked while its program lives:
+so two programs never meet, and what one left behind that ended without a word can be told from what is being
+worked on. The environment variable ``ROBOCOV_DRAFTS`` names another folder, or none if it is empty.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+from robocov.errors import MapError, OutputError
+from robocov.files.atomic import locked, written
+from robocov.files.strictjson import parse, read_bytes
+
+FOLDER = "ROBOCOV_DRAFTS"
+"""Environment variable with another folder to keep work in; empty for none."""
+
+_FILE = "draft.json"
+
+_PAUSE = 0.25
+"""Seconds between two writings."""
+
+_SHARE = 10.0
+"""The pause is at least so many times as long as the last writing took: large work does not stutter."""
+
+_PATIENCE = 2.0
+"""Seconds until it is tried again when work could not be written."""
+
+_TRIES = 3
+"""Folders that are tried to work in."""
+
+_YOUNG = 60.0
+"""Seconds in which a folder without work may be one that a program is just making."""
+
+_Found = TypeVar("_Found")
+_Content = Callable[[], Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Record:
+    """What the folder of a document holds.
+
+    Attributes
+    ----------
+    folder : Path
+    path : Path or None
+        The file that the document belongs to; None if it never had one.
+    when : datetime
+        Local time of writing.
+    content : dict
+        The work, as `Autosaver.keep` was given it; without it where everything was saved.
+    """
+
+    folder: Path
+    path: Path | None
+    when: datetime
+    content: Mapping[str, Any]
+
+
+class Autosaver:
+    """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk.
+
+    Parameters
+    ----------
+    folder : Path or None
+        `autosave_folder()`; None keeps nothing.
+    kind : str
+        The format that its records name, such as ``robocov-draft``.
+    path : Path or None
+        The document's file.
+    resumed : Path or None
+        The folder of a record whose work goes on; OutputError when another program has taken it over.
+    """
+
+    def __init__(
+        self, folder: Path | None, kind: str, path: Path | None = None, resumed: Path | None = None
+    ) -> None:
+        self.trouble = ""
+        """Why work cannot be kept, in words; empty if it can."""
+        self._kind, self._path = kind, path
+        self._lock = ExitStack()
+        self._changed = threading.Condition()
+        self._wanted: tuple[Path | None, _Content | None] | None = None
+        self._writing = self._closed = self._hurried = False
+        self._holds = resumed is not None
+        if resumed is not None:
+            self._lock.enter_context(locked(resumed))
+        self._place = resumed if resumed is not None or folder is None else self._new_place(folder)
+        if self._place is None:
+            return
+        self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
+        self._thread.start()
+        if resumed is None:
+            self._want(None)  # so that other programs know of the file
+
+    def keep(self, content: _Content) -> None:
+        """Keep work that is not saved; only the newest counts, and it is asked for in the thread."""
+        self._want(content)
+
+    def settle(self, path: Path | None) -> None:
+        """Forget what was kept: the document was saved, or opened anew."""
+        self._path = path
+        self._want(None)
+
+    def flush(self, timeout: float = 5.0) -> bool:
+        """Wait until everything is on the disk; return whether it is."""
+        with self._changed:
+            self._hurried = True
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: not (self._writing or (self._wanted and self._hurried)), timeout)
+            return self._wanted is None and not self._writing and not self.trouble
+
+    def close(self, *, discard: bool) -> None:
+        """End; discard what was kept, as when nobody wants to save it, or leave it for the next start."""
+        if self._place is None:
+            return
+        with self._changed:
+            self._closed = True
+            if discard:
+                self._wanted = None
+            self._changed.notify_all()
+        self._thread.join()
+        if discard or not self._holds:
+            with suppress(OSError):
+                (self._place / _FILE).unlink()
+            # where files that are open cannot be removed, the lock goes first
+            self._lock.close()
+            shutil.rmtree(self._place, ignore_errors=True)
+        self._lock.close()
+        self._place = None
+
+    def _new_place(self, folder: Path) -> Path | None:
+        for _ in range(_TRIES):
+            try:
+                folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+                place = folder / f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(4)}"
+                place.mkdir(mode=0o700)
+                self._lock.enter_context(locked(place))
+            except (OSError, OutputError) as error:
+                # perhaps another program looks for what was left behind in just this moment
+                self.trouble = f"work is not kept aside: {error}"
+            else:
+                self.trouble = ""
+                return place
+        return None
+
+    def _want(self, content: _Content | None) -> None:
+        with self._changed:
+            if self._place is not None and not self._closed:
+                self._wanted = self._path, content
+                self._changed.notify_all()
+
+    def _work(self) -> None:
+        """Write what is wanted, the newest only, with pauses in which others can work."""
+        pause = 0.0
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._hurried, pause)
+                self._changed.wait_for(lambda: self._closed or self._wanted)
+                job, self._wanted = self._wanted, None
+                if job is None:
+                    return
+                self._writing, self._hurried = True, False
+            began = time.perf_counter()
+            trouble = self._written(*job)
+            pause = max(_PAUSE, _SHARE * (time.perf_counter() - began))
+            with self._changed:
+                self._writing, self.trouble = False, trouble
+                if trouble and self._wanted is None and not self._closed:
+                    self._wanted, pause = job, _PATIENCE  # perhaps there is room later
+                self._changed.notify_all()
+
+    def _written(self, path: Path | None, content: _Content | None) -> str:
+        assert self._place is not None
+        try:
+            record = {
+                "format": self._kind,
+                "version": 1,
+                "path": None if path is None else str(path.absolute()),
+                "when": datetime.now().astimezone().isoformat(timespec="seconds"),
+                **(content() if content is not None else {}),
+            }
+            with written(self._place / _FILE) as part:
+                part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
+        except (OSError, OutputError) as error:
+            return f"work is not kept aside: {error}"
+        self._holds = content is not None
+        return ""
+
+
+def autosave_folder() -> Path | None:
+    """Return where work is kept; None where it is not to be."""
+    named = os.environ.get(FOLDER)
+    if named is not None:
+        return Path(named) if named else None
+    from platformdirs import user_state_path
+
+    return user_state_path("robocov", appauthor=False) / "drafts"
+
+
+def recoverable(
+    folder: Path | None, kind: str, read: Callable[[Record], _Found | None]
+) -> tuple[_Found, ...]:
+    """Return the work that programs left behind which live no more, the newest first.
+
+    `read` returns what a record stands for, None where nothing would be lost without it, and raises MapError
+    where it cannot be read. Folders without work are removed; what cannot be read stays, and is not offered.
+    """
+    found = []
+    for place in _places(folder):
+        try:
+            with locked(place):
+                record = read_record(place, kind) if (place / _FILE).exists() else None
+                work = None if record is None else read(record)
+        except (OutputError, MapError, OSError):  # in use, or not to be read
+            continue
+        if record is not None and work is not None:
+            found.append((record.when, work))
+        elif _age(place) > _YOUNG:
+            shutil.rmtree(place, ignore_errors=True)
+    return tuple(work for _, work in sorted(found, key=lambda pair: pair[0], reverse=True))
+
+
+def discard(folder: Path) -> None:
+    """Remove the folder of a record for good."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
+    """Return whether a living program has this file open; to be asked before making one's own `Autosaver`."""
+    wanted = path.resolve()
+    for place in _places(folder):
+        with suppress(MapError, OSError):
+            named = read_record(place, kind).path
+            if named is None or named.resolve() != wanted:
+                continue
+            try:
+                with locked(place):
+                    pass
+            except OutputError:
+                return True
+    return False
+
+
+def read_record(folder: Path, kind: str) -> Record:
+    """Return what a folder holds; MapError when that is no such record."""
+    file = folder / _FILE
+    held = parse(read_bytes(file), str(file))
+    if not isinstance(held, dict) or held.get("format") != kind or held.get("version") != 1:
+        raise MapError(f"{file}: is no {kind}")
+    content = {name: held[name] for name in held if name not in ("format", "version", "path", "when")}
+    try:
+        path = None if held["path"] is None else Path(held["path"])
+        return Record(folder, path, datetime.fromisoformat(held["when"]).astimezone(), content)
+    except (TypeError, ValueError, KeyError) as error:
+        raise MapError(f"{file}: is no whole {kind}: {error}") from None
+
+
+def _places(folder: Path | None) -> list[Path]:
+    if folder is None:
+        return []
+    with suppress(OSError):
+        return sorted(place for place in folder.iterdir() if place.is_dir())
+    return []
+
+
+def _age(place: Path) -> float:
+    """Return how many seconds ago a folder was changed last; 0 where it is gone."""
+    with suppress(OSError):
+        return time.time() - place.stat().st_mtime
+    return 0.0

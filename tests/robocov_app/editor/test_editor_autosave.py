@@ -1,0 +1,79 @@
+"""Maps that are kept aside, and what is offered of them after a crash."""
+
+import json
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+from drawn_sketches import HALL
+
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError
+from robocov_app.editor.model.autosave import KIND, Autosave, content, recoverable
+from robocov_app.editor.model.file import saved, state_of
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.toolkit.autosave import Autosaver, discard
+
+SKETCH = Sketch("Hall", boundary=HALL)
+
+
+def with_circles(count: int) -> Sketch:
+    return SKETCH.added([CircleObstacle((k + 1.0, 1.0), 0.3) for k in range(count)])[0]
+
+
+def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
+    keeper = Autosaver(folder, KIND, path)
+    keeper.keep(lambda: content(sketch, disk))
+    keeper.close(discard=False)
+
+
+def test_a_map_comes_back_with_its_file(tmp_path):
+    path = tmp_path / "hall.json"
+    disk = saved(SKETCH, path)
+    kept(tmp_path / "drafts", with_circles(5), path, disk)
+    (found,) = recoverable(tmp_path / "drafts")
+    assert (found.path, found.name, found.obstacles, found.disk) == (path, "Hall", 5, disk)
+    assert found.sketch() == with_circles(5)
+    assert found.words().startswith("“Hall”, 5 obstacles, today ")
+    assert found.words().endswith("not saved to hall.json")
+    assert state_of(found.disk) == "same"
+
+
+def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
+    path = tmp_path / "hall.json"
+    disk = saved(with_circles(3), path)
+    kept(tmp_path / "drafts", with_circles(3), path, disk)
+    assert recoverable(tmp_path / "drafts") == ()
+    saved(with_circles(4), path, disk)
+    assert len(recoverable(tmp_path / "drafts")) == 1
+
+
+def test_one_that_vanishes_meanwhile_is_said(tmp_path):
+    kept(tmp_path, SKETCH)
+    (found,) = recoverable(tmp_path)
+    assert found.words().endswith("never saved")
+    discard(found.folder)
+    with pytest.raises(MapError, match="no such file"):
+        found.sketch()
+
+
+def test_what_is_no_map_or_has_a_strange_file_is_left_alone(tmp_path):
+    kept(tmp_path, SKETCH)
+    (file,) = tmp_path.glob("*/draft.json")
+    held = json.loads(file.read_text())
+    for wrong in ({"sketch": []}, {"path": "x", "disk": 1}, {"path": "x", "disk": {"stamp": [1]}}):
+        file.write_text(json.dumps(held | wrong))
+        assert recoverable(tmp_path) == ()
+    file.write_text(json.dumps(held))
+    assert len(recoverable(tmp_path)) == 1
+
+
+def test_words_for_days():
+    now = datetime(2030, 5, 17, 12, 0).astimezone()
+    for when, words in [
+        (now - timedelta(hours=2), "today 10:00"),
+        (now - timedelta(hours=20), "yesterday 16:00"),
+        (now - timedelta(days=9), "2030-05-08 12:00"),
+    ]:
+        found = Autosave(Path("x"), Path("/maps/hall.json"), "Hall", when, 1, None)
+        assert found.words(now) == f"“Hall”, 1 obstacle, {words}, not saved to hall.json"
