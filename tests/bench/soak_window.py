@@ -15,7 +15,7 @@ import numpy as np
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
 from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.scenario import Law, Scenario
@@ -39,7 +39,7 @@ def main(minutes: int, robots: int) -> None:
     layers = {layer.name for layer in standard_layers() if layer.default}
     with tempfile.TemporaryDirectory() as folder, display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
-        desk = Desk(session, DirectCosts(16), layers, Path(folder), "rooms")
+        desk = Desk(session, Costs(16, direct=True), layers, Path(folder), "rooms")
         window = Window(desk, (1280, 720), 1.0)
         warm = resident()
         for minute in range(1, minutes + 1):

@@ -13,7 +13,7 @@ from touched_run import HALL, RAPF, begun
 
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
@@ -57,7 +57,7 @@ def opened(
     with display(headless=True):
         session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
         usual = {layer.name for layer in standard_layers() if layer.default}
-        desk = Desk(session, DirectCosts(lattice), usual if shown is None else shown, folder, map_name)
+        desk = Desk(session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name)
         driver = Driver(Window(desk, size, scale, patient=True))
         driver.settle()
         driver.settle()  # now it knows how high the legend is

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.pane import with_failed
 from robocov_app.viewer.session.scenario import Law, Scenario
@@ -84,7 +84,7 @@ def with_pillar(environment=HALL, pillar=PILLAR) -> Environment:
 
 def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Desk:
     """Return a desk in the hall, paused at its beginning."""
-    return Desk(begun(*laws, **changes), DirectCosts(8), {"cells", "robots"}, folder, "hall")
+    return Desk(begun(*laws, **changes), Costs(8, direct=True), {"cells", "robots"}, folder, "hall")
 
 
 def positions_of(session) -> list[np.ndarray]:

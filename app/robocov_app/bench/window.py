@@ -13,7 +13,7 @@ import pygame
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row
 from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.costs import LATTICE, WorkerCosts
+from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.screen import undisturbed
@@ -47,7 +47,7 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
     session = Session(Scenario(load_map("rooms"), (Law("rapf"),), n, start, limits=limits))
     with display(headless=True):
         shown = {layer.name for layer in standard_layers() if layer.default}
-        desk = Desk(session, WorkerCosts(LATTICE), shown, Path(), "rooms")
+        desk = Desk(session, Costs(LATTICE), shown, Path(), "rooms")
         window = Window(desk, SIZE, 1.0)
         try:
             with undisturbed():

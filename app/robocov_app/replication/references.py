@@ -16,10 +16,12 @@ from robocov.errors import OutputError
 from robocov.files.atomic import written
 from robocov.mapfile import to_json
 from robocov_app.terminal.progress import progress
+from robocov_app.toolkit import worker
 
 if TYPE_CHECKING:
     from robocov_app.sweep.study import StudyMap
     from robocov_app.terminal.interruption import Interruption
+    from robocov_app.toolkit.worker import Line
 
 _FORMAT = "robocov-reference 1"
 """Another one whenever the search gives other results."""
@@ -87,6 +89,16 @@ def answered(question: Question) -> Reference:
     )
     positions = tuple((float(x), float(y)) for x, y in best.positions.tolist())
     return Reference(float(best.mean_distance), positions, float(best.agreement()))
+
+
+class Searching:
+    """Searches for references in a process of its own."""
+
+    failing = "the search failed"
+
+    def __call__(self, questions: list[Question], line: Line) -> Reference:
+        """Search for one."""
+        return answered(questions[-1])
 
 
 def references(
@@ -210,11 +222,7 @@ def _work(
     ended: threading.Event,
 ) -> None:
     """Have a process answer one question after the other, until none is left or nobody wants to know."""
-    from robocov_app.live.messages import receive, send
-    from robocov_app.live.own_process import started
-
-    process = started("robocov_app.replication.reference_worker")
-    assert process.stdin and process.stdout
+    process = worker.started("robocov_app.replication.references:Searching")
 
     def watch() -> None:
         ended.wait()
@@ -225,19 +233,19 @@ def _work(
     try:
         while not ended.is_set():
             name, question = waiting.get_nowait()
-            with suppress(OSError):
-                send(process.stdin, question)
-            answer = receive(process.stdout)
-            if answer is None:
-                answer = OutputError(f"references: the process that searched for that of {name} has ended")
-            answers.put((name, answer))
-            if not isinstance(answer, Reference):
-                break
+            reply = worker.asked(process, question)
+            if reply is not None and isinstance(reply.answer, Reference):
+                answers.put((name, reply.answer))
+                continue
+            words = (
+                f"references: the process that searched for that of {name} has ended"
+                if reply is None
+                else f"reference of map {question.document.get('name')!r}: {reply.trouble}"
+            )
+            answers.put((name, OutputError(words)))
+            break
     except queue.Empty:
         pass
     finally:
-        for stream in (process.stdin, process.stdout):
-            with suppress(OSError):
-                stream.close()
         process.kill()
-        process.wait()
+        worker.ended(process)

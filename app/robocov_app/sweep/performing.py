@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from robocov.metrics import CostHistory
     from robocov.record import Record
     from robocov_app.sweep.task import Task
+    from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4
 """Maps whose costs a worker keeps; tasks come map by map."""
@@ -90,6 +91,16 @@ def perform(task: Task) -> Outcome:
     """Do a run; what goes wrong in it is a part of the outcome."""
     with _undisturbed():
         return _caught(task)
+
+
+class Performing:
+    """Does the tasks of a `LocalPool` in a process of its own."""
+
+    failing = "the run failed"
+
+    def __call__(self, questions: list[Task], line: Line) -> Outcome:
+        """Do a run."""
+        return perform(questions[-1])
 
 
 def _caught(task: Task) -> Outcome:

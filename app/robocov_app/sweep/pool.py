@@ -8,15 +8,12 @@ import signal
 import subprocess
 import tempfile
 import threading
-from contextlib import suppress
-from typing import IO, TYPE_CHECKING, Any, TypeAlias
+from typing import IO, TYPE_CHECKING, TypeAlias
 
 from robocov.errors import OutputError
-from robocov_app.live.messages import receive, send
-from robocov_app.live.own_process import started
 from robocov_app.sweep.crew import Crew, Lost, Returned
 from robocov_app.sweep.performing import Outcome
-from robocov_app.sweep.worker import READY
+from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
 if TYPE_CHECKING:
     from robocov_app.sweep.task import Task
@@ -111,18 +108,13 @@ class _Hand:
     def _done(self, task: Task) -> Outcome | Lost:
         if self._process is None or self._process.poll() is not None:
             self._begin()
-        answer: Outcome | None = self._asked(task)
-        if answer is not None:
-            return answer
+        assert self._process is not None and self._complaints is not None
+        self._complaints.truncate(0)  # what it says of this task, and does not grow for ever
+        reply = asked(self._process, task)
+        if reply is not None and isinstance(reply.answer, Outcome):
+            return reply.answer
         status, said = self._end()
         return Lost(f"its process ended ({_cause(status)})", said, blamed=status != _OUTSIDE)
-
-    def _asked(self, task: Task) -> Any:
-        """Return what the process answers, None where it ends."""
-        assert self._process is not None and self._process.stdin and self._process.stdout
-        with suppress(OSError):
-            send(self._process.stdin, task)
-        return receive(self._process.stdout)
 
     def _begin(self) -> None:
         """Start a process, and wait until it is there."""
@@ -133,7 +125,7 @@ class _Hand:
             with self._starting:
                 if self._stopped:
                     break
-                self._process = started("robocov_app.sweep.worker", stderr=self._complaints)
+                self._process = started("robocov_app.sweep.performing:Performing", stderr=self._complaints)
             assert self._process.stdout
             if receive(self._process.stdout) == READY:
                 return
@@ -144,11 +136,7 @@ class _Hand:
         """Make sure that the process has ended; return its status and its last words."""
         status, said = 0, b""
         if self._process is not None:
-            for stream in (self._process.stdin, self._process.stdout):
-                assert stream is not None
-                with suppress(OSError):
-                    stream.close()
-            status = self._process.wait()
+            status = ended(self._process)
             self._process = None
         if self._complaints is not None:
             self._complaints.seek(0)

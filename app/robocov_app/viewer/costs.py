@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.cost import CoverageCost, MomentaryCost
-from robocov.errors import RobocovError
-from robocov_app.live.cost_worker import CostWorker
-from robocov_app.live.evaluation import evaluated
-from robocov_app.live.messages import Answer, Building, Failed, Question, Ready
+from robocov.arrays import Array
+from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
+from robocov.environment import Environment
+from robocov.errors import InputError, RobocovError
 from robocov_app.render.field import Field, FieldLattice
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.arrays import Array
-    from robocov.cost import CoverageResult, Sites
-    from robocov.environment import Environment
+from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 LATTICE = 128
 """Sites along a side."""
 
-_PANES = 1 << 20
-"""More than there will ever be."""
+_PAUSE = 0.05
+"""Seconds between two words on how far a map is."""
 
-_PATIENCE = 0.5
-"""Seconds after which an answer is not waited for any more."""
+_INDICES = ("owner", "corner", "last_corner")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +35,7 @@ class Known:
         For which moment.
     result : CoverageResult
     path : (w, 2) m or None
-        From the cursor to its nearest robot.
+        From the cursor to its nearest robot: way-points, both ends included; empty where none can come.
     lattice : callable
         Returns the sites as a field wants them.
     travel_time : float, s, or None
@@ -63,12 +54,14 @@ class Known:
         return Field(self.lattice(), self.result)
 
 
-class Costs(ABC):
-    """Where the window has its costs from.
+class Costs:
+    """Costs for a window, computed in another process, or in this one where pictures must not depend on speed.
 
     Parameters
     ----------
     lattice : int
+    direct : bool
+        Whether in this process.
 
     Attributes
     ----------
@@ -78,19 +71,33 @@ class Costs(ABC):
         What is to be said about a map that is not ready yet, or why there is no cost; else empty.
     """
 
-    def __init__(self, lattice: int = LATTICE) -> None:
+    def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
         self.known: dict[int, Known] = {}
         self.state = ""
         self._lattice = lattice
-        self._waiting: dict[int, Question] = {}
+        self._worker: Worker[Known | _Sites] = (
+            DirectWorker(CostService(), _CostWire())
+            if direct
+            else LatestWorker("robocov_app.viewer.costs:CostService", "computes the cost", _CostWire)
+        )
+        self._map: CostQuestion | None = None
+        self._number = 0
+        self._ready = False
+        self._waiting: dict[int, CostQuestion] = {}
+        self._asked: CostQuestion | None = None
+        self._pane: int | None = None
 
-    @abstractmethod
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
+        self._number += 1
+        self._map = CostQuestion(self._number, environment, self._lattice)
+        self.known, self._waiting = {}, {}
+        self._prepare()
+        self.poll()
 
     def forget(self) -> None:
         """Leave out what has been asked and is not yet answered: it was of another run."""
-        self._waiting, self.known = {}, {}
+        self._waiting, self.known, self._pane = {}, {}, None
 
     def ask(
         self,
@@ -106,129 +113,206 @@ class Costs(ABC):
         about the pane before and is not yet on its way is forgotten.
         """
         # it keeps its place among the panes that wait, so that each has its turn
-        self._waiting[pane] = Question(time, np.array(positions), pane, point, speeds)
+        if self._map is not None:
+            self._waiting[pane] = replace(
+                self._map, time=time, positions=np.array(positions), point=point, speeds=speeds
+            )
 
-    @abstractmethod
     def poll(self) -> list[tuple[int, Known]]:
         """Return what has been answered since the last call, by pane."""
+        answers = []
+        while self._asked is not None or self._ask_next():
+            answer = self._worker.poll()
+            if self._worker.busy:
+                if self._worker.progress is not None:
+                    fraction, seconds = self._worker.progress
+                    left = f", {seconds:.0f} s left" if seconds >= 1.0 else ""
+                    self.state = f"cost: preparing the map, {fraction:.0%}{left}"
+                break
+            asked, self._asked = self._asked, None
+            if answer is None and asked is self._map:
+                self.state = f"no cost: {self._worker.trouble}"
+            elif answer is None:
+                if not self._worker.lives:
+                    self._prepare()  # it is started again; not if it dies of that too
+            elif asked is self._map:
+                self._ready, self.state = True, ""
+            elif self._pane is not None and isinstance(answer, Known):
+                self.known[self._pane] = answer
+                answers.append((self._pane, answer))
+        return answers
 
     def close(self) -> None:
         """End what works for it."""
         self.forget()
-
-
-class DirectCosts(Costs):
-    """Computes in this process: for pictures that must not depend on the machine's speed."""
-
-    def __init__(self, lattice: int = LATTICE) -> None:
-        super().__init__(lattice)
-        self._cost: CoverageCost | None = None
-        self._momentary: MomentaryCost | None = None
-        self._lattices: tuple[CoverageCost, Callable[[], FieldLattice]] | None = None
-
-    def environment(self, environment: Environment) -> None:
-        before = self._cost
-        self.known, self.state, self._waiting = {}, "", {}
-        self._cost = self._momentary = None
-        if before is not None and before.environment.same_place(environment):
-            self._cost = before.with_density(environment)
-        else:
-            try:
-                self._cost = CoverageCost(environment, self._lattice)
-            except RobocovError as error:
-                self.state = f"no cost: {error}"
-                return
-        self._momentary = MomentaryCost(self._cost)
-
-    def poll(self) -> list[tuple[int, Known]]:
-        asked, self._waiting = self._waiting, {}
-        answers = []
-        for pane, question in asked.items():
-            if self._momentary is None:
-                continue
-            try:
-                found = evaluated(self._momentary, question)
-            except RobocovError:
-                continue
-            self.known[pane] = Known(
-                question.time, found.result, found.path, self._lattice_of(found.cost), found.travel_time
-            )
-            answers.append((pane, self.known[pane]))
-        return answers
-
-    def _lattice_of(self, cost: CoverageCost) -> Callable[[], FieldLattice]:
-        if self._lattices is None or self._lattices[0] is not cost:
-            self._lattices = cost, lattice_of(cost.sites)
-        return self._lattices[1]
-
-
-class WorkerCosts(Costs):
-    """Has it computed by another process, which is asked about one pane after the other."""
-
-    def __init__(self, lattice: int = LATTICE) -> None:
-        super().__init__(lattice)
-        self._worker = CostWorker()
-        self._generation = -1
-        self._out = -1.0
-        self._ready = False
-        self._run = 0
-        self._sites: Callable[[], FieldLattice] | None = None
-
-    def environment(self, environment: Environment) -> None:
-        self.known, self._waiting, self._ready, self._out = {}, {}, False, -1.0
-        self._generation = self._worker.environment(environment, self._lattice)
-        self.state = "cost: preparing the map"
-
-    def forget(self) -> None:
-        super().forget()
-        self._run += 1  # answers that are on their way are passed over
-
-    def ask(self, *args: Any, **kwargs: Any) -> None:
-        super().ask(*args, **kwargs)
-        self._send()
-
-    def poll(self) -> list[tuple[int, Known]]:
-        answers = []
-        for event in self._worker.poll():
-            if event.generation != self._generation:
-                continue
-            if isinstance(event, Building):
-                # also once more, after the other process had ended
-                self._ready = False
-                left = f", {event.seconds_left:.0f} s left" if event.seconds_left >= 1.0 else ""
-                self.state = f"cost: preparing the map, {event.fraction:.0%}{left}"
-            elif isinstance(event, Ready):
-                self._ready, self.state = True, ""
-                self._sites = lattice_of(event.sites)
-            elif isinstance(event, Answer) and self._sites is not None:
-                self._out = -1.0
-                run, pane = divmod(event.topic, _PANES)
-                if run == self._run:
-                    self.known[pane] = Known(
-                        event.time, event.result, event.path, self._sites, event.travel_time
-                    )
-                    answers.append((pane, self.known[pane]))
-            elif isinstance(event, Failed):
-                self._out = -1.0
-                if not self._ready:
-                    self.state = f"no cost: {event.message}"
-        self._send()
-        return answers
-
-    def close(self) -> None:
         self._worker.close()
 
-    def _send(self) -> None:
-        now = perf_counter()
-        if not self._waiting or not self._ready or 0.0 <= now - self._out < _PATIENCE:
-            return
-        pane = next(iter(self._waiting))
-        question = self._waiting.pop(pane)
-        topic = self._run * _PANES + pane
-        self._worker.ask(question.time, question.positions, topic, question.point, question.speeds)
-        self._out = now
+    def _prepare(self) -> None:
+        self._ready, self.state = False, "cost: preparing the map"
+        self._asked, self._pane = self._map, None
+        self._worker.put(self._map)
+
+    def _ask_next(self) -> bool:
+        if not self._waiting or not self._ready:
+            return False
+        self._pane = next(iter(self._waiting))
+        self._asked = self._waiting.pop(self._pane)
+        self._worker.put(self._asked)
+        return True
 
 
-def lattice_of(sites: Sites) -> Callable[[], FieldLattice]:
-    """Return what makes the sites what a field wants, once, when it is asked for first."""
-    return cache(lambda: FieldLattice(sites))
+@dataclass(frozen=True, eq=False)
+class CostQuestion:
+    """What is the cost of positions on a map? Without positions: prepare the map.
+
+    Attributes
+    ----------
+    number : int
+        Of the map.
+    environment : Environment or None
+        None where the process knows it.
+    """
+
+    number: int
+    environment: Environment | None
+    lattice: int
+    time: float = 0.0
+    positions: Array | None = None
+    point: Array | None = None
+    speeds: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Sites:
+    """What is the same in all results on a map."""
+
+    sites: Sites
+    corners: Array
+    weights: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """Answer on its way: sites only where they are others than before."""
+
+    sites: _Sites | None
+    time: float = 0.0
+    result: CoverageResult | None = None
+    path: Array | None = None
+    travel_time: float | None = None
+
+
+class _CostWire(Wire):
+    """Says each map once, and puts together what is said once of the results."""
+
+    def __init__(self) -> None:
+        self._told = -1
+        self._sites: _Sites | None = None
+        self._lattice: Callable[[], FieldLattice] | None = None
+
+    def encode(self, question: CostQuestion) -> CostQuestion:
+        if question.number == self._told or question.environment is None:
+            return replace(question, environment=None)
+        self._told = question.number
+        # without what has been derived already: that is quickly done again, and long to send
+        return replace(question, environment=replace(question.environment))
+
+    def decode(self, answer: _Answer) -> Known | _Sites:
+        if answer.sites is not None:
+            self._sites, sites = answer.sites, answer.sites.sites
+            self._lattice = cache(lambda: FieldLattice(sites))
+        assert self._sites is not None and self._lattice is not None
+        if answer.result is None:
+            return self._sites
+        result = replace(
+            answer.result,
+            **{name: getattr(answer.result, name).astype(np.intp) for name in _INDICES},
+            points=self._sites.sites.points,
+            corners=self._sites.corners,
+            weights=self._sites.weights,
+        )
+        return Known(answer.time, result, answer.path, self._lattice, answer.travel_time)
+
+
+class _NewerError(RobocovError):
+    """There is a newer map."""
+
+
+class CostService:
+    """Prepares the newest map, and answers the newest question about it."""
+
+    failing = "the cost could not be computed"
+
+    def __init__(self) -> None:
+        self._cost: CoverageCost | None = None
+        self._momentary: MomentaryCost | None = None
+        self._told: CoverageCost | None = None
+
+    def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
+        """Answer the last question."""
+        maps = [question for question in questions if question.environment is not None]
+        if maps:
+            self._prepare(maps[-1], line)
+        cost, momentary, question = self._cost, self._momentary, questions[-1]
+        if cost is None or momentary is None:
+            raise InputError("the map has no cost")
+        if question.positions is None:
+            return _Answer(self._sites_of(cost))
+        return self._evaluated(momentary, question, question.positions)
+
+    def _evaluated(self, momentary: MomentaryCost, question: CostQuestion, positions: Array) -> _Answer:
+        now = question.time
+        result = momentary.of_all(now, positions)
+        if result is None:
+            raise InputError("positions: none is free, but at least one robot was wanted")
+        cost, path, travel_time = momentary.at(now), None, None
+        if question.speeds is not None:
+            first = momentary(now, positions, speeds=question.speeds)
+            travel_time = None if first is None else first.mean_time
+        if question.point is not None:
+            try:
+                path = cost.path(positions[momentary.counted(now, positions)], question.point)
+            except RobocovError:
+                path = None  # the point is not free
+        # half as long on the way
+        indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
+        nothing = np.empty((0, 2))
+        result = replace(
+            result, **indices, points=nothing, corners=nothing, weights=None, environment=None, sites=None
+        )
+        return _Answer(self._sites_of(cost), now, result, path, travel_time)
+
+    def _sites_of(self, cost: CoverageCost) -> _Sites | None:
+        """Return the sites of a cost, None if they are those told last."""
+        if cost is self._told:
+            return None
+        self._told = cost
+        return _Sites(cost.sites, cost.corners, cost.weights)
+
+    def _prepare(self, asked: CostQuestion, line: Line) -> None:
+        environment, before, began = asked.environment, self._cost, time.perf_counter()
+        assert environment is not None
+        said = began
+
+        def give_up(done: float) -> None:
+            if any(question.environment is not None for question in line.newer()):
+                raise _NewerError("there is a newer map")
+
+        def tell(done: float) -> None:
+            nonlocal said
+            give_up(done)
+            now = time.perf_counter()
+            if now - said > _PAUSE and done > 0.0:
+                said = now
+                line.tell((done, (now - began) * (1.0 - done) / done))
+
+        self._momentary = None
+        if (
+            before is not None
+            and before.lattice == asked.lattice
+            and before.environment.same_place(environment)
+        ):
+            self._cost = before.with_density(environment)
+        else:
+            self._cost = CoverageCost(environment, asked.lattice, progress=tell)
+        self._momentary = MomentaryCost(self._cost, progress=give_up)

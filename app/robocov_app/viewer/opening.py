@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
 from robocov_app.viewer.actions import KEY_REPEAT
-from robocov_app.viewer.costs import LATTICE, DirectCosts, WorkerCosts
+from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.settings import Settings, load_settings, save_settings, settings_file
 
@@ -156,7 +156,7 @@ class Opening:
             size = fitting(size)
         if self.headless:
             self.session.clock.budget = float("inf")
-        costs: Costs = DirectCosts(self.lattice) if self.headless else WorkerCosts(self.lattice)
+        costs: Costs = Costs(self.lattice, direct=True) if self.headless else Costs(self.lattice)
         try:
             desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
             desk.theme = self.theme or settings.theme

@@ -11,13 +11,13 @@ import pygame
 import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
+from robocov_app.live.latest import DirectWorker, LatestWorker
 
 from robocov_app.editor.edits.properties import titled
 from robocov_app.editor.ui import import_process
 from robocov_app.editor.ui.asking import Question
 from robocov_app.editor.ui.importing import ImportQuestion, options_of
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping
-from robocov_app.live.latest import DirectWorker, LatestWorker
 
 PATIENCE = 60.0
 

@@ -9,6 +9,7 @@ import pytest
 from drawn_sketches import HALL, changes, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov_app.live.latest import Service
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import properties, transform
@@ -17,7 +18,6 @@ from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.measurement_worker import MeasurementWorker, Question
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.live.latest import Service
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn_run import ROOMS
+from robocov_app.live.cost_worker import CostWorker
+from robocov_app.live.messages import Answer, Building, Failed, Ready, receive, send
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle
 from robocov_app.live import talk
-from robocov_app.live.cost_worker import CostWorker
-from robocov_app.live.messages import Answer, Building, Failed, Ready, receive, send
 from robocov_app.render.field import Field, FieldLattice
 
 PLACES = np.array([[2.0, 2.0], [12.0, 7.0], [10.0, 1.0]])

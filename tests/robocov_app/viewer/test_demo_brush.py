@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from driven_window import opened
+from robocov_app.live.cost_worker import CostWorker
+from robocov_app.live.messages import Answer
 from touched_run import HALL, LLOYD, RAPF, all_told, begun, stepped
 
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
-from robocov_app.live.cost_worker import CostWorker
-from robocov_app.live.messages import Answer
 from robocov_app.render.phi import density_range
 from robocov_app.viewer.brush import CELLS, LEAST, MOST, Brush, painted_raster
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 
 REACH = 0.1
 
@@ -216,7 +216,7 @@ def test_the_process_for_the_cost_weighs_anew_what_it_has():
 
 def test_at_once_it_is_weighed_anew_too():
     peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
-    places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), DirectCosts(24)
+    places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), Costs(24, direct=True)
     found = []
     for environment in (HALL, HALL.with_density(peak), HALL):
         costs.environment(environment)

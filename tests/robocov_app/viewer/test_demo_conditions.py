@@ -19,7 +19,7 @@ from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import LIGHT
 from robocov_app.runs.saved import load_saved
-from robocov_app.viewer.costs import DirectCosts, WorkerCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.pane import Wanted
 from robocov_app.viewer.session.replayed import replayed_session
 from robocov_app.viewer.session.scenario import MOST_THAT_TALK, Law, Limits, Scenario
@@ -179,7 +179,7 @@ def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None
 
 
 def test_where_obstacles_move_the_cost_is_told_as_elsewhere() -> None:
-    for costs in (DirectCosts(8), WorkerCosts(8)):
+    for costs in (Costs(8, direct=True), Costs(8)):
         costs.environment(HALL)
         costs.ask(0, 0.0, STARTS)
         end = time.monotonic() + 60.0

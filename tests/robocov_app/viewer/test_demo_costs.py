@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robocov_app.live.messages import Answer, Building, Failed, Ready
 from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
-from robocov_app.live.messages import Answer, Building, Failed, Ready
 from robocov_app.render.field import Field
 from robocov_app.viewer import costs as module
-from robocov_app.viewer.costs import DirectCosts, WorkerCosts
+from robocov_app.viewer.costs import Costs
 
 PLACES = np.array([[1.0, 1.0], [5.0, 3.0]])
 OTHERS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
@@ -44,7 +44,7 @@ def answered(costs, wanted=1) -> dict[int, module.Known]:
 
 @pytest.fixture
 def worker_costs():
-    costs = WorkerCosts(32)
+    costs = Costs(32)
     yield costs
     costs.close()
 
@@ -86,7 +86,7 @@ def stubbed(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(module, "CostWorker", StubWorker)
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
-    costs = WorkerCosts(16)
+    costs = Costs(16)
     return costs, costs._worker, now
 
 
@@ -94,7 +94,7 @@ def stubbed(monkeypatch):
 
 
 def test_answers_are_those_of_the_cost():
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(HALL)
     costs.ask(0, 1.5, PLACES)
     costs.ask(3, 1.5, OTHERS, np.array([3.5, 0.5]))
@@ -112,7 +112,7 @@ def test_answers_are_those_of_the_cost():
 
 
 def test_only_the_newest_question_of_a_pane_counts():
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(HALL)
     for when in (1.0, 2.0, 3.0):
         costs.ask(0, when, PLACES)
@@ -120,7 +120,7 @@ def test_only_the_newest_question_of_a_pane_counts():
 
 
 def test_positions_are_those_when_it_was_asked():
-    costs, places = DirectCosts(32), PLACES.copy()
+    costs, places = Costs(32, direct=True), PLACES.copy()
     costs.environment(HALL)
     costs.ask(0, 1.0, places)
     places += 0.5
@@ -129,7 +129,7 @@ def test_positions_are_those_when_it_was_asked():
 
 
 def test_what_cannot_be_computed_is_left_out():
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(HALL)
     costs.ask(0, 1.0, INSIDE)
     costs.ask(1, 1.0, PLACES, INSIDE[0])
@@ -138,7 +138,7 @@ def test_what_cannot_be_computed_is_left_out():
 
 
 def test_another_map():
-    costs = DirectCosts(16)
+    costs = Costs(16, direct=True)
     costs.environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.poll()
@@ -149,7 +149,7 @@ def test_another_map():
     assert costs.poll() == []
     costs.ask(0, 2.0, INSIDE)
     assert len(costs.poll()) == 1
-    costs = DirectCosts(1)
+    costs = Costs(1, direct=True)
     costs.environment(FULL)
     costs.ask(0, 1.0, PLACES)
     assert costs.poll() == []
@@ -159,7 +159,7 @@ def test_another_map():
 
 
 def test_what_was_of_another_run_is_forgotten():
-    costs = DirectCosts(16)
+    costs = Costs(16, direct=True)
     costs.environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.poll()
@@ -170,7 +170,7 @@ def test_what_was_of_another_run_is_forgotten():
 
 
 def test_obstacles_that_move_stand_where_they_are_at_the_time():
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(CROSSED)
     assert costs.state == ""
     values = []
@@ -184,7 +184,7 @@ def test_obstacles_that_move_stand_where_they_are_at_the_time():
 
 
 def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(CROSSED)
     over = np.array([[1.0, 2.0], [5.0, 3.0]])
     costs.ask(0, 0.0, over, np.array([5.5, 3.5]))
@@ -200,7 +200,7 @@ def test_a_robot_below_an_obstacle_that_moves_is_nearest_to_nothing():
 
 def test_the_time_until_the_first_robot_comes():
     speeds = np.array([0.2, 1.0])
-    costs = DirectCosts(32)
+    costs = Costs(32, direct=True)
     costs.environment(HALL)
     costs.ask(0, 1.0, PLACES)
     costs.ask(1, 1.0, PLACES, speeds=speeds)
@@ -384,7 +384,7 @@ def test_another_process_knows_where_obstacles_are(worker_costs):
 
 
 def test_a_map_without_a_cost_is_said():
-    costs = WorkerCosts(1)
+    costs = Costs(1)
     try:
         costs.environment(FULL)
         end = time.monotonic() + PATIENCE

@@ -15,7 +15,6 @@ from touched_run import RAPF, RPF, too_deep
 
 from robocov_app.render.picture import standard_layers
 from robocov_app.viewer.actions import all_actions
-from robocov_app.viewer.costs import DirectCosts
 from robocov_app.viewer.session.scenario import MOST_PANES
 from robocov_app.viewer.window import Window
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robocov.mapfile import load_map
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.scenario import Scenario
 from robocov_app.viewer.session.session import Session
@@ -18,7 +18,7 @@ from robocov_app.viewer.status import cursor_words, facts
 @pytest.fixture
 def desk() -> Desk:
     session = Session(Scenario(load_map("rooms")))
-    desk = Desk(session, DirectCosts(32), set(), Path(), "rooms")
+    desk = Desk(session, Costs(32, direct=True), set(), Path(), "rooms")
     desk.costs.ask(0, 0.0, session.lanes[0].simulation.positions)
     desk.costs.poll()
     return desk
@@ -69,7 +69,7 @@ def test_a_closed_room_is_told() -> None:
 
     closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))
     session = Session(Scenario(closed, robots=1, given=np.array([[1.0, 1.0]])))
-    desk = Desk(session, DirectCosts(32), set(), Path(), "two")
+    desk = Desk(session, Costs(32, direct=True), set(), Path(), "two")
     desk.costs.ask(0, 0.0, session.lanes[0].simulation.positions)
     desk.costs.poll()
     desk.cursor = 3.0, 1.0

@@ -13,7 +13,7 @@ from touched_run import RAPF, begun
 from robocov.controllers import controller_kinds
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.render.picture import pane_layers, standard_layers
-from robocov_app.viewer.costs import DirectCosts
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.scenario import MOST_PANES, Limits
 from robocov_app.viewer.tour import _PLAIN, CHAPTERS, Chapter, Tour
@@ -28,7 +28,7 @@ SHORT = tuple(
 
 
 def desk_of(**changes) -> Desk:
-    return Desk(begun(**changes), DirectCosts(4), {"cells", "robots"}, Path(), "hall")
+    return Desk(begun(**changes), Costs(4, direct=True), {"cells", "robots"}, Path(), "hall")
 
 
 @pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda chapter: chapter.title)

@@ -55,27 +55,14 @@ class Pasteboard(Protocol):
         """Return the text that is there, empty if none is."""
 
 
-class Readings(Protocol):
-    """Who measures sketches, as `robocov_app.editor.model.measurement_worker.MeasurementWorker` does."""
-
-    def ask(self, sketch: Sketch, radius: float) -> None:
-        """Ask about a sketch."""
-
-    def poll(self) -> Measurement | None:
-        """Return the newest answer, if there is one."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether an answer is to come."""
-
-
 class Desk:
     """What the user does, and what of it is shown.
 
     Parameters
     ----------
     document : Document
-    readings : Readings
+    readings : Worker of Measurement
+        Asked by (sketch, radius).
     pasteboard : Pasteboard
     folder : Path
         Where things are saved.
@@ -99,7 +86,9 @@ class Desk:
         The one that is shown with its words.
     """
 
-    def __init__(self, document: Document, readings: Readings, pasteboard: Pasteboard, folder: Path) -> None:
+    def __init__(
+        self, document: Document, readings: Worker[Measurement], pasteboard: Pasteboard, folder: Path
+    ) -> None:
         self.document, self.readings, self.pasteboard, self.folder = document, readings, pasteboard, folder
         self.tools = toolbox()
         self.tool: Tool = self.tools["select"]
@@ -237,7 +226,7 @@ class Desk:
         about = self._about
         if about is None or about[0] is not sketch or about[1] != self.radius:
             self._about = sketch, self.radius
-            self.readings.ask(sketch, self.radius)
+            self.readings.put(self._about)
 
     def select(self, selection: Selection) -> None:
         """Select something else."""

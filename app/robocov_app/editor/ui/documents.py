@@ -14,19 +14,16 @@ from robocov_app.editor.model.background import picture_laid
 from robocov_app.editor.model.document import SUFFIX, Document
 from robocov_app.editor.model.file import ChangedError
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui import import_process
 from robocov_app.editor.ui.asking import Answer, FileQuestion, Picker, Question
-from robocov_app.editor.ui.importing import ImportQuestion
+from robocov_app.editor.ui.importing import Imported, Importing, ImportQuestion
 from robocov_app.editor.ui.settings import MOST_RECENT
-from robocov_app.live.latest import DirectWorker, LatestWorker
+from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.ui.desk import Desk
-    from robocov_app.editor.ui.import_process import Imported
-    from robocov_app.editor.ui.importing import Worker
     from robocov_app.importers import Importer
 
 _PATIENCE = 2.0
@@ -172,10 +169,10 @@ class Documents:
 
         self.desk.asked = ImportQuestion(path, importer, self._import_worker(), put)
 
-    def _import_worker(self) -> Worker:
+    def _import_worker(self) -> Worker[Imported]:
         if self._patient:
-            return DirectWorker(import_process.SERVICE)
-        return LatestWorker("robocov_app.editor.ui.import_process", "imports", patience=_PATIENCE)
+            return DirectWorker(Importing())
+        return LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=_PATIENCE)
 
     def recover(self, draft: Autosave) -> None:
         """Go on with work that was left behind.

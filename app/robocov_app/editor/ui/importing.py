@@ -5,10 +5,9 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from robocov.errors import ParameterError, RobocovError, shown
-from robocov_app.editor.ui.import_process import Imported, Wanted
 from robocov_app.importers import ReadOptions, Shaping
 
 if TYPE_CHECKING:
@@ -110,25 +109,43 @@ def _helps(settings: type) -> dict[str, str]:
     }
 
 
-class Worker(Protocol):
-    """Background worker, as `robocov_app.live.latest.LatestWorker`."""
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Request: a file and the options to import it with."""
 
-    def put(self, question: object) -> None:
-        """Import this; nothing that was wanted before."""
+    path: Path
+    format: str
+    options: ReadOptions
+    shaping: Shaping
 
-    def poll(self) -> Imported | None:
-        """Return the newest answer, if there is one."""
 
-    def close(self) -> None:
-        """End."""
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """Answer: the imported map, with its report and what walls changed sides."""
 
-    @property
-    def busy(self) -> bool:
-        """Whether an answer is to come."""
+    environment: Environment
+    report: ImportReport
+    comparison: Comparison
 
-    @property
-    def trouble(self) -> str:
-        """Why the last question has no answer."""
+
+class Importing:
+    """Importer that keeps the file it read last: shaping it anew takes less."""
+
+    failing = "the map could not be imported"
+
+    def __init__(self) -> None:
+        self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
+
+    def __call__(self, questions: list[Wanted], line: Line) -> Imported:
+        """Import what was wanted last."""
+        last = questions[-1]
+        key = last.path, last.format, last.options
+        if self._read is None or self._read[0] != key:
+            self._read = None
+            self._read = key, read_map(last.path, format=last.format, options=last.options)
+        foreign = self._read[1]
+        environment, report = shaped(foreign, last.shaping, one_line(last.path.name))
+        return Imported(environment, report, compare(foreign, environment, report))
 
 
 class ImportQuestion:
@@ -158,7 +175,7 @@ class ImportQuestion:
     """
 
     def __init__(
-        self, path: Path, importer: Importer, worker: Worker, call: Callable[[Imported], object]
+        self, path: Path, importer: Importer, worker: Worker[Imported], call: Callable[[Imported], object]
     ) -> None:
         self.path, self.importer, self.call = path, importer, call
         self.options = options_of(importer)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from robocov.errors import InputError
 from robocov_app.editor.model.autosave import opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
-from robocov_app.editor.model.measurement import measure
-from robocov_app.editor.model.measurement_worker import MeasurementWorker
+from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.ui.asking import Answer, Question
 from robocov_app.editor.ui.desk import Desk
 from robocov_app.editor.ui.documents import heading, lay_under, opened
@@ -25,34 +24,12 @@ if TYPE_CHECKING:
 
     from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.model.measurement import Measurement
-    from robocov_app.editor.model.sketch import Sketch
     from robocov_app.editor.ui.window import EditorWindow
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
     "and map files can be edited by hand: robocov check --watch FILE"
 )
-
-
-class DirectReadings:
-    """Measures at once: for pictures without a display, and for tests."""
-
-    busy = False
-
-    def __init__(self) -> None:
-        self._answer: Measurement | None = None
-
-    def ask(self, sketch: Sketch, radius: float) -> None:
-        """Measure."""
-        self._answer = measure(sketch, radius)
-
-    def poll(self) -> Measurement | None:
-        """Return the answer."""
-        answer, self._answer = self._answer, None
-        return answer
-
-    def close(self) -> None:
-        """There is nothing to end."""
 
 
 class EditorOpening:
@@ -102,7 +79,7 @@ class EditorOpening:
         found = Document.new(drafts) if self.path is None else opened(self.path, drafts)
         document = found if isinstance(found, Document) else Document.new(drafts)
         ended = False
-        readings = DirectReadings() if self.headless else MeasurementWorker()
+        readings = measurement_worker(direct=self.headless)
         try:
             with display(headless=self.headless, otherwise=NO_DISPLAY):
                 file = None if self.headless else settings_file(FILE)
@@ -133,9 +110,7 @@ class EditorOpening:
         finally:
             readings.close()
 
-    def _desk(
-        self, document: Document, readings: DirectReadings | MeasurementWorker, settings: EditorSettings
-    ) -> Desk:
+    def _desk(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Desk:
         pasteboard = OwnPasteboard() if self.headless else SystemPasteboard()
         desk = Desk(document, readings, pasteboard, self.folder)
         desk.theme = self.theme or settings.theme

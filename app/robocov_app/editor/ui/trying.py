@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.costs import LATTICE, DirectCosts, WorkerCosts
+from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.keyboard import key_of
 from robocov_app.viewer.presenter import Desk as DemoDesk
 from robocov_app.viewer.session.scenario import Limits, Scenario
@@ -107,7 +107,7 @@ def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) ->
     session = Session(scenario)
     if patient:
         session.clock.budget = float("inf")
-    costs: Costs = DirectCosts(LATTICE) if patient else WorkerCosts(LATTICE)
+    costs: Costs = Costs(LATTICE, direct=True) if patient else Costs(LATTICE)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
         demo = TrialDesk(session, costs, shown, desk.folder, desk.document.title)

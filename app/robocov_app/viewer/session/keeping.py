@@ -15,10 +15,9 @@ from typing import IO, TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from robocov.errors import OutputError
-from robocov_app.live.messages import receive, send
-from robocov_app.live.own_process import started
 from robocov_app.runs.compare import folder_names
 from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.worker import receive, send, started
 from robocov_app.viewer.session.kept import Job, Kept, Moments, NotKept, Part
 
 if TYPE_CHECKING:

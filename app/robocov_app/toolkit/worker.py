@@ -1,0 +1,426 @@
+"""Work in processes of our own, beside a window that must not wait: only the newest question counts.
+
+A *service* is a class without arguments whose objects answer questions (see `Service`). `LatestWorker` runs one in
+another process, `DirectWorker` in this one. `started` and the messages are for whoever waits for each answer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import faulthandler
+import importlib
+import math
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any, BinaryIO, Generic, Protocol, TypeVar
+
+from robocov.errors import RobocovError
+
+if TYPE_CHECKING:
+    pass
+
+_Answer = TypeVar("_Answer")
+_Covariant = TypeVar("_Covariant", covariant=True)
+
+READY = "ready"
+"""First message of a process: its service is loaded."""
+
+_LENGTH = struct.Struct("<Q")
+_PIPE = 1 << 20
+_SET_DEATH_SIGNAL = 1
+
+
+class Service(Protocol):
+    """Answers questions.
+
+    Attributes
+    ----------
+    failing : str
+        Begins the message about an unforeseen error: ``the map could not be measured``.
+    """
+
+    failing: str
+
+    def __call__(self, questions: list[Any], line: Line) -> object:
+        """Learn from all questions since the last answer, one at least, and answer the last of them."""
+
+
+class Wire:
+    """Translates between the window and one process; called on threads, in order, anew for each process."""
+
+    def encode(self, question: Any) -> object:
+        """Return what the process is told."""
+        return question
+
+    def decode(self, answer: Any) -> Any:
+        """Return the answer for the window."""
+        return answer
+
+
+@dataclass(frozen=True, eq=False)
+class Reply:
+    """Answer to a numbered question, or in words why there is none; or, not `final`, how far it is."""
+
+    number: int
+    answer: Any
+    trouble: str = ""
+    final: bool = True
+
+
+class Worker(Protocol[_Covariant]):
+    """What answers questions for a window; no call waits."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether the newest question is not answered yet."""
+
+    @property
+    def lives(self) -> bool:
+        """Whether the worker goes on; the next question starts it again."""
+
+    @property
+    def trouble(self) -> str:
+        """Why the last question has no answer, in words; empty if it has one."""
+
+    @property
+    def progress(self) -> Any:
+        """How far the newest question is, as the service tells; None if it has not told yet."""
+
+    def put(self, question: object) -> None:
+        """Ask; an older question without an answer does not count any more."""
+
+    def poll(self) -> _Covariant | None:
+        """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
+
+    def close(self) -> None:
+        """End what works."""
+
+
+class LatestWorker(Generic[_Answer]):
+    """A service in a process of its own, which is started by a question and again after it has died.
+
+    Parameters
+    ----------
+    service : str
+        ``package.module:Class``.
+    doing : str
+        For people: ``measures the map``.
+    wire : type
+        Of `Wire`.
+    patience : float, s
+        A process that works longer on an older question than that is ended for a newer one.
+    """
+
+    def __init__(
+        self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = math.inf
+    ) -> None:
+        self.trouble = ""
+        self._service, self._doing, self._wire, self._patience = service, doing, wire, patience
+        self._since = 0.0
+        self._number = self._answered = 0
+        self._talk: _Talk | None = None
+
+    @property
+    def lives(self) -> bool:
+        """Whether there is a process."""
+        return self._talk is not None and not self._talk.ended
+
+    @property
+    def busy(self) -> bool:
+        """Whether the newest question is not answered yet."""
+        return self._answered < self._number
+
+    @property
+    def progress(self) -> Any:
+        """How far the newest question is, as the service tells; None if it has not told yet."""
+        told = None if self._talk is None else self._talk.progress
+        return told.answer if told is not None and told.number == self._number else None
+
+    def put(self, question: object) -> None:
+        """Ask; an older question without an answer does not count any more."""
+        now = time.monotonic()
+        if not self.busy:
+            self._since = now
+        talk = self._talk
+        if talk is None or talk.ended or now - self._since > self._patience:
+            self.close()
+            self._since = now
+            talk = self._talk = _Talk(self._service, self._wire())
+        self._number += 1
+        talk.ask(self._number, question)
+
+    def poll(self) -> _Answer | None:
+        """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
+        if self._talk is None:
+            return None
+        ended, reply = self._talk.ended, self._talk.heard()
+        if reply is not None:
+            self._answered, self.trouble, self._since = reply.number, reply.trouble, time.monotonic()
+        if ended and self.busy:
+            self._answered, self.trouble = self._number, f"the process that {self._doing} has ended"
+            return None
+        return None if reply is None else reply.answer
+
+    def close(self) -> None:
+        """End the process."""
+        if self._talk is not None:
+            self._talk.close()
+            self._talk = None
+
+
+class DirectWorker(Generic[_Answer]):
+    """A service that answers in this process at once: for pictures without a display, and for tests."""
+
+    busy = False
+    lives = True
+    progress = None
+
+    def __init__(self, service: Service, wire: Wire | None = None) -> None:
+        self._service, self._wire = service, wire or Wire()
+        self._reply = Reply(0, None)
+
+    @property
+    def trouble(self) -> str:
+        """Why the last question has no answer, in words; empty if it has one."""
+        return self._reply.trouble
+
+    def put(self, question: object) -> None:
+        """Answer."""
+        self._reply = reply_of(self._service, [(0, self._wire.encode(question))], Line())
+
+    def poll(self) -> _Answer | None:
+        """Return the answer, once."""
+        reply, self._reply = self._reply, Reply(0, None, self.trouble)
+        answer: _Answer | None = None if reply.answer is None else self._wire.decode(reply.answer)
+        return answer
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+class _Talk:
+    """One process, with a thread that writes to it and one that reads."""
+
+    def __init__(self, service: str, wire: Wire) -> None:
+        self.process = started(service)
+        self.ended = False
+        self.progress: Reply | None = None
+        self._wire = wire
+        self._changed = threading.Condition()
+        self._closed = False
+        self._wanted: tuple[int, object] | None = None
+        self._reply: Reply | None = None
+        self._threads = [threading.Thread(target=call, daemon=True) for call in (self._write, self._read)]
+        for thread in self._threads:
+            thread.start()
+
+    def ask(self, number: int, question: object) -> None:
+        with self._changed:
+            self._wanted = number, question
+            self._changed.notify()
+
+    def heard(self) -> Reply | None:
+        with self._changed:
+            reply, self._reply = self._reply, None
+        return reply
+
+    def close(self) -> None:
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self.process.kill()
+        self.process.wait()
+        for thread in self._threads:
+            thread.join()
+
+    def _write(self) -> None:
+        assert self.process.stdin is not None
+        # when the process has ended, reading says so
+        with contextlib.suppress(OSError), self.process.stdin as stream:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(lambda: self._closed or self._wanted is not None)
+                    wanted, self._wanted = self._wanted, None
+                    if self._closed or wanted is None:
+                        return
+                number, question = wanted
+                send(stream, (number, self._wire.encode(question)))
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        try:
+            with self.process.stdout as stream:
+                receive(stream)  # READY
+                while (reply := receive(stream)) is not None:
+                    if not reply.final:
+                        self.progress = reply
+                        continue
+                    if reply.answer is not None:
+                        reply = Reply(reply.number, self._wire.decode(reply.answer), reply.trouble)
+                    with self._changed:
+                        self._reply = reply
+        finally:
+            self.ended = True
+
+
+# the process
+
+
+class Line:
+    """What a service hears and says while it works: newer questions, and how far it is."""
+
+    def newer(self) -> list[Any]:
+        """Return the questions that have come since."""
+        return []
+
+    def tell(self, progress: object) -> None:
+        """Say how far the answer is."""
+
+
+class _PipeLine(Line):
+    def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
+        self._source, self._target = source, target
+        self._asked = threading.Condition()
+        self._questions: list[tuple[int, Any]] = []
+        self._number = 0
+
+    def newer(self) -> list[Any]:
+        return [question for _, question in self._questions]
+
+    def tell(self, progress: object) -> None:
+        self.say(Reply(self._number, progress, final=False))
+
+    def say(self, message: object) -> None:
+        try:
+            send(self._target, message)
+        except OSError:
+            os._exit(0)
+
+    def taken(self) -> list[tuple[int, Any]]:
+        """Wait for questions, and take them."""
+        with self._asked:
+            self._asked.wait_for(lambda: self._questions)
+            questions, self._questions = self._questions, []
+        self._number = questions[-1][0]
+        return questions
+
+    def listen(self) -> None:
+        """Take questions in; end the process when the parent's end of the pipe is closed."""
+        while (question := receive(self._source)) is not None:
+            with self._asked:
+                self._questions.append(question)
+                self._asked.notify()
+        os._exit(0)
+
+
+def reply_of(service: Service, questions: list[tuple[int, Any]], line: Line) -> Reply:
+    """Return the reply of a service to numbered questions."""
+    number = questions[-1][0]
+    try:
+        return Reply(number, service([question for _, question in questions], line))
+    except RobocovError as error:
+        return Reply(number, None, str(error))
+    except Exception as error:  # what nobody has foreseen must not end the window
+        traceback.print_exc()
+        return Reply(number, None, f"{service.failing}: {error}")
+
+
+def serve(service: str) -> None:
+    """Answer questions until the standard input ends, which it does however the parent ends."""
+    if sys.version_info >= (3, 14):
+        faulthandler.enable(c_stack=False)  # the engine's own frames would hide those of a user's code
+    else:
+        faulthandler.enable()
+    with contextlib.suppress(
+        OSError, AttributeError, TypeError
+    ):  # where the kernel can end it with its parent
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    line = _PipeLine(*own_streams())
+    threading.Thread(target=line.listen, daemon=True).start()
+    module, _, name = service.partition(":")
+    answering = getattr(importlib.import_module(module), name)()
+    line.say(READY)
+    while True:
+        line.say(reply_of(answering, line.taken(), line))
+
+
+def started(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
+    """Start a process that serves; pipes lead to its standard input and from its standard output.
+
+    A service without a class, ``package.module``, is run as a program. Complaints go to `stderr`, by default to ours.
+    """
+    # it is to import what this one does
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        environment.setdefault(name, "1")
+    serving = f"from robocov_app.toolkit.worker import serve; serve({service!r})"
+    # -P: what lies in the working folder is not meant
+    command = [sys.executable, "-P", *(("-c", serving) if ":" in service else ("-m", service))]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, env=environment)
+    if sys.platform == "linux":
+        import fcntl
+
+        # a pipe that holds a whole answer wakes its reader less often; so much is not allowed to everybody
+        with contextlib.suppress(OSError):
+            fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
+    return process
+
+
+def asked(process: subprocess.Popen[bytes], question: object) -> Reply | None:
+    """Ask a process that serves, and wait for its answer; None if it ends."""
+    assert process.stdin is not None and process.stdout is not None
+    with contextlib.suppress(OSError):
+        send(process.stdin, (0, question))
+    while (reply := receive(process.stdout)) == READY:
+        pass
+    return reply if isinstance(reply, Reply) else None
+
+
+def ended(process: subprocess.Popen[bytes]) -> int:
+    """Let a process end, which it does without its streams; return its status."""
+    for stream in (process.stdin, process.stdout):
+        assert stream is not None
+        with contextlib.suppress(OSError):
+            stream.close()
+    return process.wait()
+
+
+def own_streams() -> tuple[BinaryIO, BinaryIO]:
+    """Return the pipes from and to the parent.
+
+    Code that is called may read from stdin, where there is nothing, and print, which goes to stderr.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    source, target = (os.fdopen(os.dup(fd), mode) for fd, mode in ((0, "rb"), (1, "wb")))
+    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file
+        os.dup2(nothing.fileno(), 0)
+    os.dup2(2, 1)
+    return source, target  # type: ignore[return-value]
+
+
+def send(stream: IO[bytes], message: object) -> None:
+    """Write one message."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(_LENGTH.pack(len(data)))
+    stream.write(data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> Any:
+    """Read one message; None at the end, also in the midst of one."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    data = stream.read(length)
+    return pickle.loads(data) if len(data) == length else None
