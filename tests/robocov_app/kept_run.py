@@ -6,13 +6,13 @@ import time
 from pathlib import Path
 
 import numpy as np
-from robocov_app.live.messages import receive
 
 from robocov.controllers import make_controller
 from robocov.mapfile import from_json
 from robocov.record import ARRAYS, Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov_app.toolkit.worker import receive
 from robocov_app.viewer.session.keep_process import heard
 from robocov_app.viewer.session.keeping import Keeper, Said, tell, wanted_of
 from robocov_app.viewer.session.session import Session

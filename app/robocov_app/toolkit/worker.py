@@ -1,7 +1,7 @@
 """Work in processes of our own, beside a window that must not wait: only the newest question counts.
 
-A *service* is a class without arguments whose objects answer questions (see `Service`). `LatestWorker` runs one in
-another process, `DirectWorker` in this one. `started` and the messages are for whoever waits for each answer.
+A *service* is a class without arguments whose objects answer questions (see `Service`). `LatestWorker`
+runs one in another process, `DirectWorker` in this one; `started` and `asked` are for callers that may wait.
 """
 
 from __future__ import annotations
@@ -356,7 +356,7 @@ def serve(service: str) -> None:
 def started(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
     """Start a process that serves; pipes lead to its standard input and from its standard output.
 
-    A service without a class, ``package.module``, is run as a program. Complaints go to `stderr`, by default to ours.
+    A module without a class is run as a program. Complaints go to `stderr`, by default to ours.
     """
     # it is to import what this one does
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}

@@ -55,7 +55,7 @@ class Known:
 
 
 class Costs:
-    """Costs for a window, computed in another process, or in this one where pictures must not depend on speed.
+    """Costs for a window, computed in another process, or in this one where pictures must not depend on it.
 
     Parameters
     ----------

@@ -65,8 +65,8 @@ class SeldomReadings:
     def __init__(self) -> None:
         self._asked, self._count = None, 0
 
-    def ask(self, sketch, radius) -> None:
-        self._asked = sketch, radius
+    def put(self, question) -> None:
+        self._asked = question
 
     def poll(self):
         self._count += 1

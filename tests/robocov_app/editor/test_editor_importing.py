@@ -11,13 +11,12 @@ import pygame
 import pytest
 from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
-from robocov_app.live.latest import DirectWorker, LatestWorker
 
 from robocov_app.editor.edits.properties import titled
-from robocov_app.editor.ui import import_process
 from robocov_app.editor.ui.asking import Question
-from robocov_app.editor.ui.importing import ImportQuestion, options_of
+from robocov_app.editor.ui.importing import Importing, ImportQuestion, options_of
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping
+from robocov_app.toolkit.worker import DirectWorker, LatestWorker
 
 PATIENCE = 60.0
 
@@ -35,7 +34,7 @@ def plan(tmp_path: Path) -> Path:
 
 
 def question(path: Path, worker: Any = None, taken: Any = None) -> ImportQuestion:
-    worker = worker or DirectWorker(import_process.SERVICE)
+    worker = worker or DirectWorker(Importing())
     return ImportQuestion(path, IMPORTERS["picture"], worker, taken)
 
 
@@ -55,7 +54,7 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
-    asked = ImportQuestion(tmp_path / "x", IMPORTERS[name], DirectWorker(import_process.SERVICE), None)
+    asked = ImportQuestion(tmp_path / "x", IMPORTERS[name], DirectWorker(Importing()), None)
     assert asked.settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
@@ -117,11 +116,11 @@ def waited(asked: ImportQuestion) -> None:
 
 def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     # every older import is given up
-    worker: Any = LatestWorker("robocov_app.editor.ui.import_process", "imports", patience=0.0)
+    worker: Any = LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=0.0)
     asked = question(plan, worker)
     for letter in "0.1":
         asked.type(letter)
-    process = worker._talk._process
+    process = worker._talk.process
     waited(asked)
     assert free(asked) == pytest.approx(80 - 1)
     asked.keep_inside((15.0, 5.0))
@@ -129,7 +128,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     waited(asked)
     taken = asked.poll()
     assert taken is not None and taken.environment.free_area == pytest.approx(56)
-    assert worker._talk._process is process
+    assert worker._talk.process is process
     asked.close()
     assert process.poll() is not None
 

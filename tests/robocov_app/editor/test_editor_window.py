@@ -363,7 +363,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
 class NoReadings:
     busy = False
 
-    def ask(self, sketch, radius) -> None:
+    def put(self, question) -> None:
         pass
 
     def poll(self) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from driven_window import opened
-from robocov_app.live.cost_worker import CostWorker
-from robocov_app.live.messages import Answer
 from touched_run import HALL, LLOYD, RAPF, all_told, begun, stepped
 
 from robocov.cost import CoverageCost
@@ -194,27 +191,7 @@ def test_in_the_window(tmp_path):
         assert "mean distance by φ" in driver.window.arena._scenes[0].cost
 
 
-def test_the_process_for_the_cost_weighs_anew_what_it_has():
-    """A density alone needs no preparation of the map; the answers are those of the cost."""
-    peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
-    places = np.array([[1.0, 1.0], [5.0, 3.2]])
-    with CostWorker() as worker:
-        for environment in (HALL, HALL.with_density(peak), HALL):
-            generation = worker.environment(environment, 24)
-            end, answer = time.monotonic() + 60.0, None
-            while answer is None and time.monotonic() < end:
-                worker.ask(0.0, places)
-                found = [each for each in worker.poll() if isinstance(each, Answer)]
-                answer = next((each for each in found if each.generation == generation), None)
-                time.sleep(0.01)
-            assert answer is not None
-            wanted = CoverageCost(environment, 24)(places)
-            assert answer.result.mean_distance == wanted.mean_distance
-            assert answer.result.value == wanted.value
-            assert np.array_equal(answer.result.gradient, wanted.gradient)
-
-
-def test_at_once_it_is_weighed_anew_too():
+def test_a_density_alone_needs_no_preparation_of_the_map():
     peak = Gaussians((Gaussian((5.0, 3.0), 5.0, sigma=0.7),), 0.5)
     places, costs = np.array([[1.0, 1.0], [5.0, 3.2]]), Costs(24, direct=True)
     found = []

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov_app.live.messages import Answer, Building, Failed, Ready
 from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov_app.render.field import Field
+from robocov_app.toolkit.worker import DirectWorker
 from robocov_app.viewer import costs as module
-from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.costs import Costs, CostService
 
 PLACES = np.array([[1.0, 1.0], [5.0, 3.0]])
 OTHERS = np.array([[1.0, 3.0], [3.5, 3.0], [5.0, 3.0]])
@@ -53,41 +53,41 @@ class StubWorker:
     """Answers when it is told to."""
 
     def __init__(self) -> None:
-        self.generation, self.asked, self.events, self.closed = 0, [], [], False
+        self.asked, self.busy, self.lives, self.progress, self.trouble = [], False, True, None, ""
+        self._service, self._answer = DirectWorker(CostService(), module._CostWire()), None
 
-    def environment(self, environment, lattice) -> int:
-        self.generation += 1
-        self.cost = CoverageCost(environment, lattice)
-        self.events.append(Building(self.generation, 0.0, 3.0))
-        return self.generation
+    def put(self, question) -> None:
+        self.asked.append(question)
+        self.busy, self.progress = True, None
+        self._service.put(question)
 
-    def ready(self) -> None:
-        self.events.append(Ready(self.generation, self.cost.sites, self.cost.corners, 0.1))
+    def answer(self) -> None:
+        self._answer, self.trouble = self._service.poll(), self._service.trouble
+        self.busy = False
 
-    def ask(self, when, positions, topic=0, point=None, speeds=None) -> None:
-        self.asked.append((when, positions, topic, point))
-
-    def answer(self, generation=None) -> None:
-        when, positions, topic, _ = self.asked[-1]
-        generation = self.generation if generation is None else generation
-        self.events.append(Answer(generation, when, self.cost(positions), 0.01, topic, None))
+    def die(self) -> None:
+        self._answer, self.trouble, self.busy, self.lives = None, "it has ended", False, False
 
     def poll(self):
-        events, self.events = self.events, []
-        return events
-
-    def close(self) -> None:
-        self.closed = True
+        answer, self._answer = self._answer, None
+        return answer
 
 
 @pytest.fixture
-def stubbed(monkeypatch):
-    """Give costs whose worker does what the test says, with a clock that stands still."""
-    now = [100.0]
-    monkeypatch.setattr(module, "CostWorker", StubWorker)
-    monkeypatch.setattr(module, "perf_counter", lambda: now[0])
-    costs = Costs(16)
-    return costs, costs._worker, now
+def stubbed():
+    """Give costs whose worker does what the test says."""
+    costs = Costs(16, direct=True)
+    costs._worker = StubWorker()
+    costs.environment(HALL)
+    return costs, costs._worker
+
+
+@pytest.fixture
+def ready(stubbed):
+    costs, worker = stubbed
+    worker.answer()
+    costs.poll()
+    return costs, worker
 
 
 # at once
@@ -215,30 +215,27 @@ def test_the_time_until_the_first_robot_comes():
 
 
 def test_nothing_is_asked_before_the_map_is_ready(stubbed):
-    costs, worker, _ = stubbed
-    costs.environment(HALL)
-    assert costs.state == "cost: preparing the map"
+    costs, worker = stubbed
     costs.ask(0, 1.0, PLACES)
     assert costs.poll() == []
-    assert costs.state == "cost: preparing the map, 0%, 3 s left"
-    worker.events.append(Building(1, 0.5, 0.3))
+    assert costs.state == "cost: preparing the map"
+    worker.progress = 0.25, 3.0
+    costs.poll()
+    assert costs.state == "cost: preparing the map, 25%, 3 s left"
+    worker.progress = 0.5, 0.3
     costs.poll()
     assert costs.state == "cost: preparing the map, 50%"
-    assert worker.asked == []
-    worker.ready()
+    assert [each.positions for each in worker.asked] == [None]
+    worker.answer()
     costs.poll()
     assert costs.state == ""
-    assert len(worker.asked) == 1
+    assert [each.time for each in worker.asked[1:]] == [1.0]
 
 
-def test_every_pane_has_its_turn(stubbed):
-    costs, worker, now = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_every_pane_has_its_turn(ready):
+    costs, worker = ready
     turns = []
     for frame in range(40):
-        now[0] += 1 / 60
         for pane in range(3):
             costs.ask(pane, float(frame), PLACES)
         worker.answer()
@@ -248,29 +245,19 @@ def test_every_pane_has_its_turn(stubbed):
     assert min(known.time for known in costs.known.values()) >= 36.0
 
 
-def test_one_question_at_a_time(stubbed):
-    costs, worker, now = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_one_question_at_a_time(ready):
+    costs, worker = ready
     for pane in range(3):
         costs.ask(pane, 1.0, PLACES)
-    assert len(worker.asked) == 1
-    now[0] += 0.3
-    costs.poll()
-    assert len(worker.asked) == 1
-    # what does not come is not waited for for ever
-    now[0] += 0.3
-    costs.poll()
-    assert len(worker.asked) == 2
+    for _ in range(3):
+        assert costs.poll() == []
+    assert len(worker.asked) == 2  # with the map
 
 
-def test_answers_to_another_run_are_passed_over(stubbed):
-    costs, worker, _ = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_answers_to_another_run_are_passed_over(ready):
+    costs, worker = ready
     costs.ask(0, 7.0, PLACES)
+    costs.poll()
     costs.forget()
     costs.ask(0, 0.0, OTHERS)
     worker.answer()
@@ -280,62 +267,49 @@ def test_answers_to_another_run_are_passed_over(stubbed):
     assert [(pane, known.time) for pane, known in costs.poll()] == [(0, 0.0)]
 
 
-def test_so_are_those_of_another_map(stubbed):
-    costs, worker, _ = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_so_are_those_of_another_map(ready):
+    costs, worker = ready
     costs.ask(2, 7.0, PLACES)
-    worker.answer()
-    assert len(costs.poll()) == 1
-    costs.ask(2, 8.0, PLACES)
+    costs.poll()
     costs.environment(replace(HALL, obstacles=()))
-    assert costs.known == {}
-    worker.answer(generation=1)
-    assert costs.poll() == []
     costs.ask(2, 8.0, INSIDE)
-    worker.ready()
-    costs.poll()
-    worker.answer()
-    assert [pane for pane, _ in costs.poll()] == [2]
+    worker._answer = module.Known(7.0, None, None, None)  # while the newest question has no answer
+    assert costs.poll() == []
+    assert costs.known == {}
+    for _ in range(2):
+        worker.answer()
+        answers = costs.poll()
+    assert [(pane, known.time) for pane, known in answers] == [(2, 8.0)]
 
 
-def test_a_robot_in_an_obstacle_stops_nothing(stubbed):
-    costs, worker, _ = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_a_robot_in_an_obstacle_stops_nothing(ready):
+    costs, worker = ready
     costs.ask(0, 1.0, INSIDE)
     costs.ask(1, 1.0, PLACES)
-    worker.events.append(Failed(1, "robot 1 is outside the free space"))
+    costs.poll()
+    worker.answer()
+    assert "outside the free space" in worker.trouble
     assert costs.poll() == []
     assert costs.state == ""
     worker.answer()
     assert [pane for pane, _ in costs.poll()] == [1]
 
 
-def test_a_process_that_ends_again_and_again_is_said(stubbed):
-    costs, worker, now = stubbed
-    costs.environment(HALL)
-    worker.ready()
-    costs.poll()
+def test_a_process_that_ends_again_and_again_is_said(ready):
+    costs, worker = ready
     costs.ask(0, 1.0, PLACES)
-    worker.events.append(Failed(1, "the process that computes the cost has ended"))
     costs.poll()
-    # asked again, it is started again, and prepares the map
-    costs.ask(0, 2.0, PLACES)
-    worker.events.append(Building(1, 0.1, 9.0))
+    worker.die()
     costs.poll()
-    assert costs.state == "cost: preparing the map, 10%, 9 s left"
-    asked = len(worker.asked)
-    now[0] += 1.0
-    costs.ask(0, 3.0, PLACES)
-    assert len(worker.asked) == asked
-    worker.events.append(Failed(1, "the process that computes the cost has ended"))
-    costs.poll()
-    assert costs.state == "no cost: the process that computes the cost has ended"
-    costs.close()
-    assert worker.closed
+    assert costs.state == "cost: preparing the map"
+    assert worker.asked[-1].positions is None
+    count = len(worker.asked)
+    worker.die()
+    for _ in range(3):
+        costs.ask(0, 2.0, PLACES)
+        costs.poll()
+    assert costs.state == "no cost: it has ended"
+    assert len(worker.asked) == count
 
 
 # by another process
@@ -401,7 +375,7 @@ def test_a_process_that_dies_is_replaced(worker_costs):
     worker_costs.environment(HALL)
     worker_costs.ask(0, 1.0, PLACES)
     answered(worker_costs)
-    os.kill(worker_costs._worker._talk._process.pid, signal.SIGKILL)
+    os.kill(worker_costs._worker._talk.process.pid, signal.SIGKILL)
     end = time.monotonic() + PATIENCE
     answers = []
     while not answers and time.monotonic() < end:

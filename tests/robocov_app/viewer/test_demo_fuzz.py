@@ -15,6 +15,7 @@ from touched_run import RAPF, RPF, too_deep
 
 from robocov_app.render.picture import standard_layers
 from robocov_app.viewer.actions import all_actions
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.scenario import MOST_PANES
 from robocov_app.viewer.window import Window
 
@@ -58,14 +59,15 @@ SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))
 BUTTONS = (1, 1, 1, 1, 2, 3, 4, 8)
 
 
-class SomeCosts(DirectCosts):
+class SomeCosts(Costs):
     """The costs of small maps; those of large ones take long, and are tested elsewhere."""
 
     def environment(self, environment) -> None:
         if len(environment.obstacles) < 15:
             super().environment(environment)
         else:
-            self._cost, self.known = None, {}
+            self.forget()
+            self._map = None
 
 
 class Monkey:
@@ -219,7 +221,7 @@ def limited(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
     with monkeypatch.context() as patch:
         patch.setattr(Window, "do", seldom)
-        patch.setattr("driven_window.DirectCosts", SomeCosts)
+        patch.setattr("driven_window.Costs", SomeCosts)
         yield
 
 

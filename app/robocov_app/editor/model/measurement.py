@@ -1,6 +1,6 @@
 """What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass.
 
-Takes longer than a frame: a window asks a `MeasurementWorker`, which has a process of its own.
+Takes longer than a frame: a window asks a `measurement_worker`, which has a process of its own.
 """
 
 from __future__ import annotations

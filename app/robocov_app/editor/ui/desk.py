@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.tools.tool import Tool
     from robocov_app.editor.ui.asking import ListQuestion, Question
     from robocov_app.editor.ui.importing import ImportQuestion
+    from robocov_app.toolkit.worker import Worker
 
 SAID_FOR = 5.0
 """Seconds for which a message stays."""

@@ -19,8 +19,7 @@ from robocov_app.viewer.overlays import card, dim, wrapped
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from robocov_app.editor.ui.import_process import Imported
-    from robocov_app.editor.ui.importing import ImportQuestion, Option
+    from robocov_app.editor.ui.importing import Imported, ImportQuestion, Option
     from robocov_app.render.theme import Colour, Theme
 
 _COLUMN, _ROW, _LINE, _ABOVE = 300, 25, 17, 40

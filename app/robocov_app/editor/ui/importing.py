@@ -5,14 +5,17 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from robocov.errors import ParameterError, RobocovError, shown
-from robocov_app.importers import ReadOptions, Shaping
+from robocov.environment import Environment
+from robocov.errors import ParameterError, RobocovError, one_line, shown
+from robocov_app.importers import ForeignMap, ImportReport, ReadOptions, Shaping, read_map, shaped
+from robocov_app.importers.comparison import Comparison, compare
+from robocov_app.toolkit.worker import Line, Worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     from robocov_app.importers import Importer
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.model.measurement import Measurement
     from robocov_app.editor.ui.window import EditorWindow
+    from robocov_app.toolkit.worker import Worker
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "

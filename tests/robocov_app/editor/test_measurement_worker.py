@@ -1,0 +1,69 @@
+import time
+from contextlib import closing
+
+from drawn_sketches import HALL, changes, sound_sketches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov_app.editor.edits import properties, transform
+from robocov_app.editor.model.measurement import measure
+from robocov_app.editor.model.measurement_worker import MeasurementWire, Measuring, measurement_worker
+from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.toolkit.worker import Line
+
+PATIENCE = 60.0
+"""Seconds after which nothing will come any more."""
+
+SKETCH, _ = Sketch("Hall", boundary=HALL).added(
+    [CircleObstacle((3.0, 3.0), 1.0), WallObstacle(((6.0, -1.0), (6.0, 7.7)), 0.2)]
+)
+
+
+def same(a, b) -> bool:
+    """Whether two measurements say the same."""
+    numbers = ("free_area", "components", "reached", "gap", "vertices", "radius")
+    words = [[problem.words for problem in each.problems] for each in (a, b)]
+    return (
+        all(getattr(a, name) == getattr(b, name) for name in numbers)
+        and a.impassable.equals(b.impassable)
+        and words[0] == words[1]
+    )
+
+
+def test_it_says_what_the_function_says_after_every_change():
+    history = [SKETCH]
+    history.append(transform.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)
+    history.append(history[-1].added([PolygonObstacle(((9.0, 1.0), (11.0, 1.0), (10.0, 3.0)))])[0])
+    history.append(history[-1].without([0]))
+    history.append(properties.raised(history[-1], Selection.of(1), "top").sketch)
+    history.append(SKETCH)
+    with closing(measurement_worker()) as worker, closing(measurement_worker(direct=True)) as direct:
+        for sketch in history:
+            for each in (worker, direct):
+                each.put((sketch, 0.2))
+                result, end = each.poll(), time.monotonic() + PATIENCE
+                while each.busy and time.monotonic() < end:
+                    result = each.poll()
+                    time.sleep(0.002)
+                assert same(result, measure(sketch, 0.2))
+
+
+@settings(max_examples=20)
+@given(st.data())
+def test_what_has_changed_is_enough_to_know_the_whole(data):
+    measuring, wire = Measuring(), MeasurementWire()
+    sketch, known = data.draw(sound_sketches(least=1)), {}
+    questions = []
+    for _ in range(4):
+        questions.append(wire.encode((sketch, 0.2)))
+        assert [item.key for item in questions[-1].changed] == [
+            item.key for item in sketch.obstacles if known.get(item.key) is not item
+        ]
+        known = {item.key: item for item in sketch.obstacles}
+        last, change = sketch, data.draw(changes(sketch))
+        sketch = sketch if change is None else change.sketch
+    measuring(questions[:2], Line())
+    answer, wanted = measuring(questions[2:], Line()), measure(last, 0.2)
+    assert (answer.vertices, answer.free_area) == (wanted.vertices, wanted.free_area)
