@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, anywhere, drafts, floats, json_values, shapes, sound_sketches
+from drawn_sketches import HALL, anywhere, drafts, floats, json_values, renumbered, shapes, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -81,7 +81,7 @@ def test_keys_are_not_in_the_file():
     )
     again = sketch_of(draft_document(sketch))
     assert [item.key for item in again.obstacles] == [0, 1]
-    assert again == sketch.renumbered()
+    assert again == renumbered(sketch)
 
 
 def test_a_number_too_long_for_a_map_is_still_a_draft():
@@ -222,10 +222,13 @@ def test_what_others_keep_stays_untouched(foreign):
     assert again.extra == sketch.extra
 
 
+MARKS = {"note": "x", "group": "desks", "locked": True}
+
+
 @given(st.dictionaries(st.sampled_from(["editor", "editor 2", "mine"]), json_values))
 def test_free_keys_with_notes_come_apart_again(extra):
-    notes, background, others = taken_apart(annotated(extra, {1: "x"}, ["a", "b"], None), ["a", "b"])
-    assert (notes, background) == ({1: "x"}, None)
+    notes, background, others = taken_apart(annotated(extra, {1: MARKS}, ["a", "b"], None), ["a", "b"])
+    assert (notes, background) == ({1: MARKS}, None)
     # an empty object of the editor's own is none
     assert {**others, **{key: {} for key in extra if key not in others}} == extra
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pygame
 import pytest
 from called import complaint
+from drawn_sketches import renumbered
 from driven_editor import Hands, opened_editor, sheet, touched
 from PIL import Image
 
@@ -71,7 +72,7 @@ def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
     hands.key("ctrl+s")
     hands.key("return")
     assert "as a draft" in hands.said
-    assert Document.opened(tmp_path / "untitled.json", None).history.sketch == hands.sketch.renumbered()
+    assert Document.opened(tmp_path / "untitled.json", None).history.sketch == renumbered(hands.sketch)
 
 
 def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:

@@ -3,7 +3,7 @@ import stat
 import sys
 
 import pytest
-from drawn_sketches import HALL, drafts
+from drawn_sketches import HALL, drafts, renumbered
 from hypothesis import HealthCheck, given, settings
 
 from robocov.environment import CircleObstacle
@@ -72,7 +72,7 @@ def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     disk_of_first = saved(one, path, disk_of_first)
     with pytest.raises(ChangedError):
         saved(other, path, disk_of_second)
-    assert opened(path)[0] == one.renumbered()
+    assert opened(path)[0] == renumbered(one)
     saved(other, path, disk_of_second, over=True)
     assert state_of(disk_of_first) == "changed"
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pygame
 import pytest
+from drawn_sketches import renumbered
 from driven_editor import Hands, of_map, opened_editor, sheet
 from driven_window import KEYS, MODIFIERS
 
@@ -193,7 +194,7 @@ def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
                 window.closed = window.documents.leaving = False
             if step % 50 == 0:
                 sketch = hands.sketch
-                assert parse_sketch(sketch_text(sketch), "map") == sketch.renumbered()
+                assert parse_sketch(sketch_text(sketch), "map") == renumbered(sketch)
                 assert hands.desk.selection.within(sketch) == hands.desk.selection
         # and back to the beginning, exactly
         pygame.event.clear()

@@ -1,4 +1,4 @@
-from drawn_sketches import changes, drafts, sound_sketches
+from drawn_sketches import changes, drafts, renumbered, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,7 +22,7 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
         if change is not None and history.do(change):
             was.append((history.sketch, history.selection))
             # whatever an edit makes can be kept, and comes back
-            assert sketch_of(draft_document(change.sketch)) == change.sketch.renumbered()
+            assert sketch_of(draft_document(change.sketch)) == renumbered(change.sketch)
             assert change.selection == change.selection.within(change.sketch)
             assert len(change.sketch.places) == len(change.sketch.obstacles)
             assert change.words

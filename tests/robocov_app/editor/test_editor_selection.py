@@ -16,7 +16,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.model.hit_test import edge_at, in_box, owner_at, owners_at, vertex_at, vertices_in_box
+from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
 from robocov_app.editor.model.selection import (
     Edge,
     Selection,
@@ -44,6 +44,10 @@ STARTS = (
 @pytest.fixture
 def sketch() -> Sketch:
     return Sketch("Hall", boundary=HALL, starts=STARTS).added([LOW, HIGH, WALL])[0]
+
+
+def owner_at(sketch: Sketch, point, reach: float):
+    return next(iter(owners_at(sketch, point, reach)), None)
 
 
 def test_a_click_takes_the_topmost(sketch):
@@ -75,13 +79,6 @@ def test_what_is_near_is_taken_where_nothing_covers(sketch):
 @given(sound_sketches(least=2), places, st.sampled_from([0.05, 0.5]))
 def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
     owners = [BOUNDARY, *(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
-    handles = [(math.dist(point, at), vertex) for owner in owners for vertex, at in points_of(sketch, owner)]
-    nearest = min((away for away, _ in handles), default=math.inf)
-    found = vertex_at(sketch, point, reach, owners)
-    if nearest > reach:
-        assert found is None
-    else:
-        assert math.dist(point, place_of(sketch, found)) == nearest
     lines = [
         shapely.LineString([*points, *points[:1]] if closed else points)
         for owner in owners
@@ -186,7 +183,6 @@ def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):
     )
     for x, y in rng.uniform(0, 50, (50, 2)).tolist():
         owner_at(sketch, (x, y), 0.1)
-        vertex_at(sketch, (x, y), 0.1, keys)
         edge_at(sketch, (x, y), 0.1, keys)
         in_box(sketch, (x, y), (x + 5, y + 5), touched=True)
     assert measured and sum(measured) < 50 * 20

@@ -1,10 +1,11 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 from drawn_sketches import HALL, sound_sketches
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
@@ -120,20 +121,11 @@ def test_centre_and_rim_of_discs(sketch):
         (lambda s: vertices.bevelled(s, picked(Vertex(1, 0, 0)), 0.1), "select corners"),
         (lambda s: vertices.bevelled(s, picked(Vertex(0, 0, 0)), 0.1, segments=0), "segments"),
         (lambda s: vertices.rounded_off(s, picked(Vertex(0, 0, 0)), -1.0), "radius above 0"),
-        (lambda s: vertices.hole_cut(s, 1, HOLE), "turn it into one first"),
-        (lambda s: vertices.hole_cut(s, 0, HOLE[:2]), "three corners"),
-        (lambda s: vertices.hole_cut(s, 0, [(4, 4), (8, 4), (4, 4.5)]), "inside the polygon"),
-        (lambda s: vertices.hole_cut(s, 0, HOLE), "apart from other holes"),
-        (
-            lambda s: vertices.hole_cut(s, 0, [(4, 4), (4.5, 4.5), (4.5, 4), (4, 4.5)]),
-            "enclose|crosses itself",
-        ),
         (lambda s: vertices.hole_filled(s, 0, 2), "no such hole"),
         (lambda s: vertices.split(s, Vertex(2, 0, 0)), "between its ends"),
         (lambda s: vertices.split(s, Vertex(0, 0, 0)), "no wall"),
         (lambda s: vertices.joined(s, Selection.of(0, 2)), "walls to join"),
         (lambda s: vertices.joined(s, Selection.of(2)), "walls to join"),
-        (lambda s: vertices.reversed_order(s, 1), "no order"),
     ],
 )
 def test_what_cannot_be_done_is_said(sketch, deed, words):
@@ -158,7 +150,7 @@ def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
     ring = ring_points(sketch, edge.of)[edge.ring]
     a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
     middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-    change = vertices.inserted(sketch, edge, middle)
+    change = vertices.inserted(sketch, replace(edge, point=middle))
     (new,) = change.selection.vertices
     assert (new.of, new.ring, new.index) == (edge.of, edge.ring, edge.index + 1)
     assert place_of(change.sketch, new) == pytest.approx(middle, abs=1e-4)
@@ -241,48 +233,13 @@ def test_what_has_no_angle_is_no_corner():
 # edges
 
 
-@given(sound_sketches(least=1), st.integers(0, 20), st.sampled_from([-0.2, 0.05, 0.7]))
-def test_a_pushed_edge_stays_parallel_and_its_neighbours_keep_their_directions(sketch, k, by):
-    ring = ring_points(sketch, sketch.obstacles[0].key)[0]
-    assume(isinstance(sketch.obstacles[0].shape, PolygonObstacle))
-    edge = Edge(sketch.obstacles[0].key, 0, k % len(ring), (0.0, 0.0))
-    after = ring_points(vertices.edge_pushed(sketch, edge, by).sketch, edge.of)[0]
-    count = len(ring)
-
-    def direction(points, index):
-        a, b = np.array(points[index % count]), np.array(points[(index + 1) % count])
-        return (b - a) / max(np.hypot(*(b - a)), 1e-12)
-
-    e = edge.index
-    a, b, c = (np.array(ring[i % count]) for i in (e, e + 1, e))
-    normal = np.array([-(b - a)[1], (b - a)[0]]) / np.hypot(*(b - a))
-    assert (np.array(after[e]) - c) @ normal == pytest.approx(by, abs=2e-4)
-    for other in (e - 1, e, e + 1):
-        if math.dist(after[other % count], after[(other + 1) % count]) > 0.1:
-            before, now = direction(ring, other), direction(after, other)
-            assert abs(before[0] * now[1] - before[1] * now[0]) < 5e-3
-
-
-def test_ends_of_walls_are_pushed_straight(sketch):
-    after = vertices.edge_pushed(sketch, Edge(2, 0, 0, (7.0, 1.0)), 0.5).sketch.item(2).shape
-    assert after.points == ((6.0, 1.5), (9.0, 1.5), (9.0, 3.0))
-    moved = vertices.edge_moved(sketch, Edge(2, 0, 1, (9.0, 2.0)), 0.5, 0.25).sketch.item(2).shape
-    assert moved.points == ((6.0, 1.0), (9.5, 1.25), (9.5, 3.25))
-    around = vertices.edge_moved(sketch, Edge(0, 0, 3, (1.0, 2.0)), -0.5, 0.0)
-    assert around.sketch.item(0).shape.vertices == ((0.5, 1.0), (5.0, 1.0), (5.0, 5.0), (0.5, 5.0))
-    assert around.words == "edge of polygon “frame” moved"
-
-
 # holes and walls
 
 
-def test_holes_are_cut_and_filled(sketch):
-    change = vertices.hole_cut(sketch, 0, [(3.5, 3.5), (4.5, 3.5), (4.0, 4.5)])
-    assert len(change.sketch.item(0).shape.holes) == 2
-    assert change.sketch.item(0).shape.polygon.is_valid
-    filled = vertices.hole_filled(change.sketch, 0, 1)
-    assert filled.sketch.item(0).shape.holes == (((3.5, 3.5), (4.5, 3.5), (4.0, 4.5)),)
-    assert vertices.hole_filled(filled.sketch, 0, 1).sketch.item(0).shape.holes == ()
+def test_holes_are_filled(sketch):
+    filled = vertices.hole_filled(sketch, 0, 1)
+    assert filled.words == "hole of polygon “frame” filled"
+    assert filled.sketch.item(0).shape.holes == ()
 
 
 def test_a_wall_goes_on_is_cut_and_joined(sketch):
@@ -316,9 +273,3 @@ def test_walls_that_are_apart_are_joined_where_they_are_nearest():
     sketch, keys = Sketch().added(walls)
     (item,) = vertices.joined(sketch, Selection.of(*keys)).sketch.obstacles
     assert item.shape == WallObstacle(((0.0, 0.0), (1.0, 0.0), (2.0, 0.5), (5.0, 0.0)), 0.1, "b")
-
-
-def test_the_order_is_turned_round(sketch):
-    change = vertices.reversed_order(sketch, 0)
-    assert change.sketch.item(0).shape.vertices == FRAME.vertices[::-1]
-    assert vertices.reversed_order(change.sketch, 0).sketch == sketch

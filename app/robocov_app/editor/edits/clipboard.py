@@ -29,13 +29,7 @@ FORMAT = "robocov-clipboard"
 
 
 def copied(sketch: Sketch, selection: Selection) -> str:
-    """Return the text that stands for what is selected: obstacles with notes, starts, the boundary.
-
-    Raises
-    ------
-    MapError
-        When nothing is selected that can be copied.
-    """
+    """Return the text that stands for what is selected: obstacles with notes, starts, the boundary."""
     part = Sketch(
         name=sketch.name,
         boundary=sketch.boundary if selection.boundary else None,
@@ -58,11 +52,6 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None) -> Change:
     text : str
     at : (x, y) or None, m
         Where the middle of its bounding box is to be; None leaves it where it was.
-
-    Raises
-    ------
-    MapError
-        When the text is nothing that can be pasted; one sentence.
     """
     part = _part(text)
     shapes = [(item.shape, item.note) for item in part.obstacles]

@@ -85,13 +85,7 @@ def density_removed(sketch: Sketch) -> Change:
 
 
 def weight_of(text: str) -> float:
-    """Return a typed weight of a hot spot.
-
-    Raises
-    ------
-    MapError
-        When it is no number above 0.
-    """
+    """Return a typed weight of a hot spot."""
     try:
         weight = float(text)
     except ValueError:

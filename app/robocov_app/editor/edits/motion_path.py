@@ -102,13 +102,7 @@ def path_paced(sketch: Sketch, selection: Selection, speed: float) -> Change:
 
 
 def speed_of(text: str) -> float:
-    """Return a typed speed, m/s.
-
-    Raises
-    ------
-    MapError
-        When it is no speed that obstacles may have.
-    """
+    """Return a typed speed, m/s."""
     try:
         return _speed(float(text.strip().removesuffix("m/s")))
     except ValueError:
@@ -116,13 +110,7 @@ def speed_of(text: str) -> float:
 
 
 def middle_of(item: Item) -> Point:
-    """Return the middle of an obstacle's bounding box, m.
-
-    Raises
-    ------
-    MapError
-        When it covers nothing.
-    """
+    """Return the middle of an obstacle's bounding box, m."""
     if item.geometry.is_empty:
         raise MapError("what covers nothing cannot move")
     low_x, low_y, high_x, high_y = item.geometry.bounds

@@ -15,10 +15,7 @@ from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObst
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.edits.create import (
-    encodable,
-    label_of,
-)
+from robocov_app.editor.edits.create import encodable, label_of
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import outlines, tenths
 from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles

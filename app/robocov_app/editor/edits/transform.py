@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
@@ -30,6 +30,17 @@ from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenth
 from robocov_app.editor.model.selection import Change, Selection, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
+Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
+Axis: TypeAlias = Literal["x", "y"]
+Box: TypeAlias = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y, m."""
+
+SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
+"""Left, centre and right move along x; top, middle and bottom along y."""
+
+_ALONG_X = SIDES[:3]
+_MOST_COPIES = 10_000
+
 _ALIKE = 1e-12
 """Relative difference of what is the same but for rounding."""
 
@@ -38,8 +49,6 @@ _ALIKE = 1e-12
 class Affine:
     """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0).
 
-    Examples
-    --------
     >>> Affine.turn(90.0, about=(1.0, 0.0)).point((2.0, 0.0))
     (1.0, 1.0)
     """
@@ -67,15 +76,6 @@ class Affine:
         """Return the map that scales along x and y about a point."""
         return cls(fx, 0.0, 0.0, fy)._about(about)
 
-    @classmethod
-    def mirror(cls, a: Point, b: Point) -> Affine:
-        """Return the map that mirrors across the line through two points, which are not the same."""
-        dx, dy = b[0] - a[0], b[1] - a[1]
-        length = math.hypot(dx, dy)
-        cos, sin = dx / length, dy / length
-        double = cos * cos - sin * sin, 2.0 * cos * sin
-        return cls(double[0], double[1], double[1], -double[0])._about(a)
-
     @property
     def factor(self) -> float | None:
         """By how much it scales all lengths alike; None where it stretches some more than others."""
@@ -91,15 +91,8 @@ class Affine:
         return np.column_stack([self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0])
 
     def ring(self, ring: Iterable[Point]) -> Ring:
-        """Return where points go, to the tenth of a millimetre.
-
-        Raises
-        ------
-        MapError
-            When that is farther away than maps reach.
-        """
-        moved = self.points(np.array(list(ring), dtype=float).reshape(-1, 2))
-        return ring_near(moved)
+        """Return where points go, to the tenth of a millimetre; MapError where that is beyond all maps."""
+        return ring_near(self.points(np.array(list(ring), dtype=float).reshape(-1, 2)))
 
     def point(self, point: Point) -> Point:
         """Return where a point goes, to the tenth of a millimetre."""
@@ -120,19 +113,11 @@ class Affine:
             width = _times(shape.width, factor or 1.0)
             return replace(shape, points=self.ring(shape.points), width=width, path=path)
         if factor is None:
-            outline = shape.polygon.exterior.coords[:-1]
-            return PolygonObstacle(self.ring(outline), (), shape.name, path)
-        radius = _times(shape.radius, factor)
-        return replace(shape, center=self.point(shape.center), radius=radius, path=path)
+            return PolygonObstacle(self.ring(shape.polygon.exterior.coords[:-1]), (), shape.name, path)
+        return replace(shape, center=self.point(shape.center), radius=_times(shape.radius, factor), path=path)
 
     def start(self, spec: StartSpec) -> StartSpec:
-        """Return where a start goes; one in the whole free space stays.
-
-        Raises
-        ------
-        MapError
-            When a disc would become an ellipse.
-        """
+        """Return where a start goes; one in the whole free space stays, and no disc becomes an ellipse."""
         if isinstance(spec, PointsStart):
             return PointsStart(self.ring(spec.positions))
         if isinstance(spec, DiscStart):
@@ -152,9 +137,6 @@ class Affine:
 
 def _times(length: float, factor: float) -> float:
     return length if factor == 1.0 else tenths(length * factor)
-
-
-_MOST_COPIES = 10_000
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
@@ -208,12 +190,10 @@ def resized(
             raise MapError(f"it has no {name} that could be scaled")
     fixed = (bounds[0], bounds[1]) if about is None else about
     if width is None or height is None:
-        factors = [
-            wanted / there for wanted, there in ((width, now[0]), (height, now[1])) if wanted is not None
-        ]
-        if not factors:
+        if width is None and height is None:
             raise MapError("a width or a height was wanted")
-        return _change(sketch, selection, Affine.stretch(factors[0], factors[0], fixed), "resized")
+        factor = width / now[0] if width is not None else (height or 0.0) / now[1]
+        return _change(sketch, selection, Affine.stretch(factor, factor, fixed), "resized")
 
     # walls keep their width, so that the box does not quite grow by the factor: go nearer step by step
     fx, fy = width / now[0], height / now[1]
@@ -233,10 +213,8 @@ def resized(
 
 def placed(sketch: Sketch, selection: Selection, x: float | None, y: float | None) -> Change:
     """Move what is selected so that its bounding box has its lower left corner there; None leaves it."""
-    bounds = _bounds(sketch, selection)
-    dx = 0.0 if x is None else x - bounds[0]
-    dy = 0.0 if y is None else y - bounds[1]
-    return moved(sketch, selection, dx, dy)
+    low_x, low_y, *_ = _bounds(sketch, selection)
+    return moved(sketch, selection, 0.0 if x is None else x - low_x, 0.0 if y is None else y - low_y)
 
 
 def mirrored(sketch: Sketch, selection: Selection, axis: str, at: float | None = None) -> Change:
@@ -244,21 +222,14 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str, at: float | None =
 
     By default about the middle of its bounding box.
     """
-    if axis not in ("x", "y"):
-        raise MapError("an axis x or y was wanted")
-    x, y = _middle(sketch, selection)
+    middle = _middle(sketch, selection)
     if axis == "x":
-        affine = Affine(xx=-1.0, x0=2.0 * (x if at is None else at))
+        affine = Affine(xx=-1.0, x0=2.0 * (middle[0] if at is None else at))
+    elif axis == "y":
+        affine = Affine(yy=-1.0, y0=2.0 * (middle[1] if at is None else at))
     else:
-        affine = Affine(yy=-1.0, y0=2.0 * (y if at is None else at))
+        raise MapError("an axis x or y was wanted")
     return _change(sketch, selection, affine, "mirrored")
-
-
-def mirrored_across(sketch: Sketch, selection: Selection, a: Point, b: Point) -> Change:
-    """Mirror what is selected across the line through two points."""
-    if math.dist(a, b) < SMALLEST:
-        raise MapError("the line to mirror across needs two points that are apart")
-    return _change(sketch, selection, Affine.mirror(a, b), "mirrored")
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
@@ -266,7 +237,7 @@ def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float 
     whole = Selection(items=selection.items, starts=selection.starts)
     if not whole:
         raise MapError("select obstacles or starts to copy")
-    after, copies = copied_by(sketch, whole, Affine.shift(dx, dy))
+    after, copies = _copied(sketch, whole, Affine.shift(dx, dy))
     return Change(after, copies, f"{whole.words(sketch)} duplicated")
 
 
@@ -283,13 +254,114 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
     for row in range(rows):
         for column in range(columns):
             if row or column:
-                after, copies = copied_by(after, whole, Affine.shift(column * dx, row * dy))
+                after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
                 everything = everything.plus(copies)
-    words = f"{whole.words(sketch)} copied into {columns} × {rows}"
-    return Change(after, everything, words)
+    return Change(after, everything, f"{whole.words(sketch)} copied into {columns} × {rows}")
 
 
-def copied_by(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
+def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bool = False) -> Change:
+    """Align the selected obstacles and starts with the side of their common bounding box, or the boundary's.
+
+    The boundary itself stays: when it is selected too, the others align with it. Of single vertices alone:
+    gives them the same x or y.
+    """
+    if side not in SIDES:
+        raise MapError(f"one of {', '.join(SIDES)} was wanted")
+    words = {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
+    if selection.vertices and not selection.owners:
+        places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
+        if len(places) < 2:
+            raise MapError("select two or more vertices to align")
+        level = _level(_around((*place, *place) for place in places.values()), side)
+        new = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
+        return Change(with_places(sketch, new), selection, f"{selection.words(sketch)} aligned {words}")
+    boxes = _boxes(sketch, selection)
+    if to_boundary or selection.boundary:
+        frame = box_of(sketch, BOUNDARY)
+        if frame is None:
+            raise MapError("there is no boundary to align with")
+        if not boxes:
+            raise MapError("select obstacles or starts to align")
+    else:
+        if len(boxes) < 2:
+            raise MapError("select two or more obstacles or starts to align")
+        frame = _around(boxes.values())
+    off = {owner: _level(frame, side) - _level(box, side) for owner, box in boxes.items()}
+    by = {owner: (d, 0.0) if side in _ALONG_X else (0.0, d) for owner, d in off.items()}
+    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
+
+
+def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float | None = None) -> Change:
+    """Spread three or more selected things so that the gaps between their boxes are equal.
+
+    The first and the last stay where they are; with a `gap` in metres, the first only.
+    """
+    if axis not in ("x", "y"):
+        raise MapError("an axis x or y was wanted")
+    a = ("x", "y").index(axis)
+    boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
+    if len(boxes) < (3 if gap is None else 2):
+        count = "three" if gap is None else "two"
+        raise MapError(f"select {count} or more obstacles or starts to distribute")
+    if gap is None:
+        room = boxes[-1][1][a + 2] - boxes[0][1][a]
+        gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
+    by: dict[Owner, Point] = {}
+    low = boxes[0][1][a]
+    for owner, box in boxes:
+        by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
+        low += box[a + 2] - box[a] + gap
+    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
+
+
+def box_of(sketch: Sketch, owner: Owner) -> Box | None:
+    """Return the bounding box of something; None where it is nowhere."""
+    held: object = None
+    if owner == BOUNDARY:
+        points = np.array(sketch.boundary or (), dtype=float).reshape(-1, 2)
+    elif isinstance(owner, str):
+        held = sketch.start(owner)
+        points = np.array(getattr(held, "positions", ()), dtype=float).reshape(-1, 2)
+    else:
+        item = sketch.item(owner)
+        held, points = item.shape, np.array(shapely.bounds(item.geometry)).reshape(2, 2)
+    if isinstance(held, CircleObstacle | DiscStart):
+        # a typed size is that of the circle, not of the polygon that stands for it
+        (x, y), r = held.center, held.radius
+        return x - r, y - r, x + r, y + r
+    if not len(points) or not np.isfinite(points).all():
+        return None
+    (low_x, low_y), (high_x, high_y) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return low_x, low_y, high_x, high_y
+
+
+def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
+    """Return the bounding box of what is selected; None of nothing."""
+    boxes = [box for owner in selection.owners if (box := box_of(sketch, owner)) is not None]
+    boxes += [(*place, *place) for place in (place_of(sketch, vertex) for vertex in selection.vertices)]
+    return _around(boxes) if boxes else None
+
+
+def _around(boxes: Iterable[Box]) -> Box:
+    low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
+    return min(low_x), min(low_y), max(high_x), max(high_y)
+
+
+def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
+    """Return the boxes of the selected obstacles and starts, in the order of the sketch."""
+    owners: list[Owner] = [item.key for item in sketch.obstacles if item.key in selection.items]
+    owners += [name for name, _ in sketch.starts if name in selection.starts]
+    return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}
+
+
+def _level(box: Box, side: Side) -> float:
+    a = 0 if side in _ALONG_X else 1
+    if side in ("centre", "middle"):
+        return (box[a] + box[a + 2]) / 2
+    return box[a] if side in ("left", "bottom") else box[a + 2]
+
+
+def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
     """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
     shapes = [(affine.shape(item.shape), item.note) for item in sketch.obstacles if item.key in whole.items]
     after, keys = sketch.added(shapes)
@@ -301,43 +373,7 @@ def copied_by(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch,
     return after, Selection.of(*keys, *names)
 
 
-def box_of(sketch: Sketch, owner: Owner) -> tuple[float, float, float, float] | None:
-    """Return smallest x, smallest y, largest x, largest y of something, m; None where it is nowhere."""
-    if owner == BOUNDARY:
-        points = np.array(sketch.boundary or (), dtype=float).reshape(-1, 2)
-    elif isinstance(owner, str):
-        spec = sketch.start(owner)
-        if isinstance(spec, DiscStart):
-            (x, y), r = spec.center, spec.radius
-            return x - r, y - r, x + r, y + r
-        positions = spec.positions if isinstance(spec, PointsStart) else ()
-        points = np.array(positions, dtype=float).reshape(-1, 2)
-    else:
-        item = sketch.item(owner)
-        if isinstance(item.shape, CircleObstacle):
-            # a typed size is that of the circle, not of the polygon that stands for it
-            (x, y), r = item.shape.center, item.shape.radius
-            return x - r, y - r, x + r, y + r
-        points = np.array(shapely.bounds(item.geometry)).reshape(2, 2)
-    if not len(points) or not np.isfinite(points).all():
-        return None
-    (low_x, low_y), (high_x, high_y) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return low_x, low_y, high_x, high_y
-
-
-def bounds_of(sketch: Sketch, selection: Selection) -> tuple[float, float, float, float] | None:
-    """Return smallest x, smallest y, largest x, largest y of what is selected, m; None of nothing."""
-    boxes = [box for owner in selection.owners if (box := box_of(sketch, owner)) is not None]
-    for vertex in selection.vertices:
-        x, y = place_of(sketch, vertex)
-        boxes.append((x, y, x, y))
-    if not boxes:
-        return None
-    low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
-    return min(low_x), min(low_y), max(high_x), max(high_y)
-
-
-def each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
+def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
     """Return the sketch with things moved, each by its own (dx, dy) m."""
     for owner, (dx, dy) in by.items():
         if dx or dy:
@@ -354,11 +390,8 @@ def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) ->
 def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     """Return the sketch with what is selected taken elsewhere."""
     owners = selection.owners
-    places = {
-        vertex: affine.point(place_of(sketch, vertex))
-        for vertex in selection.vertices
-        if vertex.of not in owners
-    }
+    single = [vertex for vertex in selection.vertices if vertex.of not in owners]
+    places = {vertex: affine.point(place_of(sketch, vertex)) for vertex in single}
     sketch = sketch.with_shapes({key: affine.shape(sketch.item(key).shape) for key in selection.items})
     for name in selection.starts:
         sketch = sketch.with_start(name, affine.start(sketch.start(name)))
@@ -367,7 +400,7 @@ def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     return with_places(sketch, places) if places else sketch
 
 
-def _bounds(sketch: Sketch, selection: Selection) -> tuple[float, float, float, float]:
+def _bounds(sketch: Sketch, selection: Selection) -> Box:
     bounds = bounds_of(sketch, selection)
     if bounds is None:
         raise MapError("select something first")
@@ -377,115 +410,3 @@ def _bounds(sketch: Sketch, selection: Selection) -> tuple[float, float, float, 
 def _middle(sketch: Sketch, selection: Selection) -> Point:
     bounds = _bounds(sketch, selection)
     return rounded(((bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2))
-
-
-Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
-Axis: TypeAlias = Literal["x", "y"]
-Box: TypeAlias = tuple[float, float, float, float]
-
-SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
-"""Left, centre and right move along x; top, middle and bottom along y."""
-
-_ALONG_X = SIDES[:3]
-
-
-def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bool = False) -> Change:
-    """Align the selected obstacles and starts with the side of their common bounding box, or the boundary's.
-
-    The boundary itself stays: when it is selected too, the others align with it. Of single vertices alone:
-    gives them the same x or y.
-    """
-    if side not in SIDES:
-        raise MapError(f"one of {', '.join(SIDES)} was wanted")
-    if selection.vertices and not selection.owners:
-        return _aligned_vertices(sketch, selection, side)
-    boxes = _boxes(sketch, selection)
-    if to_boundary or selection.boundary:
-        frame = box_of(sketch, BOUNDARY)
-        if frame is None:
-            raise MapError("there is no boundary to align with")
-        if not boxes:
-            raise MapError("select obstacles or starts to align")
-    else:
-        if len(boxes) < 2:
-            raise MapError("select two or more obstacles or starts to align")
-        low_x, low_y, high_x, high_y = zip(*boxes.values(), strict=True)
-        frame = min(low_x), min(low_y), max(high_x), max(high_y)
-    by: dict[Owner, Point] = {}
-    for owner, box in boxes.items():
-        off = _level(frame, side) - _level(box, side)
-        by[owner] = (off, 0.0) if side in _ALONG_X else (0.0, off)
-    words = f"{Selection.of(*boxes).words(sketch)} aligned {_words(side)}"
-    return Change(each_moved(sketch, by), selection, words)
-
-
-def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float | None = None) -> Change:
-    """Spread three or more selected things so that the gaps between their boxes are equal.
-
-    The first and the last stay where they are; with a `gap` in metres, the first only.
-    """
-    a = _axis(axis)
-    boxes = _in_order(sketch, selection, 3 if gap is None else 2, lambda box: (box[a], box[a + 2]))
-    if gap is None:
-        room = boxes[-1][1][a + 2] - boxes[0][1][a]
-        gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
-    by: dict[Owner, Point] = {}
-    low = boxes[0][1][a]
-    for owner, box in boxes:
-        by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
-        low += box[a + 2] - box[a] + gap
-    return _spread(sketch, selection, by)
-
-
-def _aligned_vertices(sketch: Sketch, selection: Selection, side: Side) -> Change:
-    places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
-    if len(places) < 2:
-        raise MapError("select two or more vertices to align")
-    xs, ys = zip(*places.values(), strict=True)
-    level = _level((min(xs), min(ys), max(xs), max(ys)), side)
-    moved = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
-    words = f"{selection.words(sketch)} aligned {_words(side)}"
-    return Change(with_places(sketch, moved), selection, words)
-
-
-def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
-    """Return the boxes of the selected obstacles and starts, in the order of the sketch."""
-    owners: list[Owner] = [item.key for item in sketch.obstacles if item.key in selection.items]
-    owners += [name for name, _ in sketch.starts if name in selection.starts]
-    return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}
-
-
-def _in_order(
-    sketch: Sketch, selection: Selection, least: int, rank: Callable[[Box], tuple[float, float]]
-) -> list[tuple[Owner, Box]]:
-    boxes = _boxes(sketch, selection)
-    if len(boxes) < least:
-        count = {2: "two", 3: "three"}[least]
-        raise MapError(f"select {count} or more obstacles or starts to distribute")
-    return sorted(boxes.items(), key=lambda pair: rank(pair[1]))
-
-
-def _spread(sketch: Sketch, selection: Selection, by: dict[Owner, Point]) -> Change:
-    return Change(each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
-
-
-def _axis(axis: Axis) -> int:
-    if axis not in ("x", "y"):
-        raise MapError("an axis x or y was wanted")
-    return ("x", "y").index(axis)
-
-
-def _level(box: Box, side: Side) -> float:
-    low_x, low_y, high_x, high_y = box
-    return {
-        "left": low_x,
-        "centre": (low_x + high_x) / 2,
-        "right": high_x,
-        "top": high_y,
-        "middle": (low_y + high_y) / 2,
-        "bottom": low_y,
-    }[side]
-
-
-def _words(side: Side) -> str:
-    return {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")

@@ -1,17 +1,13 @@
-"""Edits of single vertices: of polygons and their holes, walls, the boundary, rims of circles, starts.
-
-As in `edits`: a `Change`, or a MapError with a sentence. More are in `corners` and `walls`.
-"""
+"""Edits of single vertices: of polygons and their holes, walls, the boundary, rims of circles, starts."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from robocov.arrays import Array
 from robocov.environment import (
@@ -26,7 +22,7 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.mapfile.models import SMALLEST
-from robocov_app.editor.model.geometry import ring_near, tenths
+from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import (
     Change,
     Edge,
@@ -34,23 +30,29 @@ from robocov_app.editor.model.selection import (
     Vertex,
     display_name,
     place_of,
+    replace_obstacles,
     ring_points,
     rings_of,
     with_rings,
 )
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+
+_STRAIGHT = math.radians(0.1)
+"""A corner that turns by less has nothing to be cut off."""
+
+_MOST_SEGMENTS = 256
+
+_SAME = 1e-4
+"""Ends of walls that are closer, in metres, are one point."""
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
     """Move the selected vertices by (dx, dy) m; a rim's vertex changes the radius."""
     if not selection.vertices:
         raise MapError("select vertices first")
-    places = {}
-    for vertex in selection.vertices:
-        x, y = place_of(sketch, vertex)
-        places[vertex] = (x + dx, y + dy)
-    words = f"{Selection(vertices=selection.vertices).words(sketch)} moved"
-    return Change(with_places(sketch, places), selection, words)
+    places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
+    places = {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()}
+    return replace(put(sketch, places), selection=selection)
 
 
 def put(sketch: Sketch, places: Mapping[Vertex, Point]) -> Change:
@@ -63,11 +65,6 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
     """Return the sketch with vertices at other places.
 
     Where a circle's centre is among them it moves as a whole; else the first of its rim gives the radius.
-
-    Raises
-    ------
-    MapError
-        When there is no such vertex, a circle would have no radius, or it is too far away.
     """
     by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
     for vertex, place in places.items():
@@ -77,8 +74,7 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
         if isinstance(owner, str):
             spec = sketch.start(owner)
             if isinstance(spec, DiscStart):
-                center, radius = _with_rim(spec, moves)
-                sketch = sketch.with_start(owner, DiscStart(center, radius))
+                sketch = sketch.with_start(owner, DiscStart(*_with_rim(spec, moves)))
                 continue
         elif owner != BOUNDARY:
             shape = sketch.item(owner).shape
@@ -89,20 +85,32 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
         rings = [list(ring) for ring in ring_points(sketch, owner)]
         for vertex, place in zip(moves, ring_near(np.array(list(moves.values()))), strict=True):
             rings[vertex.ring][vertex.index] = place
-        sketch = with_rings(sketch, owner, [tuple(ring) for ring in rings])
+        sketch = with_rings(sketch, owner, rings)
     return sketch
 
 
-def inserted(sketch: Sketch, edge: Edge, point: Point | None = None) -> Change:
-    """Insert a vertex on an edge, at the edge's point unless another is given; it is selected then."""
+def _with_rim(round_one: CircleObstacle | DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
+    """Return centre and radius after some of its handles have moved."""
+    by_index = {vertex.index: place for vertex, place in moves.items()}
+    place = point_near(by_index[min(by_index)])
+    if 0 in by_index:
+        return place, round_one.radius
+    radius = tenths(math.dist(round_one.center, place))
+    if radius < SMALLEST:
+        raise MapError("a circle needs a radius: drag its rim away from its centre")
+    return round_one.center, radius
+
+
+def inserted(sketch: Sketch, edge: Edge) -> Change:
+    """Insert a vertex at the point of an edge; it is selected then."""
     rings = [list(ring) for ring in ring_points(sketch, edge.of)]
-    _ends(sketch, edge)
-    (place,) = ring_near(np.array([point or edge.point], dtype=float))
-    rings[edge.ring].insert(edge.index + 1, place)
+    closed = {number: is_closed for number, _, is_closed in rings_of(sketch, edge.of)}
+    if edge.ring not in closed or not 0 <= edge.index < len(rings[edge.ring]) - (not closed[edge.ring]):
+        raise MapError("there is no such edge any more")
+    rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
     new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
-    return Change(
-        with_rings(sketch, edge.of, rings), new, f"vertex inserted in {display_name(sketch, edge.of)}"
-    )
+    words = f"vertex inserted in {display_name(sketch, edge.of)}"
+    return Change(with_rings(sketch, edge.of, rings), new, words)
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
@@ -112,107 +120,28 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
     """
     if not selection.vertices:
         raise MapError("select vertices first")
-    gone: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
-    for vertex in selection.vertices:
-        place_of(sketch, vertex)
-        gone[vertex.of][vertex.ring].add(vertex.index)
     after = sketch
-    for owner, by_ring in gone.items():
+    for owner, by_ring in _by_ring(sketch, selection.vertices).items():
         after = _with_fewer(after, owner, by_ring)
     words = f"{Selection(vertices=selection.vertices).words(sketch)} deleted"
-    left = replace(selection, vertices=frozenset()).within(after)
-    return Change(after, left, words)
+    return Change(after, selection.without_vertices().within(after), words)
 
 
-def edge_moved(sketch: Sketch, edge: Edge, dx: float, dy: float) -> Change:
-    """Move both ends of an edge by (dx, dy) m."""
-    a, b = _ends(sketch, edge)
-    change = moved(sketch, Selection(vertices=frozenset({a, b})), dx, dy)
-    return replace(change, words=f"edge of {display_name(sketch, edge.of)} moved")
-
-
-def edge_pushed(sketch: Sketch, edge: Edge, by: float) -> Change:
-    """Push an edge by so many metres along its normal, to the left; its neighbours keep their directions.
-
-    A neighbour in line with the edge cannot: its end moves along the normal.
-    """
-    a, b = _ends(sketch, edge)
-    ring = np.array(ring_points(sketch, edge.of)[edge.ring])
-    p, q = ring[a.index], ring[b.index]
-    length = float(np.hypot(*(q - p)))
-    if length == 0.0:
-        raise MapError("this edge has no length")
-    closed = rings_of(sketch, edge.of)[edge.ring][2]
-    count = len(ring)
-    along = (q - p) / length
-    shift = np.array([-along[1], along[0]]) * by
-    places = {}
-    for vertex, end, step in ((a, p, -1), (b, q, 1)):
-        neighbour = vertex.index + step
-        moved_to = end + shift
-        if closed or 0 <= neighbour < count:
-            direction = ring[neighbour % count] - end
-            across = direction[0] * along[1] - direction[1] * along[0]
-            if abs(across) > 1e-6 * np.hypot(*direction):
-                # along the neighbour until it is as far from the edge as the edge is pushed
-                moved_to = end + direction * (by / -across)
-        places[vertex] = (float(moved_to[0]), float(moved_to[1]))
-    selection = Selection(vertices=frozenset({a, b}))
-    return Change(with_places(sketch, places), selection, f"edge of {display_name(sketch, edge.of)} pushed")
-
-
-def hole_cut(sketch: Sketch, key: int, points: Sequence[Point]) -> Change:
-    """Give a polygon a hole."""
-    shape = sketch.item(key).shape
-    if not isinstance(shape, PolygonObstacle):
-        raise MapError("only a polygon can have holes: turn it into one first")
-    hole = ring_near(np.array(points, dtype=float).reshape(-1, 2))
-    if len(set(hole)) < 3 or shapely.Polygon(hole).area < SMALLEST**2:
-        raise MapError("a hole needs three corners that enclose something")
-    if not shapely.Polygon(hole).is_valid:
-        raise MapError("the hole's outline crosses itself")
-    if not sketch.item(key).geometry.covers(shapely.Polygon(hole)):
-        raise MapError("a hole must lie inside the polygon, apart from other holes")
-    after = sketch.with_shapes({key: replace(shape, holes=(*shape.holes, hole))})
-    return Change(after, Selection.of(key), f"hole cut into {display_name(sketch, key)}")
-
-
-def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
-    """Take a hole of a polygon away."""
-    shape = sketch.item(key).shape
-    if not isinstance(shape, PolygonObstacle) or not 1 <= ring <= len(shape.holes):
-        raise MapError("there is no such hole")
-    holes = shape.holes[: ring - 1] + shape.holes[ring:]
-    after = sketch.with_shapes({key: replace(shape, holes=holes)})
-    return Change(after, Selection.of(key), f"hole of {display_name(sketch, key)} filled")
-
-
-def reversed_order(sketch: Sketch, owner: Owner) -> Change:
-    """Turn the order of the vertices round."""
-    rings = [tuple(reversed(ring)) for ring in ring_points(sketch, owner)]
-    if not rings_of(sketch, owner):
-        raise MapError(f"the {display_name(sketch, owner)} has no order of vertices")
-    after = with_rings(sketch, owner, rings)
-    return Change(after, Selection.of(owner), f"order of {display_name(sketch, owner)} turned round")
-
-
-def _with_rim(held: CircleObstacle | DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
-    """Return centre and radius after some of its handles have moved."""
-    by_index = {vertex.index: place for vertex, place in moves.items()}
-    (place,) = ring_near(np.array([by_index[min(by_index)]], dtype=float))
-    if 0 in by_index:
-        return place, held.radius
-    radius = tenths(math.dist(held.center, place))
-    if radius < SMALLEST:
-        raise MapError("a circle needs a radius: drag its rim away from its centre")
-    return held.center, radius
+def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
+    """Return the indices of vertices by owner and ring."""
+    found: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
+    for vertex in vertices:
+        place_of(sketch, vertex)
+        found[vertex.of][vertex.ring].add(vertex.index)
+    return found
 
 
 def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> Sketch:
     """Return the sketch without some vertices of something, by ring and index."""
-    rings: list[Ring] = []
-    for number, ring in enumerate(ring_points(sketch, owner)):
-        rings.append(tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ())))
+    rings = [
+        tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ()))
+        for number, ring in enumerate(ring_points(sketch, owner))
+    ]
     if owner == BOUNDARY:
         if len(rings[0]) < 3:
             raise MapError("the boundary needs three corners at least")
@@ -233,19 +162,17 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
     return with_rings(sketch, owner, kept)
 
 
-def _ends(sketch: Sketch, edge: Edge) -> tuple[Vertex, Vertex]:
-    """Return the vertices at the ends of an edge."""
-    for number, points, closed in rings_of(sketch, edge.of):
-        count = len(points)
-        if number == edge.ring and 0 <= edge.index < (count if closed else count - 1):
-            return Vertex(edge.of, number, edge.index), Vertex(edge.of, number, (edge.index + 1) % count)
-    raise MapError("there is no such edge any more")
+def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
+    """Take a hole of a polygon away."""
+    shape = sketch.item(key).shape
+    if not isinstance(shape, PolygonObstacle) or not 1 <= ring <= len(shape.holes):
+        raise MapError("there is no such hole")
+    holes = shape.holes[: ring - 1] + shape.holes[ring:]
+    after = sketch.with_shapes({key: replace(shape, holes=holes)})
+    return Change(after, Selection.of(key), f"hole of {display_name(sketch, key)} filled")
 
 
-_STRAIGHT = math.radians(0.1)
-"""A corner that turns by less has nothing to be cut off."""
-
-_MOST_SEGMENTS = 256
+# corners cut off and rounded
 
 
 def bevelled(sketch: Sketch, selection: Selection, length: float, *, segments: int = 1) -> Change:
@@ -276,28 +203,20 @@ def _cut(
     sketch: Sketch, selection: Selection, wanted: Callable[[float], tuple[float, int]], words: str
 ) -> Change:
     """Cut corners; `wanted` says for the angle that a corner turns by the length and the segments."""
-    chosen: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
-    for vertex in selection.vertices:
-        place_of(sketch, vertex)
-        chosen[vertex.of][vertex.ring].add(vertex.index)
     after, count = sketch, 0
-    for owner, by_ring in chosen.items():
-        closed = {number: is_closed for number, _, is_closed in rings_of(sketch, owner)}
+    for owner, by_ring in _by_ring(sketch, selection.vertices).items():
         rings = list(ring_points(sketch, owner))
-        for number, indices in by_ring.items():
-            if number in closed:
-                cuts = _cuts(rings[number], indices, closed[number], wanted)
-                rings[number] = _without_corners(rings[number], cuts, closed[number])
-                count += len(cuts)
+        closed = {number: is_closed for number, _, is_closed in rings_of(sketch, owner)}
+        for number in by_ring.keys() & closed.keys():
+            cuts = _cuts(rings[number], by_ring[number], closed[number], wanted)
+            rings[number] = _without_corners(rings[number], cuts, closed[number])
+            count += len(cuts)
         if closed:
             after = with_rings(after, owner, rings)
     if not count:
         raise MapError("select corners first, of polygons, walls or the boundary")
-    return Change(
-        after,
-        Selection(selection.items, frozenset(), selection.starts, selection.boundary),
-        (f"{count} corners {words}" if count > 1 else f"corner {words}"),
-    )
+    words = f"{count} corners {words}" if count > 1 else f"corner {words}"
+    return Change(after, selection.without_vertices(), words)
 
 
 def _cuts(
@@ -307,22 +226,18 @@ def _cuts(
     points = np.array(ring)
     cuts = {}
     for k in sorted(indices):
-        if not closed and k in (0, len(ring) - 1):
-            continue
-        turn = _turn(points, k)
-        if turn < _STRAIGHT:
-            continue
+        turn = 0.0 if not closed and k in (0, len(ring) - 1) else _turn(points, k)
         if turn > math.pi - _STRAIGHT:
             raise MapError("a corner that turns right back cannot be cut off")
-        cuts[k] = wanted(turn)
+        if turn >= _STRAIGHT:
+            cuts[k] = wanted(turn)
     count = len(ring)
     for k, (length, _) in cuts.items():
         for other in ((k - 1) % count, (k + 1) % count):
             edge = math.dist(ring[k], ring[other])
-            both = other in cuts
-            taken = length + (cuts[other][0] if both else 0.0)
+            taken = length + (cuts[other][0] if other in cuts else 0.0)
             if taken > edge + 1e-9:
-                more = " for the corners at both ends" if both else ""
+                more = " for the corners at both ends" if other in cuts else ""
                 raise MapError(
                     f"that takes {tenths(taken):g} m of an edge that is {tenths(edge):g} m long{more}: "
                     f"less was wanted"
@@ -340,21 +255,13 @@ def _turn(points: Array, k: int) -> float:
 
 def _without_corners(ring: Ring, cuts: Mapping[int, tuple[float, int]], closed: bool) -> Ring:
     points = np.array(ring)
-    count = len(ring)
-    new: list[Array] = []
-    for k in range(count):
-        if k in cuts:
-            length, segments = cuts[k]
-            new.append(_arc(points[k - 1], points[k], points[(k + 1) % count], length, segments))
-        else:
-            new.append(points[k : k + 1])
-    kept: list[Point] = []
-    for point in ring_near(np.concatenate(new)):
-        if not kept or point != kept[-1]:
-            kept.append(point)
-    if closed and len(kept) > 1 and kept[0] == kept[-1]:
-        kept.pop()
-    return tuple(kept)
+    new = [
+        _arc(points[k - 1], points[k], points[(k + 1) % len(ring)], *cuts[k])
+        if k in cuts
+        else points[k : k + 1]
+        for k in range(len(ring))
+    ]
+    return distinct(ring_near(np.concatenate(new)), closed=closed)
 
 
 def _arc(before: Array, corner: Array, after: Array, length: float, segments: int) -> Array:
@@ -372,25 +279,21 @@ def _arc(before: Array, corner: Array, after: Array, length: float, segments: in
     sweep = math.atan2(float(spoke[0] * end[1] - spoke[1] * end[0]), float(spoke @ end))
     angle = np.linspace(0.0, sweep, segments + 1)
     cos, sin = np.cos(angle), np.sin(angle)
-    return np.asarray(
-        center + np.column_stack([cos * spoke[0] - sin * spoke[1], sin * spoke[0] + cos * spoke[1]])
-    )
+    turned = np.column_stack([cos * spoke[0] - sin * spoke[1], sin * spoke[0] + cos * spoke[1]])
+    return np.asarray(center + turned)
 
 
-_SAME = 1e-4
-"""Ends of walls that are closer, in metres, are one point."""
+# walls
 
 
 def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Go on with a wall from its first or last vertex; the new one is selected then."""
-    wall = _wall(sketch, vertex)
-    (place,) = ring_near(np.array([point], dtype=float))
-    last = len(wall.points) - 1
+    key, wall = _wall(sketch, vertex)
+    place, last = point_near(point), len(wall.points) - 1
     if vertex.index not in (0, last):
         raise MapError("a wall goes on from its ends only")
     at_end = vertex.index == last
     points = (*wall.points, place) if at_end else (place, *wall.points)
-    key = int(vertex.of)
     selection = Selection(vertices=frozenset({Vertex(key, 0, last + 1 if at_end else 0)}))
     after = sketch.with_shapes({key: replace(wall, points=points)})
     return Change(after, selection, f"{display_name(sketch, key)} extended")
@@ -398,16 +301,12 @@ def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
 
 def split(sketch: Sketch, vertex: Vertex) -> Change:
     """Cut a wall in two at one of its inner vertices; both are selected then."""
-    wall = _wall(sketch, vertex)
+    key, wall = _wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
-    place, key = sketch.places[int(vertex.of)], sketch.fresh_key
-    item = sketch.obstacles[place]
-    first = replace(item, shape=replace(wall, points=wall.points[: vertex.index + 1]))
-    second = Item(key, replace(wall, points=wall.points[vertex.index :]), item.note)
-    items = (*sketch.obstacles[:place], first, second, *sketch.obstacles[place + 1 :])
-    words = f"{display_name(sketch, item.key)} cut in two"
-    return Change(replace(sketch, obstacles=items), Selection.of(item.key, key), words)
+    halves = wall.points[: vertex.index + 1], wall.points[vertex.index :]
+    pieces = [replace(wall, points=points) for points in halves]
+    return replace_obstacles(sketch, {key: pieces}, f"{display_name(sketch, key)} cut in two")
 
 
 def joined(sketch: Sketch, selection: Selection) -> Change:
@@ -427,15 +326,10 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
         del rest[k]
     name = next((wall.name for wall in shapes if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
-    first = items[0]
-    whole = WallObstacle(chain, shapes[0].width, name)
-    gone = {item.key for item in items[1:]}
-    kept = tuple(
-        replace(item, shape=whole, note=note) if item.key == first.key else item
-        for item in sketch.obstacles
-        if item.key not in gone
-    )
-    return Change(replace(sketch, obstacles=kept), Selection.of(first.key), f"{len(items)} walls joined")
+    whole = replace(items[0], shape=WallObstacle(chain, shapes[0].width, name), note=note)
+    kept = sketch.without(item.key for item in items[1:]).obstacles
+    after = replace(sketch, obstacles=tuple(whole if item.key == whole.key else item for item in kept))
+    return Change(after, Selection.of(whole.key), f"{len(items)} walls joined")
 
 
 def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
@@ -448,11 +342,10 @@ def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
     return min(ways, key=lambda way: way[0])
 
 
-def _wall(sketch: Sketch, vertex: Vertex) -> WallObstacle:
+def _wall(sketch: Sketch, vertex: Vertex) -> tuple[int, WallObstacle]:
     place_of(sketch, vertex)
-    shape = (
-        sketch.item(vertex.of).shape if vertex.of in sketch.places and isinstance(vertex.of, int) else None
-    )
-    if not isinstance(shape, WallObstacle):
-        raise MapError("that is no wall")
-    return shape
+    if isinstance(vertex.of, int) and vertex.of in sketch.places:
+        shape = sketch.item(vertex.of).shape
+        if isinstance(shape, WallObstacle):
+            return vertex.of, shape
+    raise MapError("that is no wall")

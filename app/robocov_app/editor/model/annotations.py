@@ -1,6 +1,6 @@
-"""What the editor keeps in a map's free keys: notes on obstacles, and the picture underneath.
+"""What the editor keeps in a map's free keys: notes, groups, locks, and the picture underneath.
 
-A note tells of its obstacle by its place in the list and by its name, so that it finds it again when
+An entry tells of its obstacle by its place in the list and by its name, so that it finds it again when
 somebody has edited the file by hand. What others keep under the same key stays untouched.
 """
 
@@ -12,15 +12,20 @@ from typing import Any
 
 from robocov_app.editor.model.background import Background
 
+MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
+"""What is kept of an obstacle besides its shape, and its kind; the falsy is not written."""
+
 _HOME = "editor"
 """The editor's free key, unless that holds something of somebody else."""
 
+_LISTS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
+_OURS = {*_LISTS, "background"}
 _LOST = "notes of obstacles that are gone"
 
 
 def annotated(
     extra: Mapping[str, Any],
-    notes: Mapping[int, str],
+    marks: Mapping[int, Mapping[str, Any]],
     names: Sequence[str | None],
     background: Background | None,
 ) -> dict[str, Any]:
@@ -30,14 +35,21 @@ def annotated(
     ----------
     extra : dict
         Of everybody else.
-    notes : dict of place to note
+    marks : dict of place to dict
+        By the place of each obstacle, as `MARKS`.
     names : sequence of str or None
         Of the obstacles in their order.
     background : Background or None
     """
     ours: dict[str, Any] = {}
-    if notes:
-        ours["notes"] = [_note(k, names[k], notes[k]) for k in sorted(notes)]
+    for key, kept in _LISTS.items():
+        entries = []
+        for k in sorted(marks):
+            of = {"obstacle": k} if names[k] is None else {"obstacle": k, "name": names[k]}
+            held = {name: marks[k][name] for name in kept if name in marks[k]}
+            entries += [{**of, **held}] if held else []
+        if entries:
+            ours[key] = entries
     if background is not None:
         ours["background"] = background.document()
     if not ours:
@@ -48,26 +60,29 @@ def annotated(
 
 def taken_apart(
     extra: Mapping[str, Any], names: Sequence[str | None]
-) -> tuple[dict[int, str], Background | None, dict[str, Any]]:
-    """Return notes by the place of their obstacle, the picture, and the free keys of everybody else."""
+) -> tuple[dict[int, dict[str, Any]], Background | None, dict[str, Any]]:
+    """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
     for home, _ in zip(_homes(), range(len(extra) + 1), strict=False):
         held = extra.get(home)
         if not isinstance(held, dict) or _is_free(held):
             continue
-        entries = held.get("notes", [])
         background = Background.of_document(held["background"]) if "background" in held else None
-        if not _are_notes(entries) or ("background" in held and background is None):
+        sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
+        if not sound or ("background" in held and background is None):
             continue
-        notes: dict[int, str] = {}
-        rest = {key: value for key, value in held.items() if key not in ("notes", "background")}
-        for entry in entries:
-            k = _obstacle_of(entry, names)
-            if k is None or k in notes:
-                rest[_LOST] = [*rest.get(_LOST, []), entry]
-            else:
-                notes[k] = entry["note"]
+        marks: dict[int, dict[str, Any]] = {}
+        rest = {key: value for key, value in held.items() if key not in _OURS}
+        for key, kept in _LISTS.items():
+            taken = set()
+            for entry in held.get(key, []):
+                k = _obstacle_of(entry, names)
+                if k is not None and k not in taken:
+                    taken.add(k)
+                    marks.setdefault(k, {}).update((name, entry[name]) for name in kept if name in entry)
+                elif key == "notes":
+                    rest[_LOST] = [*rest.get(_LOST, []), entry]
         others = {key: value for key, value in extra.items() if key != home}
-        return notes, background, {**extra, home: rest} if rest else others
+        return marks, background, {**extra, home: rest} if rest else others
     return {}, None, dict(extra)
 
 
@@ -77,27 +92,24 @@ def _homes() -> Iterator[str]:
         yield f"{_HOME} {k}"
 
 
-def _note(k: int, name: str | None, note: str) -> dict[str, Any]:
-    return {"obstacle": k, "note": note} if name is None else {"obstacle": k, "name": name, "note": note}
-
-
 def _is_free(held: object) -> bool:
-    return isinstance(held, dict) and "notes" not in held and "background" not in held
+    return isinstance(held, dict) and not _OURS & held.keys()
 
 
-def _are_notes(entries: object) -> bool:
+def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
     return isinstance(entries, list) and all(
         isinstance(entry, dict)
         and type(entry.get("obstacle")) is int
-        and isinstance(entry.get("note"), str)
         and isinstance(entry.get("name", ""), str)
-        and set(entry) <= {"obstacle", "name", "note"}
+        and set(entry) <= {"obstacle", "name", *kept}
+        and any(name in entry for name in kept)
+        and all(type(entry[name]) is MARKS[name] for name in kept if name in entry)
         for entry in entries
     )
 
 
 def _obstacle_of(entry: Mapping[str, Any], names: Sequence[str | None]) -> int | None:
-    """Return the place of the obstacle that a note is about; None if it is gone."""
+    """Return the place of the obstacle that an entry is about; None if it is gone."""
     k, name = int(entry["obstacle"]), entry.get("name")
     if 0 <= k < len(names) and names[k] == name:
         return k

@@ -110,13 +110,7 @@ class Background:
 
 
 def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
-    """Return a picture just taken, so many metres wide, its lower left corner in the origin.
-
-    Raises
-    ------
-    MapError
-        When it has no pixels, or more than `MOST_PIXELS`.
-    """
+    """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
     if min(pixels) < 1 or pixels[0] * pixels[1] > MOST_PIXELS:
         raise MapError(
             f"the picture has {pixels[0]} x {pixels[1]} pixels: "
@@ -126,13 +120,7 @@ def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Bac
 
 
 def to_scale(background: Background, a: Point, b: Point, metres: float) -> Background:
-    """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays.
-
-    Raises
-    ------
-    MapError
-        When the places are the same, or the length is none.
-    """
+    """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
     apart = math.dist(a, b)
     if not (math.isfinite(metres) and metres > 0.0):
         raise MapError("the length between the two points must be above 0 m")

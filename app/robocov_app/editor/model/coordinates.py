@@ -45,11 +45,6 @@ def length_of(text: str, *, now: float | None = None) -> float:
 
     With `now`, what it is at present, also ``+0.5``, ``-0.5``, ``*2``, ``/2`` and ``50%``.
 
-    Raises
-    ------
-    MapError
-        One sentence: what was typed, and what can be.
-
     Examples
     --------
     >>> length_of("120cm"), length_of("3,2"), length_of("+0.5", now=2.0), length_of("/4", now=2.0)
@@ -72,11 +67,6 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     """Return a place in metres: ``3.2 1.5``; ``2<45`` from the origin, at 45 degrees.
 
     Relative to `last`: ``@0.5 0``, ``@2<45``, and ``+0.5 0``, whose first sign is a plus.
-
-    Raises
-    ------
-    MapError
-        One sentence: what was typed, and what can be; also for a relative place without a `last`.
 
     Examples
     --------
@@ -108,11 +98,6 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
 
     ``<45`` alone keeps the cursor's distance at that angle.
 
-    Raises
-    ------
-    MapError
-        As `point_of`.
-
     Examples
     --------
     >>> next_point_of("2", (1.0, 1.0), (1.0, 1.3))
@@ -138,11 +123,6 @@ def size_of(text: str, *, now: tuple[float, float] | None = None) -> tuple[float
 
     With `now`, what they are at present, ``*2`` and ``50%`` scale both.
 
-    Raises
-    ------
-    MapError
-        One sentence; also where one is not above 0.
-
     Examples
     --------
     >>> size_of("3 x 2"), size_of("120cm×80cm"), size_of("1,5"), size_of("50%", now=(3.0, 2.0))
@@ -162,11 +142,6 @@ def size_of(text: str, *, now: tuple[float, float] | None = None) -> tuple[float
 
 def angle_of(text: str) -> float:
     """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``.
-
-    Raises
-    ------
-    MapError
-        One sentence.
 
     Examples
     --------

@@ -121,13 +121,6 @@ class Document:
 
         A map that nobody has named is called like its file, at each of its steps: what was undone can be
         redone after saving.
-
-        Raises
-        ------
-        ChangedError
-            When something else has changed the file since, or another file would be lost, unless `over`.
-        OutputError
-            When it cannot be written.
         """
         path = _with_suffix(path)
         if is_bundled(path):

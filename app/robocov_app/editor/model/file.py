@@ -40,13 +40,7 @@ class OnDisk:
 
 
 def opened(path: Path) -> tuple[Sketch, OnDisk]:
-    """Return the sketch in a map file, which may be a draft, and what the file was like.
-
-    Raises
-    ------
-    MapError
-        As `document.parse_sketch`, and when the file cannot be read.
-    """
+    """Return the sketch in a map file, which may be a draft, and what the file was like."""
     path = path.absolute()
     # the stamp of before: what changes while it is read is noticed at the next look
     stamp = _stamp(path)
@@ -67,13 +61,6 @@ def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: boo
         What the file was like when this program read or wrote it last; None if never.
     over : bool
         Replace whatever is there.
-
-    Raises
-    ------
-    ChangedError
-        When the file is not as it was before (or there is one, and nothing is known of it), unless `over`.
-    OutputError
-        When it cannot be written; a file that was there before is then untouched.
     """
     path = path.absolute()
     text = sketch_text(sketch).encode()

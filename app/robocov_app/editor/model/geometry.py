@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
-from shapely.geometry.polygon import LinearRing
 
 from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
@@ -40,16 +39,30 @@ def tenths(length: float) -> float:
 
 
 def ring_near(points: Array) -> Ring:
-    """Return (n, 2) points to the tenth of a millimetre.
-
-    Raises
-    ------
-    MapError
-        When one is farther away than maps reach, or is no number.
-    """
+    """Return (n, 2) points to the tenth of a millimetre; MapError where one is farther than maps reach."""
     if not np.all(np.abs(points) <= FARTHEST):  # nan is not near either
         raise MapError(f"that is too far away: maps reach {FARTHEST / 1000:.0f} km from their origin")
     return tuple([(x, y) for x, y in (np.round(points, DECIMALS) + 0.0).tolist()])
+
+
+def point_near(point: Point) -> Point:
+    """Return a point to the tenth of a millimetre, as `ring_near` does."""
+    return ring_near(np.array([point], dtype=float))[0]
+
+
+def distinct(ring: Iterable[Point], *, closed: bool = True) -> Ring:
+    """Return points without those that repeat the one before; of a closed ring the last is before the first.
+
+    >>> distinct([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 0.0)])
+    ((0.0, 0.0), (1.0, 0.0))
+    """
+    kept: list[Point] = []
+    for point in ring:
+        if not kept or point != kept[-1]:
+            kept.append(point)
+    if closed and len(kept) > 1 and kept[0] == kept[-1]:
+        kept.pop()
+    return tuple(kept)
 
 
 def nearest_on(starts: Array, ends: Array, point: Array) -> Array:
@@ -87,19 +100,14 @@ def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonOb
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
-    return tuple(
-        PolygonObstacle(
-            _ring(part.exterior), tuple(_ring(hole) for hole in part.interiors if not _is_crumb(hole)), name
-        )
-        for part in map(shapely.orient_polygons, parts)
-    )
-
-
-def _ring(ring: LinearRing) -> Ring:
-    return tuple(rounded(point) for point in ring.coords[:-1])
+    found = []
+    for part in map(shapely.orient_polygons, parts):
+        rings = [part.exterior, *(hole for hole in part.interiors if not _is_crumb(hole))]
+        outline, *holes = [tuple(map(rounded, ring.coords[:-1])) for ring in rings]
+        found.append(PolygonObstacle(outline, tuple(holes), name))
+    return tuple(found)
 
 
 def _is_crumb(part: BaseGeometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
-    # of what is empty these are no numbers
-    return not min(high_x - low_x, high_y - low_y) >= SMALLEST
+    return not min(high_x - low_x, high_y - low_y) >= SMALLEST  # of what is empty these are no numbers

@@ -1,39 +1,27 @@
-"""What lies under the cursor or in a box."""
+"""What lies under the cursor or in a box; what is locked or hidden is not there for the mouse."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import DiscStart, PointsStart
+from robocov.arrays import Array
+from robocov.environment import DiscStart, Point, PointsStart, StartSpec
 from robocov_app.editor.model.geometry import nearest_on
+from robocov_app.editor.model.selection import Edge, Selection, Vertex, ring_points, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
-    from robocov.arrays import Array
-    from robocov.environment import Point, StartSpec
-
-
-from robocov_app.editor.model.selection import Edge, Selection, Vertex, points_of, ring_points, rings_of
-
-
-def owner_at(sketch: Sketch, point: Point, reach: float) -> Owner | None:
-    """Return what is to be selected by a click; None if there is nothing within `reach` metres.
+def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
+    """Return all that a click could mean within `reach` metres, what it means first.
 
     A start's places, centre or rim come first, then the topmost obstacle that covers the point, a start's
     disc, the nearest obstacle, and the line of the boundary.
     """
-    return next(iter(owners_at(sketch, point, reach)), None)
-
-
-def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
-    """Return all that a click could mean, in the order of `owner_at`: to go down by clicking again."""
     found: list[Owner] = []
     discs: list[Owner] = []
     for name, spec in reversed(sketch.starts):
@@ -46,6 +34,7 @@ def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
         elif isinstance(spec, PointsStart) and any(math.dist(point, at) <= reach for at in spec.positions):
             found.append(name)
     near = np.sort(sketch.tree.query(_box_round(point, reach)))[::-1]
+    near = near[[not (sketch.obstacles[k].locked or sketch.obstacles[k].hidden) for k in near]]
     away = shapely.distance(sketch.geometries[near], shapely.Point(point))
     keys = [sketch.obstacles[k].key for k in near.tolist()]
     found += [key for key, distance in zip(keys, away.tolist(), strict=True) if distance == 0.0]
@@ -55,17 +44,6 @@ def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
     if sketch.boundary is not None and edge_at(sketch, point, reach, [BOUNDARY]) is not None:
         found.append(BOUNDARY)
     return tuple(found)
-
-
-def vertex_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Vertex | None:
-    """Return the nearest vertex of some things within `reach` metres; None if there is none."""
-    best, nearest = reach, None
-    for owner in _near(sketch, point, reach, owners):
-        for vertex, at in points_of(sketch, owner):
-            away = math.dist(point, at)
-            if away < best or (away <= best and nearest is None):
-                best, nearest = away, vertex
-    return nearest
 
 
 def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
@@ -96,15 +74,15 @@ def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Sele
     low, high = np.minimum(a, b), np.maximum(a, b)
     box = shapely.box(*low, *high)
     if touched:
-        places = np.sort(sketch.tree.query(box, predicate="intersects")).tolist()
+        places = sketch.tree.query(box, predicate="intersects")
     else:
         bounds = shapely.bounds(sketch.geometries).reshape(-1, 4)
-        inside = (bounds[:, :2] >= low).all(axis=1) & (bounds[:, 2:] <= high).all(axis=1)
-        places = np.flatnonzero(inside).tolist()
+        places = np.flatnonzero((bounds[:, :2] >= low).all(axis=1) & (bounds[:, 2:] <= high).all(axis=1))
+    items = [sketch.obstacles[k] for k in places.tolist()]
     starts = [name for name, spec in sketch.starts if _start_in_box(spec, low, high, box, touched=touched)]
     ring = np.array(sketch.boundary or (), dtype=float).reshape(-1, 2)
     return Selection(
-        frozenset(sketch.obstacles[k].key for k in places),
+        frozenset(item.key for item in items if not (item.locked or item.hidden)),
         starts=frozenset(starts),
         boundary=bool(len(ring) and (ring >= low).all() and (ring <= high).all()),
     )
@@ -124,9 +102,9 @@ def vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner])
 
 def _start_in_box(spec: StartSpec, low: Array, high: Array, box: BaseGeometry, *, touched: bool) -> bool:
     if isinstance(spec, DiscStart):
-        center = np.array(spec.center)
         if touched:
             return bool(shapely.distance(box, shapely.Point(spec.center)) <= spec.radius)
+        center = np.array(spec.center)
         return bool((center - spec.radius >= low).all() and (center + spec.radius <= high).all())
     if isinstance(spec, PointsStart) and spec.positions:
         inside = ((np.array(spec.positions) >= low) & (np.array(spec.positions) <= high)).all(axis=1)

@@ -1,18 +1,22 @@
-"""What is selected, and what lies under the cursor or in a box."""
+"""What is selected, the vertices of things, and the change that an edit makes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov.errors import MapError, one_line
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
-from robocov_app.viewer.session.map_edits import words_for
-
-if TYPE_CHECKING:
-    from robocov.environment import Obstacle, Point, StartSpec
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Obstacle,
+    Point,
+    PointsStart,
+    PolygonObstacle,
+    StartSpec,
+    WallObstacle,
+)
+from robocov.errors import MapError, counted, one_line
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_and_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +40,7 @@ class Vertex:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A place on an edge: from vertex `index` of a ring to the next.
-
-    Attributes
-    ----------
-    of, ring, index
-        As of a `Vertex`.
-    point : (x, y), m
-        The place on the edge.
-    """
+    """A place on an edge, `point` in m: from vertex `index` of a ring to the next."""
 
     of: Owner
     ring: int
@@ -75,13 +71,9 @@ class Selection:
 
     @classmethod
     def all(cls, sketch: Sketch) -> Selection:
-        """Return the selection of every obstacle, every start and the boundary."""
-        names = (name for name, _ in sketch.starts)
-        return cls(
-            frozenset(item.key for item in sketch.obstacles),
-            starts=frozenset(names),
-            boundary=sketch.boundary is not None,
-        )
+        """Return the selection of every obstacle that is not locked or hidden, every start, the boundary."""
+        free = [item.key for item in sketch.obstacles if not (item.locked or item.hidden)]
+        return replace(cls.of(*free, *dict(sketch.starts)), boundary=sketch.boundary is not None)
 
     @property
     def owners(self) -> frozenset[Owner]:
@@ -108,11 +100,10 @@ class Selection:
 
     def within(self, sketch: Sketch) -> Selection:
         """Return what of the selection there is in a sketch, as after undoing."""
-        names = {name for name, _ in sketch.starts}
         return Selection(
             self.items & sketch.places.keys(),
             frozenset(vertex for vertex in self.vertices if exists(sketch, vertex)),
-            self.starts & names,
+            self.starts & dict(sketch.starts).keys(),
             self.boundary and sketch.boundary is not None,
         )
 
@@ -120,38 +111,31 @@ class Selection:
         """Return the whole things of the selection, without single vertices."""
         return replace(self, vertices=frozenset())
 
+    def with_groups(self, sketch: Sketch) -> Selection:
+        """Return the selection with all members of each group that one of its obstacles is in."""
+        groups = {sketch.item(key).group for key in self.items} - {""}
+        if not groups:
+            return self
+        members = frozenset(item.key for item in sketch.obstacles if item.group in groups)
+        return replace(self, items=self.items | members)
+
     def words(self, sketch: Sketch) -> str:
         """Return what people call it: "wall “west”", "3 obstacles", "2 vertices"."""
-        counts = {
-            "obstacle": len(self.items),
-            "start": len(self.starts),
-            "boundary": int(self.boundary),
-            "vertex": len(self.vertices),
-        }
-        total = sum(counts.values())
-        ((kind, count), *others) = sorted(counts.items(), key=lambda pair: -pair[1])
-        if not total:
-            return "nothing"
-        if others[0][1]:
-            return f"{total} things"
-        if kind == "vertex":
-            return f"{count} vertices" if count > 1 else "vertex"
-        if count > 1:
-            return f"{count} {kind}s"
-        (owner,) = self.owners
-        return display_name(sketch, owner)
+        owners, vertices = self.owners, len(self.vertices)
+        if sum(map(bool, (self.items, self.starts, self.boundary, vertices))) > 1:
+            return f"{len(owners) + vertices} things"
+        if vertices:
+            return f"{vertices} vertices" if vertices > 1 else "vertex"
+        if len(owners) > 1:
+            return counted(len(owners), "obstacle" if self.items else "start")
+        return display_name(sketch, next(iter(owners))) if owners else "nothing"
 
 
 @dataclass(frozen=True)
 class Change:
     """What an edit makes: the sketch after it, what is selected then, and what people call it.
 
-    Attributes
-    ----------
-    sketch : Sketch
-    selection : Selection
-    words : str
-        In the past, as the status line says it and undo lists it: "3 obstacles moved".
+    The words are in the past, as the status line says it and undo lists it: "3 obstacles moved".
     """
 
     sketch: Sketch
@@ -163,26 +147,34 @@ def display_name(sketch: Sketch, owner: Owner) -> str:
     """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
     if owner == BOUNDARY:
         return "boundary"
-    return one_line(f"start “{owner}”" if isinstance(owner, str) else words_for(sketch.item(owner).shape))
+    return one_line(f"start “{owner}”" if isinstance(owner, str) else kind_and_name(sketch.item(owner).shape))
+
+
+def numbered_name(sketch: Sketch, owner: Owner) -> str:
+    """Return a name that tells things apart: obstacles without a name by their number, "wall 17"."""
+    name = display_name(sketch, owner)
+    if isinstance(owner, str) or owner == BOUNDARY or sketch.item(owner).shape.name:
+        return name
+    return f"{name} {sketch.places[owner] + 1}"
 
 
 def ring_points(sketch: Sketch, owner: Owner) -> tuple[tuple[Point, ...], ...]:
     """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
     if owner == BOUNDARY:
         return () if sketch.boundary is None else (sketch.boundary,)
-    held: Obstacle | StartSpec | None
+    thing: Obstacle | StartSpec | None
     if isinstance(owner, str):
-        held = dict(sketch.starts).get(owner)
+        thing = dict(sketch.starts).get(owner)
     else:
-        held = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(held, PolygonObstacle):
-        return (held.vertices, *held.holes)
-    if isinstance(held, WallObstacle):
-        return (held.points,)
-    if isinstance(held, PointsStart):
-        return (held.positions,)
-    if isinstance(held, CircleObstacle | DiscStart):
-        (x, y), r = held.center, held.radius
+        thing = sketch.item(owner).shape if owner in sketch.places else None
+    if isinstance(thing, PolygonObstacle):
+        return (thing.vertices, *thing.holes)
+    if isinstance(thing, WallObstacle):
+        return (thing.points,)
+    if isinstance(thing, PointsStart):
+        return (thing.positions,)
+    if isinstance(thing, CircleObstacle | DiscStart):
+        (x, y), r = thing.center, thing.radius
         return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
     return ()
 
@@ -211,10 +203,9 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], 
             items.append(item)
             continue
         for k, shape in enumerate(shapes[item.key]):
-            key = item.key if k == 0 else fresh
+            keys.append(item.key if k == 0 else fresh)
             fresh += k > 0
-            keys.append(key)
-            items.append(Item(key, shape, item.note))
+            items.append(replace(item, key=keys[-1], shape=shape))
     return Change(replace(sketch, obstacles=tuple(items)), Selection.of(*keys), words)
 
 
@@ -234,13 +225,7 @@ def exists(sketch: Sketch, vertex: Vertex) -> bool:
 
 
 def place_of(sketch: Sketch, vertex: Vertex) -> Point:
-    """Return where a vertex is, m.
-
-    Raises
-    ------
-    MapError
-        When there is none.
-    """
+    """Return where a vertex is, m; MapError when there is none."""
     if not exists(sketch, vertex):
         raise MapError("there is no such vertex any more")
     return ring_points(sketch, vertex.of)[vertex.ring][vertex.index]

@@ -1,7 +1,7 @@
-"""What is edited: a sketch of a map, valid or not, and the map document that holds it.
+"""A map in the making, valid or not.
 
-A sketch is a value: every edit makes another one, and what did not change is shared, so that
-remembering all of them costs little.
+A sketch is a value: every edit makes another one, and what did not change is shared, so that remembering all
+of them costs little.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from robocov.environment import (
     Obstacle,
     Point,
     PointsStart,
+    PolygonObstacle,
     Ring,
     StartSpec,
     WallObstacle,
 )
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
-from robocov_app.editor.model.annotations import annotated, taken_apart
+from robocov_app.editor.model.annotations import MARKS, annotated, taken_apart
 from robocov_app.editor.model.background import Background
 
 BOUNDARY: Final = -1
 """Stands for the boundary where obstacles have their keys."""
-
 
 Owner: TypeAlias = int | str
 """What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
@@ -53,20 +53,33 @@ class Item:
         As `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners.
     note : str
         What people wrote about it.
+    group : str
+        The name of the group that it is in; empty for none.
+    locked, hidden : bool
+        Not to be changed by the mouse, or not shown in the editor either; robots meet it all the same.
     """
 
     key: int
     shape: Obstacle
     note: str = ""
+    group: str = ""
+    locked: bool = False
+    hidden: bool = False
 
     @cached_property
     def geometry(self) -> BaseGeometry:
         """What it covers, as a valid shapely geometry, m: a line or a point where it covers nothing."""
         return geometry_of(self.shape)
 
+    @property
+    def marks(self) -> dict[str, Any]:
+        """What the editor keeps about it besides its shape."""
+        return {name: value for name in MARKS if (value := getattr(self, name))}
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived again."""
-        return {"key": self.key, "shape": replace(self.shape), "note": self.note}
+        marks = {name: getattr(self, name) for name in MARKS}
+        return {"key": self.key, "shape": replace(self.shape), **marks}
 
 
 @dataclass(frozen=True)
@@ -106,14 +119,13 @@ class Sketch:
     @classmethod
     def from_environment(cls, environment: Environment) -> Sketch:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        document = to_json(environment)
-        shapes = environment.obstacles
-        notes, background, extra = taken_apart(document.get("extra", {}), [shape.name for shape in shapes])
+        names = [shape.name for shape in environment.obstacles]
+        marks, background, extra = taken_apart(to_json(environment).get("extra", {}), names)
         return cls(
             name=environment.name,
             description=environment.description,
             boundary=environment.boundary,
-            obstacles=tuple(Item(k, shape, notes.get(k, "")) for k, shape in enumerate(shapes)),
+            obstacles=tuple(Item(k, s, **marks.get(k, {})) for k, s in enumerate(environment.obstacles)),
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
@@ -122,26 +134,19 @@ class Sketch:
         )
 
     def environment(self, where: str = "map") -> Environment:
-        """Return the map that can be simulated.
-
-        Raises
-        ------
-        MapError
-            When it breaks a rule, as `robocov.load_map` on the saved file would.
-        """
+        """Return the map that can be simulated; MapError when it breaks a rule, as of the saved file."""
         return from_json(draft_document(self), where)
 
     def unchecked(self) -> Environment:
         """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
-        names = [item.shape.name for item in self.obstacles]
-        notes = {place: item.note for place, item in enumerate(self.obstacles) if item.note}
+        marks = {place: item.marks for place, item in enumerate(self.obstacles) if item.marks}
         return Environment(
             name=self.name,
             boundary=self.boundary or (),
             obstacles=tuple(item.shape for item in self.obstacles),
             starts=dict(self.starts),
             description=self.description,
-            extra=annotated(self.extra, notes, names, self.background),
+            extra=annotated(self.extra, marks, [i.shape.name for i in self.obstacles], self.background),
             schema=self.schema,
             density=self.density,
         )
@@ -178,22 +183,15 @@ class Sketch:
 
     def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
-        key = self.fresh_key
-        items: list[Item] = []
-        for each in shapes:
-            shape, note = each if isinstance(each, tuple) else (each, "")
-            items.append(Item(key + len(items), shape, note))
+        pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
+        items = tuple(Item(k, shape, note) for k, (shape, note) in enumerate(pairs, self.fresh_key))
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
     def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
         """Return the sketch with other shapes for some keys; what stays equal stays the same object."""
-        items = tuple(
-            replace(item, shape=shapes[item.key])
-            if item.key in shapes and shapes[item.key] != item.shape
-            else item
-            for item in self.obstacles
-        )
-        return replace(self, obstacles=items)
+        changed = {key: shape for key, shape in shapes.items() if shape != self.item(key).shape}
+        items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
+        return replace(self, obstacles=tuple(items))
 
     def with_start(self, name: str, spec: StartSpec) -> Sketch:
         """Return the sketch with a start changed in its place, or added as the last."""
@@ -208,11 +206,6 @@ class Sketch:
         """Return the sketch with a name if nobody has given it one."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
         return replace(self, name=name) if self.name == Sketch.name and name else self
-
-    def renumbered(self) -> Sketch:
-        """Return the sketch with keys 0, 1, ...: as it comes back from a file."""
-        items = tuple(replace(item, key=key) for key, item in enumerate(self.obstacles))
-        return replace(self, obstacles=items)
 
     @property
     def bounds(self) -> tuple[float, float, float, float] | None:
@@ -241,8 +234,8 @@ class Sketch:
 def draft_document(sketch: Sketch) -> dict[str, Any]:
     """Return the map document of a sketch, whether it can be simulated or not.
 
-    `sketch_of` turns it into an equal sketch, keys aside. Of a sketch that breaks no rule it is the
-    document of its map; notes and the picture are under ``extra``.
+    `parser.sketch_of` turns it into an equal sketch, keys aside. Of a sketch that breaks no rule it is the
+    document of its map; what the editor keeps about obstacles, and the picture, are under ``extra``.
     """
     document = to_json(sketch.unchecked())
     if sketch.boundary is None:
@@ -255,6 +248,12 @@ def sketch_text(sketch: Sketch) -> str:
     return dump_document(draft_document(sketch))
 
 
+def kind_and_name(shape: Obstacle) -> str:
+    """Return what people call an obstacle: "wall", "polygon “desk”"."""
+    kind = {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(shape)]
+    return f"{kind} “{shape.name}”" if shape.name else kind
+
+
 def geometry_of(shape: Obstacle) -> BaseGeometry:
     """Return what an obstacle covers as a valid geometry, whatever the obstacle is like.
 
@@ -265,31 +264,17 @@ def geometry_of(shape: Obstacle) -> BaseGeometry:
             return GeometryCollection()
         return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
     points = shape.points if isinstance(shape, WallObstacle) else shape.vertices
-    if not _is_near(points):
+    if not _is_near(points) or not points:
         return GeometryCollection()
-    line = _line(points)
+    line = LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
     if isinstance(shape, WallObstacle):
         return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
     if len(points) < 3:
         return line
-    polygon = (
-        shape.polygon
-        if all(map(_is_ring, shape.holes))
-        else Polygon(points, list(filter(_is_ring, shape.holes)))
-    )
+    holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
+    polygon = shape.polygon if len(holes) == len(shape.holes) else Polygon(points, holes)
     return polygon if polygon.is_valid else shapely.make_valid(polygon)
 
 
 def _is_near(points: Iterable[Point]) -> bool:
     return all(abs(x) <= FARTHEST and abs(y) <= FARTHEST for x, y in points)
-
-
-def _is_ring(points: Ring) -> bool:
-    return len(points) >= 3 and _is_near(points)
-
-
-def _line(points: Ring) -> BaseGeometry:
-    """Return a line through points, or what is left of one."""
-    if not points:
-        return GeometryCollection()
-    return LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])

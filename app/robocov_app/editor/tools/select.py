@@ -58,13 +58,7 @@ class Drag:
         """Follow the mouse."""
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Take what was typed instead.
-
-        Raises
-        ------
-        MapError
-            When it means nothing.
-        """
+        """Take what was typed instead."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self) -> Preview:

@@ -198,13 +198,7 @@ class Tool:
         return False
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Take what was typed.
-
-        Raises
-        ------
-        MapError
-            When it means nothing.
-        """
+        """Take what was typed."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self, context: ToolContext) -> Preview | None:
