@@ -9,7 +9,7 @@ from robocov.controllers import Rapf
 from robocov.errors import ParameterError
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.terminal.condition_options import ConditionOptions
+from robocov_app.runs.options import ConditionOptions
 
 
 def test_nothing_said_is_no_conditions() -> None:

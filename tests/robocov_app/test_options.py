@@ -3,7 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov_app.terminal.options import RunOptions, parsed_gains
+from robocov_app.runs.options import RunOptions
+from robocov_app.terminal.arguments import parsed_gains
 
 
 def test_gains_are_json_values() -> None:
@@ -56,8 +57,7 @@ def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() 
     from robocov.simulation import DEFAULT_DT
     from robocov_app.commands.compare import Arguments as Compare
     from robocov_app.commands.run import Arguments as Run
-    from robocov_app.runs.run import team_of
 
     assert Run().controller == Compare().controllers[0] == FLAGSHIP
     assert RunOptions().dt == DEFAULT_DT
-    assert team_of(RunOptions()).to_dict() == Team.homogeneous(6).to_dict()
+    assert RunOptions().made_team().to_dict() == Team.homogeneous(6).to_dict()

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
-from robocov_app.terminal.options import RunOptions, parsed_gains
+from robocov_app.runs.options import RunOptions
+from robocov_app.terminal.arguments import parsed_gains
 
 if TYPE_CHECKING:
     from robocov_app.runs.run import Run
@@ -34,7 +35,6 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
     from robocov.compiled import compile_kernels
-    from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
     from robocov_app.runs.building import built_cost
@@ -46,15 +46,7 @@ def command(options: Arguments) -> int:
         save_comparison,
         save_comparison_moving,
     )
-    from robocov_app.runs.run import (
-        check_layers,
-        conditions_of,
-        evaluated,
-        save_numbers,
-        simulated,
-        starts_of,
-        team_of,
-    )
+    from robocov_app.runs.run import check_layers, saved_run
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
 
@@ -64,13 +56,9 @@ def command(options: Arguments) -> int:
     if len(set(names)) < len(names):
         raise ParameterError(f"--controllers: {' '.join(names)}: each once was wanted")
     gains = gains_for(names, parsed_gains(options.gains))
-    environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
-    for name, chosen in zip(names, gains, strict=True):
-        make_controller(name, chosen)
-    team_of(options)
-    conditions_of(options)
-    starts_of(environment, options)
+    environment = load_map(options.map)
+    specs = [options.spec(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)]
     check_layers(options)
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
     compile_kernels()
@@ -82,14 +70,8 @@ def command(options: Arguments) -> int:
         Interruption() as stop,
     ):
         begin_comparison(result.new, parts)
-        for name, chosen, part in zip(names, gains, parts, strict=True):
-            record = simulated(environment, name, chosen, options, stop)
-            record.save(result.new / part)
-            result.keep()  # what took long is safe, whatever happens to the evaluation
-            run = evaluated(record, cost, stop, quiet=options.json)
-            save_numbers(run, result.new / part, options.lattice)
-            result.keep()
-            runs[part] = run
+        for spec, part in zip(specs, parts, strict=True):
+            runs[part] = saved_run(spec, cost, result, part, options, stop)
             if stop.requested:
                 break
         save_comparison(runs, cost, result.new, options)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.terminal.condition_options import ConditionOptions
-from robocov_app.terminal.options import in_range, parsed_gains, parsed_size, robots_of
+from robocov_app.runs.options import ConditionOptions, robots_of
+from robocov_app.terminal.arguments import in_range, parsed_gains, parsed_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

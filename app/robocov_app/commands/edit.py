@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.terminal.options import in_range, parsed_size
+from robocov_app.terminal.arguments import in_range, parsed_size
 
 
 @dataclass

@@ -16,7 +16,7 @@ from robocov.errors import InputError, MapError, OutputError, ParameterError, co
 from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
-from robocov_app.terminal.options import in_range
+from robocov_app.terminal.arguments import in_range
 from robocov_app.terminal.progress import progress
 
 Job: TypeAlias = tuple[str, Callable[[], Environment]]

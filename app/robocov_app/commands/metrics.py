@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov_app.terminal.options import in_range
+from robocov_app.terminal.arguments import in_range
 
 if TYPE_CHECKING:
     from robocov_app.figures.metrics import Measured

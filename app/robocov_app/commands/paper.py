@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, counted
-from robocov_app.terminal.options import in_range
+from robocov_app.terminal.arguments import in_range
 
 if TYPE_CHECKING:
     from robocov_app.replication.figures import Shown

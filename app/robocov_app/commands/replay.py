@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, ParameterError, listed
-from robocov_app.terminal.options import RunOptions, parsed_size
+from robocov_app.runs.options import RunOptions
+from robocov_app.terminal.arguments import parsed_size
 
 if TYPE_CHECKING:
     from robocov_app.runs.run import Run

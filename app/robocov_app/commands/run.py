@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov_app.terminal.options import RunOptions, parsed_gains
+from robocov_app.runs.options import RunOptions
+from robocov_app.terminal.arguments import parsed_gains
 
 if TYPE_CHECKING:
     from robocov_app.runs.run import Run
@@ -32,43 +33,23 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
     from robocov.compiled import compile_kernels
-    from robocov.controllers import make_controller
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
     from robocov_app.runs.building import built_cost
     from robocov_app.runs.compare import folder_names
-    from robocov_app.runs.run import (
-        check_layers,
-        conditions_of,
-        evaluated,
-        save_numbers,
-        save_pictures,
-        save_run_moving,
-        simulated,
-        starts_of,
-        team_of,
-    )
+    from robocov_app.runs.run import check_layers, save_pictures, save_run_moving, saved_run
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
 
-    gains = parsed_gains(options.gains)
-    environment = load_map(options.map)
     # everything that the user gave is checked before a folder is made
-    make_controller(options.controller, gains)
-    team_of(options)
-    conditions_of(options)
-    starts_of(environment, options)
+    gains = parsed_gains(options.gains)
+    spec = options.spec(load_map(options.map), options.controller, gains)
     check_layers(options)
     compile_kernels()
-    cost = built_cost(environment, options.lattice, quiet=options.json)
+    cost = built_cost(spec.environment, options.lattice, quiet=options.json)
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as result, Interruption() as stop:
-        record = simulated(environment, options.controller, gains, options, stop)
-        record.save(result.new)
-        result.keep()  # what took long is safe, whatever happens to the evaluation
-        run = evaluated(record, cost, stop, quiet=options.json)
-        save_numbers(run, result.new, options.lattice)
-        result.keep()
+        run = saved_run(spec, cost, result, "", options, stop)
         save_pictures(run, cost, result.new, options)
         result.keep()
         save_run_moving(run, cost, result.new, options, stop)
@@ -76,8 +57,8 @@ def command(options: Arguments) -> int:
         print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, **run.summary})))
     else:
         print_summary(run)
-        stopped = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stop.requested else "saved in"
-        print(f"{stopped} {out}/: {listed(out)}{options.record_words}")
+        end = f"stopped at {run.record.time[-1]:.1f} s; what was done is in"
+        print(f"{end if stop.requested else 'saved in'} {out}/: {listed(out)}{options.record_words}")
     return INTERRUPTED if stop.requested else 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.terminal.options import in_range
+from robocov_app.terminal.arguments import in_range
 
 if TYPE_CHECKING:
     from robocov_app.sweep.rehearsal import Rehearsal

@@ -12,18 +12,18 @@ from robocov.errors import ParameterError, StartError, shown
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import close_pairs
-from robocov.record import Record, Recorder
+from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning.driving import driving_forces
 from robocov_app.learning.rewards import reference_distance, shares
 from robocov_app.learning.scenarios import Scenarios, map_of
+from robocov_app.runs.spec import RunSpec
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from robocov.arrays import Array, BoolArray
-    from robocov.conditions import Conditions
     from robocov.cost import CoverageCost, CoverageResult
     from robocov.environment import Environment
     from robocov.observation.region import Region
@@ -99,16 +99,23 @@ def drawn_episode(
     if conditions is not None:
         conditions = replace(conditions, seed=options.get("conditions_seed", chance))
     cost = scenarios.cost(environment)
+    spec = RunSpec(
+        environment,
+        team=task.whole_team,
+        start=start.name,
+        seed=seed,
+        duration=task.duration,
+        dt=task.dt,
+        conditions=conditions,
+        lattice=task.lattice,
+    )
     if "positions" in options:
         try:
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
             raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
-        return Episode(task, environment, cost, positions, conditions=conditions, place=place)
-    radius = float(task.whole_team.radius.max())
-    positions = start.sample(task.robots, seed=seed, radius=radius)
-    origin: dict[str, Any] = {"start": start.name, "seed": seed}
-    return Episode(task, environment, cost, positions, conditions=conditions, place=place, **origin)
+        spec = replace(spec, positions=positions, start=None, seed=None)
+    return Episode(task, spec, cost, place)
 
 
 class SharedSimulation:
@@ -186,18 +193,10 @@ class Episode:
     """
 
     def __init__(
-        self,
-        task: CoverageTask,
-        environment: Environment,
-        cost: CoverageCost,
-        positions: Array,
-        *,
-        conditions: Conditions | None = None,
-        start: str | None = None,
-        seed: int | None = None,
-        place: Place | None = None,
+        self, task: CoverageTask, spec: RunSpec, cost: CoverageCost, place: Place | None = None
     ) -> None:
-        self.task, self.team, self.environment = task, task.whole_team, environment
+        environment, positions = spec.environment, spec.starts
+        self.task, self.team, self.environment, self._spec = task, spec.team, environment, spec
         if len(positions) != len(self.team):
             raise StartError(
                 f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
@@ -208,15 +207,12 @@ class Episode:
             self.shared, run = place
         self._rows = slice(run * len(positions), (run + 1) * len(positions))
         if self.shared is None:
-            learner = Learner.of(task)
-            self.simulation = Simulation(
-                environment, learner, positions, self.team, task.dt, conditions=conditions
-            )
+            self.simulation = spec.simulation(Learner.of(task))
         else:
             self.simulation = self.shared.begin(run, positions)
         self.working = self.simulation.working[self._rows]
         self.cost, self._cost = cost, MomentaryCost(cost)
-        self._all_count = conditions is None and not environment.moves
+        self._all_count = spec.conditions is None and not environment.moves
         self._counted = self._cost.counted(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
@@ -228,7 +224,6 @@ class Episode:
         self.trail = [self.positions]
         self._rewarded = 0
         self._scans = self.simulation.observe().scans
-        self._start, self._seed = start, seed
         self._moments: list[Snapshot] = []
 
     @property
@@ -333,12 +328,7 @@ class Episode:
         """
         if not self.task.recording:
             raise ParameterError("record: a task with recording=True was wanted")
-        recorder = Recorder(
-            *(self.environment, self.team, self.simulation.controller, self.task.dt),
-            start=self._start,
-            seed=self._seed,
-            conditions=self.simulation.conditions,
-        )
+        recorder = self._spec.recorder(self.simulation.controller)
         for moment in (*self._moments, self.simulation.snapshot):
             recorder.add(moment)
         return recorder.record()

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     from robocov.cost import CoverageCost
     from robocov_app.figures.coverage import Moment
+    from robocov_app.runs.options import RunOptions
     from robocov_app.runs.panes import Shown
     from robocov_app.terminal.interruption import Interruption
-    from robocov_app.terminal.options import RunOptions
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 

@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.controllers import make_controller
 from robocov.cost import MomentaryCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
-from robocov.record import Record, Recorder
-from robocov.robots import Team
-from robocov.simulation import Simulation
+from robocov.record import Record
 from robocov_app.runs.building import FILM_LATTICE, built_cost, cost_for_pictures
+from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
 from robocov_app.terminal.progress import progress
@@ -27,14 +25,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from robocov.arrays import Array
-    from robocov.conditions import Conditions
     from robocov.cost import CoverageCost
-    from robocov.environment import Environment
+    from robocov.files.result_folder import ResultFolder
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
+    from robocov_app.runs.options import RunOptions
     from robocov_app.runs.panes import Shown
     from robocov_app.runs.recording import Frame
-    from robocov_app.terminal.options import RunOptions
 
 FILM_SCALE = 1.3
 """How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
@@ -44,9 +41,6 @@ FILM_HOLD = 1.0
 
 STOPPED_SAMPLES = 200
 """Samples of the coverage cost of a run that was stopped."""
-
-COST_RATE = 10.0
-"""Samples of the coverage cost per simulated second."""
 
 COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
 """The header of ``cost.csv``."""
@@ -66,60 +60,19 @@ class Run:
         return None if self.history.mean_time is None else float(self.history.mean_time[-1])
 
 
-def team_of(options: RunOptions) -> Team:
-    """Return the team that the options describe."""
-    return options.made_team()
-
-
-def conditions_of(options: RunOptions) -> Conditions | None:
-    """Return the conditions that the options describe; None where they are ideal."""
-    return options.conditions.conditions(options.seed, options.robots)
-
-
-def starts_of(environment: Environment, options: RunOptions) -> tuple[str, Array]:
-    """Return the name of the start and the positions drawn from it."""
-    start = environment.start(options.start)
-    radius = float(team_of(options).radius.max())  # room for the largest
-    return start.name, start.sample(options.robots, seed=options.seed, radius=radius)
-
-
-def simulated(
-    environment: Environment,
-    controller_name: str,
-    gains: Mapping[str, object],
-    options: RunOptions,
-    stop: Interruption,
-) -> Record:
-    """Simulate, and return the record up to the end or to Ctrl-C."""
-    controller = make_controller(controller_name, gains)
-    start, positions = starts_of(environment, options)
-    conditions = conditions_of(options)
-    simulation = Simulation(
-        environment, controller, positions, team_of(options), options.dt, conditions=conditions
-    )
-    recorder = Recorder(
-        environment,
-        simulation.team,
-        controller,
-        options.dt,
-        name=controller_name,
-        start=start,
-        seed=options.seed,
-        conditions=conditions,
-    )
-    total = round(options.duration / options.dt)
+def simulated(spec: RunSpec, every: int, stop: Interruption, *, quiet: bool) -> Record:
+    """Simulate, and return the record, of one step in `every`, up to the end or to Ctrl-C."""
+    simulation = spec.simulation()
     # what a user's controller prints must not get among the answer
-    chatter = redirect_stdout(sys.stderr) if options.json else nullcontext()
-    with chatter, progress(f"simulating {controller.label}", total, quiet=options.json) as update:
-        for step, snapshot in enumerate(simulation.snapshots(options.duration)):
-            last = step == total or stop.requested
-            if last or step % options.record_every == 0:
-                recorder.add(snapshot)
-            if last or step % 10 == 0:
+    chatter = redirect_stdout(sys.stderr) if quiet else nullcontext()
+    with chatter, progress(f"simulating {simulation.controller.label}", spec.steps, quiet=quiet) as update:
+
+        def watch(step: int) -> bool:
+            if step % 10 == 0 or step == spec.steps or stop.requested:
                 update(step)
-            if last:
-                break
-    return recorder.record()
+            return stop.requested
+
+        return spec.record(simulation, every=every, watch=watch)
 
 
 def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
@@ -142,6 +95,24 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
 
         history = cost_history(record, cost, rate, count)
     return Run(record, history, summarise(record, history))
+
+
+def saved_run(
+    spec: RunSpec,
+    cost: CoverageCost,
+    result: ResultFolder,
+    part: str,
+    options: RunOptions,
+    stop: Interruption,
+) -> Run:
+    """Simulate and evaluate a run, and save its numbers in a part of a folder."""
+    record = simulated(spec, options.record_every, stop, quiet=options.json)
+    record.save(result.new / part)
+    result.keep()  # what took long is safe, whatever happens to the evaluation
+    run = evaluated(record, cost, stop, quiet=options.json)
+    save_numbers(run, result.new / part, options.lattice)
+    result.keep()
+    return run
 
 
 def save_numbers(run: Run, folder: Path, lattice: int) -> None:

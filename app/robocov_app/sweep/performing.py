@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.controllers import make_controller
-from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.record import ARRAYS, Recorder, versions
-from robocov.simulation import Simulation
+from robocov.record import ARRAYS, versions
 from robocov_app.runs.run import cost_columns, cost_rows
+from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.circumstances import conditions_of
 from robocov_app.sweep.study import source_json, team_of
 from robocov_app.terminal.output import csv_text, finite
@@ -121,32 +119,32 @@ def failed(message: str, details: str) -> Outcome:
 
 def simulated(task: Task, environment: Environment) -> Record:
     """Simulate a run, and return the whole of it."""
-    with provided(task.source.modules if task.source else {}):
-        return _simulated(task, environment)
 
-
-def _simulated(task: Task, environment: Environment) -> Record:
-    controller = make_controller(task.controller, task.gains, source=task.source)
-    team = team_of(task.robots, task.team)
-    start = environment.start(task.start)
-    positions = start.sample(task.robots, seed=task.seed, radius=float(team.radius.max()))
-    conditions = conditions_of(task.team, task.seed, task.robots)
-    simulation = Simulation(environment, controller, positions, team, task.dt, conditions=conditions)
-    recorder = Recorder(
-        environment,
-        team,
-        controller,
-        task.dt,
-        name=task.controller,
-        start=task.start,
-        seed=task.seed,
-        conditions=conditions,
-    )
-    for step, snapshot in enumerate(simulation.snapshots(task.duration), start=1):
-        recorder.add(snapshot)
-        if step % _TIDY == 0:
+    def tidy(step: int) -> bool:
+        if step and step % _TIDY == 0:
             gc.collect(0)
-    return recorder.record()
+        return False
+
+    return spec_of(task, environment).record(watch=tidy)
+
+
+def spec_of(task: Task, environment: Environment) -> RunSpec:
+    """Return the run of a task on its map."""
+    return RunSpec(
+        environment,
+        task.controller,
+        task.gains,
+        task.source,
+        team_of(task.robots, task.team),
+        task.start,
+        task.seed,
+        duration=task.duration,
+        dt=task.dt,
+        conditions=conditions_of(task.team, task.seed, task.robots),
+        lattice=task.lattice,
+        cost_hz=task.cost_hz,
+        record_hz=task.record_hz,
+    )
 
 
 def prepared(task: Task) -> tuple[Environment, CoverageCost]:

@@ -16,9 +16,9 @@ from robocov.errors import InputError, ParameterError, place, shown, unknown_nam
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.simulation import DEFAULT_DT, check_dt
+from robocov_app.runs.options import MOST_ROWS
 from robocov_app.sweep.circumstances import GROUPS, TeamValue, condition_axes, conditions_of
 from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
-from robocov_app.terminal.options import MOST_ROWS
 
 if TYPE_CHECKING:
     from robocov.environment import Environment

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
-from robocov.errors import InputError
+from robocov.errors import InputError, ParameterError, shown
 
 T = TypeVar("T")
 
@@ -32,6 +33,11 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"^Missing from robocov \w+: (\S+).*$", r"\1: this option is required"),
     (r"^Unrecognized options: (.*)$", r"unknown option \1"),
 )
+
+
+_WORD = r"[A-Za-z][A-Za-z0-9_-]*"
+_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
+"""What a gain's value may look like where it is a word, and what looks so and is none."""
 
 
 def _choices(text: str) -> str:
@@ -84,3 +90,65 @@ def one_line(boxed: str) -> str:
             option = next((line.split()[0] for line in paragraph[1:] if line.startswith("--")), None)
             text += f": did you mean {option}?" if option else ""
     return text
+
+
+def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height from a text like ``1280x720``.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, or beyond the limits.
+    """
+    match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
+    if not match:
+        raise ParameterError(
+            f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
+        )
+    width, height = int(match[1]), int(match[2])
+    in_range(option, width, least[0], most[0], "pixels wide")
+    in_range(option, height, least[1], most[1], "pixels high")
+    return width, height
+
+
+def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Check the value of an option.
+
+    Raises
+    ------
+    ParameterError
+        When it is out of range.
+    """
+    if not low <= value <= high:
+        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
+
+
+def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
+
+    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
+    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
+
+    Raises
+    ------
+    ParameterError
+        When a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is given twice.
+    """
+    gains: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
+            raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
+        if name in gains:
+            raise ParameterError(f"--set: {name} is given twice")
+        if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
+            gains[name] = value
+            continue
+        try:
+            gains[name] = json.loads(value)
+        except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
+            raise ParameterError(
+                f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
+            ) from error
+    return gains

@@ -9,7 +9,7 @@ from called import SHORT, answer, complaint
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.terminal import options
+from robocov_app.runs import options
 
 
 def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

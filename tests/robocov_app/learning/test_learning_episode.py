@@ -17,15 +17,22 @@ from robocov_app.learning import CoverageTask, ObservationLayout
 from robocov_app.learning.episode import Episode, drawn_episode
 from robocov_app.learning.rewards import reference_distance
 from robocov_app.learning.scenarios import Scenarios
+from robocov_app.runs.spec import RunSpec
 
 STARTS = np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]])
 
 
 def begun(environment: Environment, positions: np.ndarray = STARTS, **changes: Any) -> Episode:
     task = CoverageTask(**{"maps": environment, "robots": len(positions), "lattice": 16, **changes})
-    return Episode(
-        task, environment, CoverageCost(environment, task.lattice), positions, conditions=task.conditions
+    spec = RunSpec(
+        environment,
+        team=task.whole_team,
+        positions=positions,
+        seed=None,
+        dt=task.dt,
+        conditions=task.conditions,
     )
+    return Episode(task, spec, CoverageCost(environment, task.lattice))
 
 
 def pushed(episode: Episode, cycles: int, seed: int = 0) -> list[np.ndarray]:

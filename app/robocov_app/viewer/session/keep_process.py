@@ -14,9 +14,9 @@ from robocov.errors import RobocovError
 from robocov.files.result_folder import ResultFolder, results
 from robocov_app.runs.building import built_cost
 from robocov_app.runs.compare import begin_comparison, folder_names, save_comparison
+from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import evaluated, save_numbers, save_pictures
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.options import RunOptions
 from robocov_app.toolkit.worker import own_streams, receive, send
 from robocov_app.viewer.session.kept import Job, Kept, Moments, NotKept, Retracing, records_of, remarks_on
 

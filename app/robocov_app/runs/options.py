@@ -1,21 +1,24 @@
-"""The options that `run` and `compare` share, and how their texts become values."""
+"""The options that `run` and `compare` share."""
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov.errors import ParameterError, shown
-from robocov_app.terminal.condition_options import ConditionOptions
+from robocov.errors import ParameterError
+from robocov_app.terminal.arguments import in_range, parsed_size
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from robocov.conditions import Conditions
+    from robocov.environment import Environment
     from robocov.robots import Team
+    from robocov_app.runs.spec import RunSpec
 
 MOST_ROWS = 2e7
 """Largest record, in moments times robots: about 2 GB."""
@@ -23,9 +26,63 @@ MOST_ROWS = 2e7
 USUAL_ROWS = 4e6
 """Largest record where its rate is left open: about 320 MB."""
 
-_WORD = r"[A-Za-z][A-Za-z0-9_-]*"
-_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
-"""What a gain's value may look like where it is a word, and what looks so and is none."""
+
+@dataclass
+class ConditionOptions:
+    """What goes wrong, or changes, during the run; the same for every controller."""
+
+    loss: float = 0.0
+    """Probability with which a message between two robots is lost."""
+    delay: float = 0.0
+    """Seconds that a message is on its way."""
+    message_rate: float | None = None
+    """Messages per second with which each robot tells where it is; at every step by default."""
+    forget_after: float = 3.0
+    """Seconds of silence after which a robot is taken to be gone."""
+    position_noise: float = 0.0
+    """Standard deviation in metres of what a robot takes its own position to be, in x and in y."""
+    sensing_noise: float = 0.0
+    """Standard deviation in metres of what the range sensor measures."""
+    failure_rate: float = 0.0
+    """Failures per second of each robot; 0.01 is a mean life of 100 s."""
+    fail: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROBOT@S ...")] = ()
+    """Robots that fail, and when: --fail 3@20 5@40. They stand still then, as obstacles."""
+    join: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROBOT@S[:X,Y] ...")] = ()
+    """Robots that join late, and when and where: --join 6@30:2.5,1; else at their start."""
+
+    def conditions(self, seed: int, robots: int) -> Conditions | None:
+        """Return the conditions for a team; None where they are ideal.
+
+        Raises
+        ------
+        ParameterError
+            When they cannot be.
+        """
+        if self == ConditionOptions():
+            return None
+        from robocov.conditions import Conditions, Failure, Join, parsed_entry
+
+        option = "--fail"
+        try:
+            failures = tuple(parsed_entry(Failure, text) for text in self.fail)
+            option = "--join"
+            joins = tuple(parsed_entry(Join, text) for text in self.join)
+        except ParameterError as error:
+            raise ParameterError(f"{option}: {error}") from None
+        conditions = Conditions(
+            loss=self.loss,
+            delay=self.delay,
+            message_rate=self.message_rate,
+            forget_after=self.forget_after,
+            position_noise=self.position_noise,
+            sensing_noise=self.sensing_noise,
+            failure_rate=self.failure_rate,
+            failures=failures,
+            joins=joins,
+            seed=seed,
+        )
+        conditions.check_team(robots)
+        return None if conditions.ideal else conditions
 
 
 @dataclass
@@ -129,10 +186,7 @@ class RunOptions:
     def made_team(self) -> Team:
         """Return the team that the options describe.
 
-        Raises
-        ------
-        InputError
-            When a value is out of range, or the team file cannot be read.
+        Raises InputError when a value is out of range, or the team file cannot be read.
         """
         from robocov.robots import Team
 
@@ -149,6 +203,26 @@ class RunOptions:
         from robocov.robots import read_team
 
         return read_team(self.team, said)
+
+    def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:
+        """Return what is to be run; raises InputError when it cannot be."""
+        from robocov_app.runs.spec import RunSpec
+
+        spec = RunSpec(
+            environment,
+            controller,
+            gains,
+            team=self.made_team(),
+            start=self.start,
+            seed=self.seed,
+            duration=self.duration,
+            dt=self.dt,
+            conditions=self.conditions.conditions(self.seed, self.robots),
+            lattice=self.lattice,
+            record_hz=self.record_hz,
+        )
+        spec.check()
+        return spec
 
     def picture_size(self) -> tuple[int, int] | None:
         """Return the size that was asked for (width, height), None when none was."""
@@ -170,65 +244,3 @@ def robots_of(team: Team, robots: int, default: int, path: Path) -> int:
     if robots not in (default, len(team)):
         raise ParameterError(f"--robots: {robots}, but the team of {path} has {len(team)}")
     return len(team)
-
-
-def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height from a text like ``1280x720``.
-
-    Raises
-    ------
-    ParameterError
-        When it is none, or beyond the limits.
-    """
-    match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
-    if not match:
-        raise ParameterError(
-            f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
-        )
-    width, height = int(match[1]), int(match[2])
-    in_range(option, width, least[0], most[0], "pixels wide")
-    in_range(option, height, least[1], most[1], "pixels high")
-    return width, height
-
-
-def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Check the value of an option.
-
-    Raises
-    ------
-    ParameterError
-        When it is out of range.
-    """
-    if not low <= value <= high:
-        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
-        raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
-
-
-def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
-
-    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
-    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
-
-    Raises
-    ------
-    ParameterError
-        When a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is given twice.
-    """
-    gains: dict[str, Any] = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
-            raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
-        if name in gains:
-            raise ParameterError(f"--set: {name} is given twice")
-        if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
-            gains[name] = value
-            continue
-        try:
-            gains[name] = json.loads(value)
-        except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
-            raise ParameterError(
-                f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
-            ) from error
-    return gains

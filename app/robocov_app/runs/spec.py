@@ -1,0 +1,147 @@
+"""What a run is, for whoever does it: the window, the command line, a sweep, learning, the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.controllers import Controller, make_controller
+from robocov.controllers.gains import Value
+from robocov.controllers.user_modules import Source, provided
+from robocov.environment import Environment
+from robocov.record import Record, Recorder
+from robocov.robots import Team
+from robocov.simulation import DEFAULT_DT, Simulation
+
+COST_RATE = 10.0
+"""Samples of the coverage cost per simulated second."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunSpec:
+    """One run: all that its result depends on; the only place that makes simulations and recorders of it.
+
+    Attributes
+    ----------
+    environment : Environment
+    controller : str
+        By name, or ``mine.py:MyController``.
+    gains : dict of name to value
+        Those that differ from their defaults.
+    source : Source or None
+        The file of a controller of one's own, where it may not be there.
+    team : Team
+    start : str or None
+        Named start of the map, its first by default; where `positions` are given, where they came from.
+    seed : int or None
+        Of the positions.
+    positions, velocities : (n, 2) m and m/s, or None
+        Given; by default drawn from the start, and at rest.
+    time : float, s
+        When it begins.
+    duration, dt : float, s
+        Dt is the control period.
+    conditions : Conditions or None
+        What goes wrong, and when robots fail and join.
+    lattice : int
+        Sites along a side, of the coverage cost.
+    cost_hz : float, Hz
+        Samples of it; 0: at the first moment and the last.
+    record_hz : float or None, Hz
+        Moments of the record that are kept; None for all.
+    """
+
+    environment: Environment
+    controller: str = "rapf"
+    gains: Mapping[str, Value] = field(default_factory=dict)
+    source: Source | None = None
+    team: Team = field(default_factory=lambda: Team.homogeneous(6))
+    start: str | None = None
+    seed: int | None = 0
+    positions: Array | None = None
+    velocities: Array | None = None
+    time: float = 0.0
+    duration: float = 60.0
+    dt: float = DEFAULT_DT
+    conditions: Conditions | None = None
+    lattice: int = 64
+    cost_hz: float = COST_RATE
+    record_hz: float | None = None
+
+    @property
+    def start_name(self) -> str | None:
+        """The name of the start; None for positions that came from nowhere."""
+        return self.start if self.positions is not None else self.environment.start(self.start).name
+
+    @cached_property
+    def starts(self) -> Array:
+        """Where the robots begin, (n, 2) m; raises StartError when there is no room for the team."""
+        if self.positions is not None:
+            return self.positions
+        radius = float(self.team.radius.max())  # room for the largest
+        return self.environment.start(self.start).sample(len(self.team), seed=self.seed or 0, radius=radius)
+
+    @property
+    def steps(self) -> int:
+        """Control periods of the whole run."""
+        return round(self.duration / self.dt)
+
+    def made_controller(self) -> Controller:
+        """Return the controller; raises ParameterError as `make_controller`."""
+        return make_controller(self.controller, self.gains, source=self.source)
+
+    def check(self) -> None:
+        """Raise what would be raised at the beginning: ParameterError, StartError."""
+        self.made_controller()
+        _ = self.starts
+
+    def simulation(self, controller: Controller | None = None) -> Simulation:
+        """Return the run at its beginning, by default under the controller that it names."""
+        return Simulation(
+            self.environment,
+            controller or self.made_controller(),
+            self.starts,
+            self.team,
+            self.dt,
+            velocities=self.velocities,
+            time=self.time,
+            conditions=self.conditions,
+        )
+
+    def recorder(self, controller: Controller, name: str | None = None) -> Recorder:
+        """Return what makes a record of the run; `name` is that of a controller that goes by another one."""
+        return Recorder(
+            self.environment,
+            self.team,
+            controller,
+            self.dt,
+            name=name,
+            start=self.start_name,
+            seed=self.seed,
+            conditions=self.conditions,
+        )
+
+    def record(
+        self,
+        simulation: Simulation | None = None,
+        *,
+        every: int = 1,
+        watch: Callable[[int], bool] = lambda step: False,
+    ) -> Record:
+        """Simulate, and return the record of one step in `every`, and of the last.
+
+        `watch` is told each step, and ends the run by saying True.
+        """
+        with provided(self.source.modules if self.source else {}):
+            simulation = simulation or self.simulation()
+            recorder = self.recorder(simulation.controller, self.controller)
+            for step, snapshot in enumerate(simulation.snapshots(self.duration)):
+                last = watch(step) or step == self.steps
+                if last or step % every == 0:
+                    recorder.add(snapshot)
+                if last:
+                    break
+            return recorder.record()
