@@ -115,12 +115,8 @@ def plot_result(
 ) -> Axes:
     """Plot the distance of every place to its nearest robot; see `robocov_app.figures.coverage`.
 
-    A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one.
-
-    Raises
-    ------
-    ParameterError
-        When the result does not know its map.
+    A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one. Raises
+    ParameterError when the result does not know its map.
     """
     from robocov.robots import Team
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
@@ -221,10 +217,7 @@ def record_png(record: Record) -> bytes:
 def _checked(axes: Any) -> Any:
     """Return axes on which a plot can be drawn, or None.
 
-    Raises
-    ------
-    ParameterError
-        When they are none, or several, or have other than two straight axes.
+    Raises ParameterError when they are none, or several, or have other than two straight axes.
     """
     from matplotlib.axes import Axes
 

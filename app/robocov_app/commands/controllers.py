@@ -67,13 +67,7 @@ def _told(gain: Gain | Option) -> dict[str, Any]:
         if isinstance(gain, Option)
         else {"low": gain.low, "high": gain.high, "nullable": gain.optional}
     )
-    return {
-        "name": gain.name,
-        "default": gain.default,
-        "unit": gain.unit,
-        **values,
-        "meaning": gain.meaning,
-    }
+    return {"name": gain.name, "default": gain.default, "unit": gain.unit, **values, "meaning": gain.meaning}
 
 
 def _span(gain: Gain | Option) -> str:

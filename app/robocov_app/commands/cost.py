@@ -103,10 +103,7 @@ def command(options: Arguments) -> None:
 def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
     """Return the speeds of so many robots, (n,) m/s, from one for all or one for each; None for none.
 
-    Raises
-    ------
-    ParameterError
-        When they are neither, or not positive.
+    Raises ParameterError when they are neither, or not positive.
     """
     if not given:
         return None
@@ -142,10 +139,7 @@ def draw(options: Arguments, environment: Environment, cost: CoverageCost, resul
 def read_positions(path: Path) -> Array:
     """Return the positions in a JSON file, (n, 2) m.
 
-    Raises
-    ------
-    InputError
-        When it is not a list of [x, y]; the message names file, place and value.
+    Raises InputError when it is not a list of [x, y]; the message names file, place and value.
     """
     try:
         content = json.loads(path.read_bytes())

@@ -87,10 +87,7 @@ def command(options: Arguments) -> int:
 def map_path(name: str) -> Path:
     """Return the file that is meant: a path, or that of a bundled map.
 
-    Raises
-    ------
-    MapError
-        For a name that is neither.
+    Raises MapError for a name that is neither.
     """
     from robocov.mapfile import bundled_maps, map_file
 

@@ -73,12 +73,7 @@ class Arguments:
 class _Gap(NamedTuple):
     """How far the end of a run is above the best.
 
-    Attributes
-    ----------
-    name : str
-    mean_distance : float, m
-    gap : float or None
-        None where the run covers other components than the best.
+    `mean_distance` in m. `gap`: None where the run covers other components than the best.
     """
 
     name: str

@@ -80,11 +80,7 @@ def command(options: Arguments) -> int:
     """Run the study and write all that comes of it."""
     from robocov_app.replication.asking import asked
     from robocov_app.replication.beyond import forecast_beyond, studied_beyond
-    from robocov_app.replication.beyond_writing import (
-        beyond_claims,
-        save_beyond_page,
-        save_beyond_pictures,
-    )
+    from robocov_app.replication.beyond_writing import beyond_claims, save_beyond_page, save_beyond_pictures
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.studying import (
         Means,

@@ -104,12 +104,8 @@ def _with_references(result: Result, options: Arguments) -> Result:
 def check_target(target: Path, *, overwrite: bool) -> None:
     """Make sure, before any work is done, that a page may be written there.
 
-    Raises
-    ------
-    InputError
-        When there is a file that is no report, and it is not to be overwritten.
-    OutputError
-        When there is no such folder, or something else than a file in its place.
+    Raises InputError when there is a file that is no report, and it is not to be overwritten; OutputError
+    when there is no such folder, or something else than a file in its place.
     """
     writable(target)
     if not target.parent.is_dir():

@@ -120,11 +120,7 @@ def _rehearse(options: Arguments, study: Study, out: Path) -> int:
         with Cluster(options.scheduler) as cluster:
             workers = max(1, cluster.threads)
     rehearsal = rehearsed(
-        study,
-        out,
-        workers=workers,
-        retry_failed=options.retry_failed,
-        keep_versions=options.keep_versions,
+        study, out, workers=workers, retry_failed=options.retry_failed, keep_versions=options.keep_versions
     )
     if options.json:
         print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))

@@ -31,19 +31,8 @@ def built_cost(
 ) -> CoverageCost:
     """Return the coverage cost of a map; how far it is gets told when that takes more than a second.
 
-    Parameters
-    ----------
-    environment : Environment
-    lattice : int
-    quiet : bool
-        Tell nothing.
-    geodesics : Geodesics or None
-        The shortest paths of this map, where they are known.
-
-    Raises
-    ------
-    ParameterError
-        As `CoverageCost`.
+    `quiet`: tell nothing. `geodesics`: the shortest paths of this map, where they are known. Raises
+    ParameterError as `CoverageCost`.
     """
     began = time.perf_counter()
     with ExitStack() as stack:

@@ -40,12 +40,8 @@ _TIMED = ("mean_time_s",)
 def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the gains of each controller out of those given for the comparison.
 
-    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone.
-
-    Raises
-    ------
-    ParameterError
-        When a gain belongs to none of the controllers.
+    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone. Raises
+    ParameterError when a gain belongs to none of the controllers.
     """
     known = {name: gains_of(controller_kind(name)) for name in names}
     chosen: list[dict[str, Any]] = [{} for _ in names]
@@ -144,11 +140,7 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
 
 
 def save_comparison_moving(
-    runs: Mapping[str, Run],
-    cost: CoverageCost | None,
-    folder: Path,
-    options: RunOptions,
-    stop: Interruption,
+    runs: Mapping[str, Run], cost: CoverageCost | None, folder: Path, options: RunOptions, stop: Interruption
 ) -> None:
     """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
     if not (options.frames or options.video):

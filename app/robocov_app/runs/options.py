@@ -53,10 +53,7 @@ class ConditionOptions:
     def conditions(self, seed: int, robots: int) -> Conditions | None:
         """Return the conditions for a team; None where they are ideal.
 
-        Raises
-        ------
-        ParameterError
-            When they cannot be.
+        Raises ParameterError when they cannot be.
         """
         if self == ConditionOptions():
             return None
@@ -236,10 +233,7 @@ class RunOptions:
 def robots_of(team: Team, robots: int, default: int, path: Path) -> int:
     """Return how many robots a team file has; the option --robots may say the same.
 
-    Raises
-    ------
-    ParameterError
-        When it says something else.
+    Raises ParameterError when it says something else.
     """
     if robots not in (default, len(team)):
         raise ParameterError(f"--robots: {robots}, but the team of {path} has {len(team)}")

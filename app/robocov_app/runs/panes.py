@@ -38,16 +38,8 @@ _NARROWEST = 360
 class PaneLayout:
     """How the panes share a film.
 
-    Attributes
-    ----------
-    columns : int
-    pane : (width, height), px
-    scale : float
-        Of text and lines.
-    header : (height, width, 3) RGB
-        The legend, as wide as the film.
-    size : (width, height), px
-        Of the film.
+    `pane`, `size`: (width, height) in px, of each and of the film. `scale`: of text and lines. `header`:
+    (height, width, 3) RGB, the legend, as wide as the film.
     """
 
     columns: int
@@ -59,14 +51,7 @@ class PaneLayout:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What panes show besides, or not, of what they usually do.
-
-    Attributes
-    ----------
-    also, without : names of layers
-    fields : Fields or None
-        See `iter_frames`.
-    """
+    """What panes show besides, or not, of what they usually do. `fields`: see `iter_frames`."""
 
     also: frozenset[str] = frozenset()
     without: frozenset[str] = frozenset()
@@ -82,16 +67,8 @@ def pane_layout(
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        Their first moments tell what the legend has to explain.
-    theme : {"light", "dark"}
-    colours : {"robots", "paper"}
-        See `iter_frames`.
-    size : (width, height) or None, px
-        Of the whole film; None for what suits the map, within `USUAL_SIZE`.
-    shown : Shown
+    `records`: their first moments tell what the legend has to explain. `colours`: see `iter_frames`. `size`,
+    (width, height) or None: of the whole film; None for what suits the map, within `USUAL_SIZE`.
     """
     count = len(records)
     aspect = max(_aspect(record.environment) for record in records)
@@ -132,14 +109,8 @@ def comparison_frames(
 ) -> Iterator[Frame]:
     """Draw the frames of several saved runs side by side.
 
-    Parameters
-    ----------
-    records, costs : sequences
-        What frames tell of each run's cost goes with its record, see `iter_frames`.
-    layout : PaneLayout
-    theme, colours, fps, speed, hold
-        See `iter_frames`.
-    shown : Shown
+    `records`, `costs`: what frames tell of each run's cost goes with its record, see `iter_frames`. `theme`,
+    `colours`, `fps`, `speed`, `hold`: see `iter_frames`.
     """
     films = [
         iter_frames(
@@ -178,21 +149,10 @@ def side_by_side(
 ) -> Iterator[Frame]:
     """Join the frames of several films of one size into frames that show them in rows.
 
-    Parameters
-    ----------
-    films : sequence of iterators of frames
-        Ends when all have ended; those that end before the others stay on their last frame.
-    columns : int or None
-        Films in a row; None puts all in one, where their widths may differ.
-    gap : int, px
-        Width of the line between two.
-    line, blank : colours
-        Of that line, and of what the last row leaves free.
-
-    Raises
-    ------
-    ParameterError
-        When a film has no frame.
+    `films`: ends when all have ended; those that end before the others stay on their last frame. `columns`:
+    films in a row; None puts all in one, where their widths may differ. `gap`, px: width of the line between
+    two. `line`, `blank`: of that line, and of what the last row leaves free. Raises ParameterError when a
+    film has no frame.
     """
     columns = columns or len(films)
     current: list[Frame | None] = [None] * len(films)

@@ -39,25 +39,9 @@ _NO_FRAMES = "frames: none were given, but at least one was wanted"
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
     """Return which row of a record each frame shows.
 
-    Parameters
-    ----------
-    time : (T,) s
-        Ascending.
-    fps : float
-        Frames per second of the film.
-    speed : float
-        Simulated seconds per second of the film.
-    hold : float, s
-        So long the film stays on the last row at its end.
-
-    Returns
-    -------
-    (m,) int
-
-    Raises
-    ------
-    ParameterError
-        When `fps` or `speed` is not positive.
+    `time`, (T,) s: ascending. `fps`: frames per second of the film. `speed`: simulated seconds per second of
+    the film. `hold`, s: so long the film stays on the last row at its end. Raises
+    ParameterError when `fps` or `speed` is not positive.
 
     Examples
     --------
@@ -95,35 +79,13 @@ def iter_frames(
 ) -> Iterator[Frame]:
     """Draw the frames of a saved run, one at a time.
 
-    Parameters
-    ----------
-    record : Record
-    size : (width, height), px
-    theme : {"light", "dark"}
-    fps, speed, hold
-        See `frame_rows`.
-    colours : {"robots", "paper"}
-        Trajectories in a hue for each robot, or all in the paper's red.
-    show : names of layers or None
-        None shows those that are shown by default.
-    also, without : names of layers
-        Changes to that.
-    fields : Fields or None
-        What layers of distances draw; without it they draw nothing.
-    layers : list of Layer or None
-        From the lowest to the topmost; None for `standard_layers`.
-    scale : float or None
-        Of text and lines; None for what suits the size.
-    cost : ((k,) s, (k,) m) or ((k,) s, (k,) m, (k,) s) or None
-        Times and mean distances, and where robots are not equally fast the mean times until the first is
-        there; each frame says the latest known. See `told_costs`.
-    rows : (m,) int or None
-        The rows to show, instead of those that `fps` and `speed` give.
-
-    Yields
-    ------
-    (height, width, 3) RGB
-        The array is the caller's own.
+    `size`: (width, height) in px. `fps`, `speed`, `hold`: see `frame_rows`. `colours`: a hue for each robot,
+    or all in the paper's red. `show`: None shows those that are shown by default. `also`, `without`: changes
+    to that. `fields`: what layers of distances draw; without it they draw nothing. `layers`: from the lowest
+    to the topmost; None for `standard_layers`. `scale`: of text and lines; None for what suits the size.
+    `cost`: times and mean distances, and where robots are not equally fast the mean times until the first is
+    there; each frame says the latest known. See `told_costs`. `rows`, (m,) int or None: the rows to show,
+    instead of those that `fps` and `speed` give. The arrays, (height, width, 3) RGB, are the caller's own.
     """
     from robocov_app.render.phi import mean_words
     from robocov_app.render.picture import Painter, standard_layers
@@ -179,16 +141,8 @@ def png_bytes(frame: Frame) -> bytes:
 def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
     """Write frames as ``000000.png``, ``000001.png``, ... and hand each on once it is written.
 
-    Parameters
-    ----------
-    folder : path
-        Created when it is not there.
-    frames : iterable of (height, width, 3) RGB
-
-    Raises
-    ------
-    OutputError
-        When the folder cannot be written. Frames already written stay; each one is whole.
+    `folder`: created when it is not there. Raises OutputError when the folder cannot be written. Frames
+    already written stay; each one is whole.
     """
     folder = Path(folder)
     try:
@@ -202,27 +156,12 @@ def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
 
 
 def save_frames(
-    folder: Path | str,
-    frames: Iterable[Frame],
-    *,
-    total: int | None = None,
-    progress: Progress | None = None,
+    folder: Path | str, frames: Iterable[Frame], *, total: int | None = None, progress: Progress | None = None
 ) -> int:
     """Write frames as `kept_frames` does, and return how many.
 
-    Parameters
-    ----------
-    folder : path
-    frames : iterable of (height, width, 3) RGB
-    total : int or None
-        Number of frames where it is known, for `progress`.
-    progress : callable or None
-        Called with (done, total) after each frame.
-
-    Raises
-    ------
-    OutputError
-        When the folder cannot be written.
+    `total`: number of frames where it is known, for `progress`. `progress`: called with (done, total) after
+    each frame. Raises OutputError when the folder cannot be written.
     """
     done = 0
     for done, _ in enumerate(kept_frames(folder, frames), start=1):
@@ -241,27 +180,12 @@ def save_film(
 ) -> int:
     """Write frames as an MP4 film (H.264, yuv420p: what browsers and slides play); return how many.
 
-    The film is made under another name in the same folder and gets its own at the end: after an
-    error or Ctrl-C there is no half film, and an older one of that name is still there.
-
-    Parameters
-    ----------
-    path : path
-        Its folder is created when it is not there.
-    frames : iterable of (height, width, 3) RGB
-        All of one size. H.264 wants even sizes: an odd one gets its last row or column twice.
-    fps : float
-    total : int or None
-        Number of frames where it is known, for `progress`.
-    progress : callable or None
-        Called with (done, total) after each frame.
-
-    Raises
-    ------
-    OutputError
-        When the encoder is missing or fails, or the film cannot be written.
-    ParameterError
-        When there are no frames, or frames of different sizes.
+    The film is made under another name in the same folder and gets its own at the end: after an error or
+    Ctrl-C there is no half film, and an older one of that name is still there. `path`: its folder is created
+    when it is not there. `frames`: all of one size. H.264 wants even sizes: an odd one gets its last row or
+    column twice. `total`: number of frames where it is known, for `progress`. `progress`: called with (done,
+    total) after each frame. Raises OutputError when the encoder is missing or fails, or the film cannot be
+    written; ParameterError when there are no frames, or frames of different sizes.
     """
     path = Path(path)
     source = iter(frames)
@@ -330,12 +254,8 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
     """Return the encoder's command: raw RGB frames of an even size come in, an MP4 film goes to `path`.
 
-    A `streamed` film can be played up to where it has come, whatever happens to the encoder.
-
-    Raises
-    ------
-    OutputError
-        When there is no encoder.
+    A `streamed` film can be played up to where it has come, whatever happens to the encoder. Raises
+    OutputError when there is no encoder.
     """
     flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
     return [

@@ -275,10 +275,7 @@ def save_run_moving(
 def check_layers(options: RunOptions) -> None:
     """Make sure, before anything is simulated, that films can show what is wanted.
 
-    Raises
-    ------
-    ParameterError
-        When there is no such layer.
+    Raises ParameterError when there is no such layer.
     """
     if options.show or options.hide:
         from robocov_app.render.picture import checked_layers

@@ -23,12 +23,8 @@ if TYPE_CHECKING:
 class ComparisonDocument(Document):
     """The content of ``comparison.json``.
 
-    Attributes
-    ----------
-    folders : list of str
-        Of the runs, in that of the comparison.
-    runs : list of dict
-        Their figures; none as long as the comparison goes on.
+    `folders`: of the runs, in that of the comparison. `runs`: their figures; none as long as the comparison
+    goes on.
     """
 
     folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), wanted("the name of a folder")]]
@@ -36,15 +32,7 @@ class ComparisonDocument(Document):
 
 
 class Saved(NamedTuple):
-    """A run that was saved.
-
-    Attributes
-    ----------
-    folder : Path
-    record : Record
-    history : CostHistory or None
-        What is in ``cost.csv``, if it is there.
-    """
+    """A run that was saved. `history`: what is in ``cost.csv``, if it is there."""
 
     folder: Path
     record: Record
@@ -54,13 +42,8 @@ class Saved(NamedTuple):
 class Roster(NamedTuple):
     """Who is who in a record.
 
-    Attributes
-    ----------
-    environment : Environment
-        The map without robots that failed.
-    numbers : (n,) int
-        What people called the robots, row by row.
-    failed : dict of number to (x, y) m
+    `environment`: the map without robots that failed. `numbers`, (n,) int: what people called the robots, row
+    by row. `failed`: where, by number, m.
     """
 
     environment: Environment
@@ -71,10 +54,7 @@ class Roster(NamedTuple):
 def load_saved(path: Path) -> list[Saved]:
     """Return the runs of a comparison, or a single run, by the folder or the JSON file in it.
 
-    Raises
-    ------
-    InputError
-        When there is none, or something of it cannot be read; the message names the file.
+    Raises InputError when there is none, or something of it cannot be read; the message names the file.
     """
     folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
     settle(folder)

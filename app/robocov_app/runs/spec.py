@@ -24,34 +24,13 @@ COST_RATE = 10.0
 class RunSpec:
     """One run: all that its result depends on; the only place that makes simulations and recorders of it.
 
-    Attributes
-    ----------
-    environment : Environment
-    controller : str
-        By name, or ``mine.py:MyController``.
-    gains : dict of name to value
-        Those that differ from their defaults.
-    source : Source or None
-        The file of a controller of one's own, where it may not be there.
-    team : Team
-    start : str or None
-        Named start of the map, its first by default; where `positions` are given, where they came from.
-    seed : int or None
-        Of the positions.
-    positions, velocities : (n, 2) m and m/s, or None
-        Given; by default drawn from the start, and at rest.
-    time : float, s
-        When it begins.
-    duration, dt : float, s
-        Dt is the control period.
-    conditions : Conditions or None
-        What goes wrong, and when robots fail and join.
-    lattice : int
-        Sites along a side, of the coverage cost.
-    cost_hz : float, Hz
-        Samples of it; 0: at the first moment and the last.
-    record_hz : float or None, Hz
-        Moments of the record that are kept; None for all.
+    `controller`: by name, or ``mine.py:MyController``. `gains`: those that differ from their defaults.
+    `source`: the file of a controller of one's own, where it may not be there. `start`: named start of the
+    map, its first by default; where `positions` are given, where they came from. `seed`: of the positions.
+    `positions`, `velocities`, (n, 2) m and m/s: given; by default drawn from the start, and at rest. `time`,
+    s: when it begins. `duration`, `dt`, s: dt is the control period. `conditions`: what goes wrong, and when
+    robots fail and join. `lattice`: sites along a side, of the coverage cost. `cost_hz`, Hz: samples of it;
+    0: at the first moment and the last. `record_hz`, Hz: moments of the record that are kept; None for all.
     """
 
     environment: Environment

@@ -68,16 +68,8 @@ def _group_text(group: Mapping[str, Any]) -> str:
 def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str, list[TeamValue]]:
     """Return the values of each condition that is given.
 
-    Parameters
-    ----------
-    given : dict of name to value, or list of values
-    robots : sequence of int
-        The sizes of teams.
-
-    Raises
-    ------
-    ParameterError
-        On an unknown name, or a value that cannot be used; the message begins with its place.
+    `robots`: the sizes of teams. Raises ParameterError on an unknown name, or a value that cannot be used;
+    the message begins with its place.
     """
     axes: dict[str, list[TeamValue]] = {}
     for name, values in given.items():
@@ -98,10 +90,7 @@ def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str,
 def conditions_of(circumstances: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
     """Return the conditions among what a study varies; None where they are ideal.
 
-    Raises
-    ------
-    ParameterError
-        When they cannot be for so many robots.
+    Raises ParameterError when they cannot be for so many robots.
     """
     values: dict[str, Any] = {name: circumstances[name] for name in LIMITS if name in circumstances}
     conditions = Conditions(

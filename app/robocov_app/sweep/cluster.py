@@ -33,15 +33,8 @@ _LOOK = 2.0
 class Cluster(Crew):
     """The workers of a Dask cluster; they need robocov, and no disk that is shared.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler: ``tcp://host:8786``.
-
-    Raises
-    ------
-    InputError
-        When Dask is not installed, or nobody answers at the address.
+    `address`: of the scheduler: ``tcp://host:8786``. Raises InputError when Dask is not installed, or nobody
+    answers at the address.
     """
 
     def __init__(self, address: str) -> None:
@@ -126,10 +119,7 @@ class Cluster(Crew):
 def _require_answer(address: str) -> None:
     """Greet a scheduler as Dask's own client does, which would wait for an answer for ever.
 
-    Raises
-    ------
-    OSError, ValueError, TimeoutError
-        When nobody answers there in time.
+    Raises OSError, ValueError, TimeoutError when nobody answers there in time.
     """
     import distributed
     from distributed import comm

@@ -22,13 +22,8 @@ _IN_A_ROW = 20
 class Lost(NamedTuple):
     """A worker has ended in the midst of a task.
 
-    Attributes
-    ----------
-    cause : str
-        One line.
-    details : str
-    blamed : bool
-        Whether it is certain that it was this task, and nothing else, that made the worker end.
+    `cause`: one line. `blamed`: whether it is certain that it was this task, and nothing else, that made the
+    worker end.
     """
 
     cause: str
@@ -43,13 +38,9 @@ class Crew(ABC):
     """Does tasks; a context, whose end stops what is going on.
 
     A task whose worker has ended is done again. Where it is not certain that the task is to blame (another
-    one may have taken all the memory), it is done alone, with nothing else going on. When workers have
-    ended twice through it, it has failed. When workers end again and again, whatever they do, all ends.
-
-    Attributes
-    ----------
-    lost : int
-        How many workers have ended in the midst of a task.
+    one may have taken all the memory), it is done alone, with nothing else going on. When workers have ended
+    twice through it, it has failed. When workers end again and again, whatever they do, all ends. `lost`: how
+    many workers have ended in the midst of a task.
     """
 
     def __init__(self) -> None:
@@ -102,10 +93,7 @@ class Crew(ABC):
     def next(self, timeout: float) -> tuple[Task, Outcome] | None:
         """Return a task that has come back, in any order; None where none does for so many seconds.
 
-        Raises
-        ------
-        OutputError
-            When nobody can do tasks any more, or workers end again and again.
+        Raises OutputError when nobody can do tasks any more, or workers end again and again.
         """
         self._feed()
         back = self._returned(timeout)

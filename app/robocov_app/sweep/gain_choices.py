@@ -40,12 +40,7 @@ Place: TypeAlias = tuple[str | int, ...]
 class Range:
     """A range of a gain that is to be sampled, both ends included.
 
-    Attributes
-    ----------
-    low, high : float
-        In the gain's unit.
-    scale : "linear" or "log"
-        What is sampled evenly: the value, or its logarithm.
+    `low`, `high`: in the gain's unit. `scale`: what is sampled evenly: the value, or its logarithm.
     """
 
     low: float
@@ -66,20 +61,9 @@ class Range:
 class Sampling:
     """How ranges are sampled: all ranges of a controller together.
 
-    Controllers with the same ranges get the same samples. The first samples of a Sobol or a Halton
-    sequence stay the same when there are more of them.
-
-    Attributes
-    ----------
-    method : "sobol", "latin-hypercube" or "halton"
-        Of `scipy.stats.qmc`, scrambled.
-    samples : int
-    seed : int
-
-    Raises
-    ------
-    ParameterError
-        On another method, or a number out of range.
+    Controllers with the same ranges get the same samples. The first samples of a Sobol or a Halton sequence
+    stay the same when there are more of them. `method`: of `scipy.stats.qmc`, scrambled. Raises
+    ParameterError on another method, or a number out of range.
     """
 
     method: Method = "sobol"
@@ -117,12 +101,8 @@ Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
 class Gains:
     """The gains of one controller in a study.
 
-    Attributes
-    ----------
-    choices : tuple of dict
-        One for each set of gains that is tried, with a value for every gain of the controller.
-    ranges : dict of name to Range
-        Those that were sampled.
+    `choices`: one for each set of gains that is tried, with a value for every gain of the controller.
+    `ranges`: those that were sampled.
     """
 
     choices: tuple[Choice, ...]
@@ -132,24 +112,12 @@ class Gains:
     def of(cls, kind: type[Any], wanted: Wanted, sampling: Sampling | None, path: Place = ()) -> Gains:
         """Return what is tried of a controller.
 
-        Parameters
-        ----------
-        kind : class
-            Of the controller.
-        wanted : Gains, dict or sequence of dict
-            Either each set of gains by itself, as dicts of name to value; or one dict of name to a value,
-            a list of values (every combination of them is tried), or a `Range`. What is not
-            given has its default.
-        sampling : Sampling or None
-            How ranges are sampled; for each combination of the lists, the same samples.
-        path : tuple
-            What messages call the place.
-
-        Raises
-        ------
-        ParameterError
-            On an unknown gain (with the nearest name), a value out of range, a value given twice, or a
-            range without a way to sample it; the message begins with the place.
+        `kind`: of the controller. `wanted`: either each set of gains by itself, as dicts of name to value; or
+        one dict of name to a value, a list of values (every combination of them is tried), or a `Range`. What
+        is not given has its default. `sampling`: how ranges are sampled; for each combination of the lists,
+        the same samples. `path`: what messages call the place. Raises ParameterError on an unknown gain (with
+        the nearest name), a value out of range, a value given twice, or a range without a way to sample it;
+        the message begins with the place.
         """
         if isinstance(wanted, Gains):
             return cls(cls.of(kind, wanted.choices, None, path).choices, wanted.ranges)
@@ -251,10 +219,7 @@ def _at(path: Place, check: Callable[[], T]) -> T:
 def once(values: Sequence[object], path: Place) -> None:
     """Check that nothing is given twice.
 
-    Raises
-    ------
-    ParameterError
-        The message names the second place, and the first.
+    Raises ParameterError; the message names the second place, and the first.
     """
     seen: dict[object, int] = {}
     for k, value in enumerate(values):
@@ -267,12 +232,6 @@ def once(values: Sequence[object], path: Place) -> None:
 
 
 def whole(at: str, value: object, low: int, high: int) -> None:
-    """Check that a value is a whole number in range.
-
-    Raises
-    ------
-    ParameterError
-        The message begins with `at`.
-    """
+    """Check that a value is a whole number in range. Raises ParameterError; the message begins with `at`."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise ParameterError(f"{at}: {shown(value)}, but a whole number from {low} to {high} was wanted")

@@ -50,15 +50,8 @@ _NAMED = 5
 class Entry(NamedTuple):
     """What the table holds of a run that is there.
 
-    Attributes
-    ----------
-    figures : dict of name to value
-        Empty where it failed.
-    error : str or None
-    versions : dict of name to str
-        Of what it was made with; empty where that is not known.
-    checked : bool
-        Whether it has check sums: those of version 1 have none.
+    `figures`: empty where it failed. `versions`: of what it was made with; empty where that is not known.
+    `checked`: whether it has check sums: those of version 1 have none.
     """
 
     figures: Mapping[str, float | int | None]
@@ -75,18 +68,10 @@ class Damaged(Exception):  # noqa: N818 - it is handled
 class Survey:
     """Inventory of a study's runs: finished, failed, and still to do.
 
-    Attributes
-    ----------
-    todo : bytearray
-        1 for each task that is to be done, in their order.
-    damaged : list of str
-        Names of runs that are done again because their files are not as they were written.
-    outdated : Counter
-        How many runs were made with other versions than those here, by how these differ.
-    unchecked : int
-        Runs without check sums, kept by an earlier version.
-    failed : int
-        Runs that have failed and are not to be done again.
+    `todo`: 1 for each task that is to be done, in their order. `damaged`: names of runs that are done again
+    because their files are not as they were written. `outdated`: how many runs were made with other versions
+    than those here, by how these differ. `unchecked`: runs without check sums, kept by an earlier version.
+    `failed`: runs that have failed and are not to be done again.
     """
 
     todo: bytearray = field(default_factory=bytearray)
@@ -133,13 +118,8 @@ class Ledger:
     ) -> Survey:
         """Check all files of all runs; return which are to be done, and why again.
 
-        Parameters
-        ----------
-        tasks : iterable of Task
-        retry_failed : bool
-            Do runs again that have failed.
-        keep_versions : bool
-            Use runs that were made with other versions of robocov or what it computes with.
+        `retry_failed`: do runs again that have failed. `keep_versions`: use runs that were made with other
+        versions of robocov or what it computes with.
         """
         found = Survey()
         for task in tasks:
@@ -162,9 +142,7 @@ class Ledger:
     def _entry(self, task: Task, *, files: bool = False) -> Entry | None:
         """Return what came of a task, None where nothing is there; with `files`, all its files are checked.
 
-        Raises
-        ------
-        Damaged
+        Raises Damaged.
         """
         folder = self._runs / task.name
         if not os.path.lexists(folder):
@@ -195,10 +173,7 @@ class Ledger:
     def keep(self, task: Task, outcome: Outcome) -> Entry:
         """Write the folder of a run, in the place of an earlier one, and return its entry.
 
-        Raises
-        ------
-        OutputError
-            When it cannot be written; nothing is left of it then.
+        Raises OutputError when it cannot be written; nothing is left of it then.
         """
         target = self._runs / task.name
         part = self._runs / f".{task.name}.part"
@@ -245,19 +220,9 @@ def difference_of(versions: Mapping[str, str]) -> str:
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     """Give the ledger of a sweep, for one process at a time; the folder is made where it is missing.
 
-    Parameters
-    ----------
-    folder : Path
-    study : dict
-        The content of ``study.json``; that of an earlier study is replaced, unless its tables are whole: then
-        it is replaced with them, by `Table`.
-
-    Raises
-    ------
-    InputError
-        When the folder holds something else than a sweep.
-    OutputError
-        When it cannot be made or written to, or another process is at work in it.
+    `study`: the content of ``study.json``; that of an earlier study is replaced, unless its tables are whole:
+    then it is replaced with them, by `Table`. Raises InputError when the folder holds something else than a
+    sweep; OutputError when it cannot be made or written to, or another process is at work in it.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -67,16 +67,8 @@ def made_with() -> dict[str, str]:
 class Outcome:
     """What came of a task.
 
-    Attributes
-    ----------
-    files : dict of name to bytes
-        What belongs into the run's folder.
-    figures : dict of name to value
-        What the table holds of the run, empty where it failed.
-    error : str or None
-        Why it failed, one line.
-    versions : dict of name to str
-        Of what it was made with.
+    `files`: what belongs into the run's folder. `figures`: what the table holds of the run, empty where it
+    failed. `error`: why it failed, one line. `versions`: of what it was made with.
     """
 
     files: Mapping[str, bytes]

@@ -36,10 +36,6 @@ class LocalPool(Crew):
 
     A process that ends is replaced. If it was ended from outside, there may have been too little memory for
     all of them.
-
-    Parameters
-    ----------
-    workers : int
     """
 
     def __init__(self, workers: int) -> None:

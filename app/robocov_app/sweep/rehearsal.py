@@ -21,26 +21,11 @@ if TYPE_CHECKING:
 class Rehearsal:
     """What a sweep would take.
 
-    Attributes
-    ----------
-    runs : int
-    left : int
-        Those that are not done yet.
-    axes : dict of name to int
-        How many values there are of each thing that the study varies; their product is `runs` where all maps
-        have as many starts, and all controllers as many gains.
-    run : str
-        Name of the run that was done.
-    error : str or None
-        Why that failed.
-    seconds_a_run : float, s
-    bytes_a_run : int
-    seconds : float, s
-        For all that are left, on so many workers.
-    bytes : int
-        For all runs together.
-    notes : list of str
-        What of that which is there is done again, and why.
+    `left`: those that are not done yet. `axes`: how many values there are of each thing that the study
+    varies; their product is `runs` where all maps have as many starts, and all controllers as many gains.
+    `run`: name of the run that was done. `error`: why that failed. `seconds_a_run` in s. `seconds`, s: for
+    all that are left, on so many workers. `bytes`: for all runs together. `notes`: what of that which is
+    there is done again, and why.
     """
 
     runs: int
@@ -65,15 +50,8 @@ def rehearsed(
 ) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path or None
-        Where runs may be that are done already.
-    workers : int
-        On which the time is estimated.
-    retry_failed, keep_versions : bool
-        As of a sweep.
+    `folder`: where runs may be that are done already. `workers`: on which the time is estimated.
+    `retry_failed`, `keep_versions`: as of a sweep.
     """
     survey = Survey(bytearray(b"\x01") * len(study))
     if folder is not None:

@@ -45,14 +45,7 @@ Swept: TypeAlias = float | Sequence[float | None] | None
 
 @dataclass(frozen=True)
 class StudyMap:
-    """A map of a study.
-
-    Attributes
-    ----------
-    name : str
-        What the table calls it.
-    environment : Environment
-    """
+    """A map of a study. `name`: what the table calls it."""
 
     name: str
     environment: Environment

@@ -157,10 +157,8 @@ _WANTED: dict[tuple[str, ...], tuple[str, ...]] = {
 def read_study(path: Path | str) -> Study:
     """Return the study in a TOML file.
 
-    Raises
-    ------
-    InputError
-        One line: the file, the key, the value and what was wanted; of unknown keys the nearest known one.
+    Raises InputError in one line: the file, the key, the value and what was wanted; of unknown keys the
+    nearest known one.
     """
     path = Path(path)
     where = one_line(path)
@@ -170,18 +168,8 @@ def read_study(path: Path | str) -> Study:
 def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
     """Return the study that a parsed file describes.
 
-    Parameters
-    ----------
-    document : dict
-    folder : Path
-        Where relative paths of maps and controllers begin.
-    where : str
-        What messages call the file.
-
-    Raises
-    ------
-    InputError
-        As `read_study`.
+    `folder`: where relative paths of maps and controllers begin. `where`: what messages call the file. Raises
+    InputError as `read_study`.
     """
     try:
         model = StudyModel.model_validate(document)

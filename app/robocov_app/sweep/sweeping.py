@@ -41,24 +41,12 @@ _ERRORS = 3
 class Totals:
     """What became of the runs of a study.
 
-    Attributes
-    ----------
-    done : int
-        Runs that were done now, and well.
-    failed : int
-        Runs that failed, now or earlier.
-    reused : int
-        Runs that were there already, done well.
-    interrupted : bool
-        Whether some are left, as somebody has stopped the sweep.
-    errors : dict of name of run to str
-        Why the first runs failed that did so for different reasons.
-    damaged : list of str
-        Runs that were there, but not as they were written, and were to be done again.
-    versions : dict of str to int
-        How many runs of the table were made with which versions; of several the table is mixed.
-    table_replaced : bool
-        Whether the table holds these runs; the one that was there stays where this one would be shorter.
+    `done`: runs that were done now, and well. `failed`: runs that failed, now or earlier. `reused`: runs that
+    were there already, done well. `interrupted`: whether some are left, as somebody has stopped the sweep.
+    `errors`: why the first runs failed that did so for different reasons. `damaged`: runs that were there,
+    but not as they were written, and were to be done again. `versions`: how many runs of the table were made
+    with which versions; of several the table is mixed. `table_replaced`: whether the table holds these runs;
+    the one that was there stays where this one would be shorter.
     """
 
     done: int
@@ -187,15 +175,8 @@ def worked_off(
 ) -> Iterator[None]:
     """Have tasks done, and keep what comes back; yield whenever the count may have changed.
 
-    Parameters
-    ----------
-    tasks : iterable of Task
-        Asked for the next one when somebody can do it.
-    hired : callable
-        Gives those who do tasks; called if there is one.
-    count : Count
-    stop : Interruption
-    keep : callable
+    `tasks`: asked for the next one when somebody can do it. `hired`: gives those who do tasks; called if
+    there is one.
     """
     with ExitStack() as stack:
         crew: Crew | None = None
@@ -241,10 +222,7 @@ class _Rows:
     def write(self, *, whatever: bool = False) -> None:
         """Write the next rows, up to the first run that is still to be done; or `whatever` is there.
 
-        Raises
-        ------
-        OutputError
-            When a run that was there is not any more, or a row cannot be written.
+        Raises OutputError when a run that was there is not any more, or a row cannot be written.
         """
         while self._head is not None:
             todo, task = self._head

@@ -36,16 +36,7 @@ ROW_GROUP = 4096
 
 
 class Column(NamedTuple):
-    """A column of the table.
-
-    Attributes
-    ----------
-    name : str
-    kind : "string", "int64" or "double"
-    unit : str
-    meaning : str
-        One line.
-    """
+    """A column of the table. `meaning`: one line."""
 
     name: str
     kind: str
@@ -147,26 +138,10 @@ class Table:
     Both files are written aside. When the context ends well they replace those of an earlier sweep, and
     ``study.json`` with them; but those of a sweep that is not `complete` replace none with more rows. Where
     there is no ``results.parquet`` yet, ``results.csv`` appears as soon as it is no shorter than the one that
-    is there, and grows row by row.
-
-    Parameters
-    ----------
-    folder : Path
-    columns : sequence of Column
-    study : bytes or None
-        The content of ``study.json`` to which the rows belong; None: the file stays as it is.
-
-    Attributes
-    ----------
-    complete : bool
-        Whether all rows are there that there will be.
-    replaced : bool
-        Whether the files are those of these rows; known when the context has ended.
-
-    Raises
-    ------
-    OutputError
-        When something cannot be written; no half of a row is left then, and no other row is taken.
+    is there, and grows row by row. `study`: the content of ``study.json`` to which the rows belong; None: the
+    file stays as it is. `complete`: whether all rows are there that there will be. `replaced`: whether the
+    files are those of these rows; known when the context has ended. Raises OutputError when something cannot
+    be written; no half of a row is left then, and no other row is taken.
     """
 
     def __init__(self, folder: Path, columns: Sequence[Column], study: bytes | None = None) -> None:
@@ -276,12 +251,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Tell of a file that cannot be written.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Tell of a file that cannot be written. Raises OutputError."""
     try:
         yield
     except OSError as error:
@@ -291,10 +261,7 @@ def _told(path: Path) -> Iterator[None]:
 def _former_rows(folder: Path) -> tuple[int, bool]:
     """Return how many rows an earlier table has, and whether it may be replaced by one that grows.
 
-    Raises
-    ------
-    OutputError
-        When something else than a file has its name.
+    Raises OutputError when something else than a file has its name.
     """
     for name in (CSV, PARQUET):
         writable(folder / name)

@@ -32,30 +32,11 @@ _DIGITS = 10
 class Task:
     """One run; nothing but this is needed to do it, on whatever machine.
 
-    Attributes
-    ----------
-    map : str
-        What the study calls the map.
-    document : str
-        The whole map as JSON.
-    controller : str
-    source : Source or None
-        Of a controller of one's own: its file, and its author's modules that it imports.
-    gains : dict of name to value
-        All of them.
-    robots : int
-    team : dict of name to value
-        As `Team.homogeneous` takes them, None for a range without limit; and the conditions that the study
-        gives.
-    start : str
-    seed : int
-    duration, dt : float, s
-    lattice : int
-    cost_hz, record_hz : float, Hz
-    metrics : bool
-        Whether the table is to hold the metrics of the end.
-    digest : str
-        Of all of this but where files are: tasks of one digest have one result.
+    `map`: what the study calls the map. `document`: the whole map as JSON. `source`: of a controller of one's
+    own: its file, and its author's modules that it imports. `gains`: all of them. `team`: as
+    `Team.homogeneous` takes them, None for a range without limit; and the conditions that the study gives.
+    `duration`, `dt` in s. `cost_hz`, `record_hz` in Hz. `metrics`: whether the table is to hold the metrics
+    of the end. `digest`: of all of this but where files are: tasks of one digest have one result.
     """
 
     map: str

@@ -22,19 +22,9 @@ PERIOD = 10.0
 class Count:
     """How many runs there are, and what became of them so far.
 
-    Attributes
-    ----------
-    total : int
-    done, failed : int
-        Those of this sweep.
-    reused : int
-        Those that were there already.
-    lost : int
-        Workers that have ended in the midst of a run.
-    waiting : str
-        What everything waits for; empty where somebody is at work.
-    began : float, s
-        When it began, by the clock of `time.perf_counter`.
+    `done`, `failed`: those of this sweep. `reused`: those that were there already. `lost`: workers that have
+    ended in the midst of a run. `waiting`: what everything waits for; empty where somebody is at work.
+    `began`, s: when it began, by the clock of `time.perf_counter`.
     """
 
     total: int
@@ -114,12 +104,7 @@ class _Bar(Teller):
 def told(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
     """Give a function to be called with the count when it has changed, and now and then.
 
-    Parameters
-    ----------
-    title : str
-    count : Count
-    quiet : bool
-        Say nothing.
+    `quiet`: say nothing.
     """
     if quiet:
         yield Teller()

@@ -49,12 +49,7 @@ def _choices(text: str) -> str:
 def parsed(kind: type[T], command: str, words: list[str]) -> T:
     """Return the dataclass of options that `words` give.
 
-    Raises
-    ------
-    InputError
-        When the words do not fit the options: one line.
-    SystemExit
-        After help was printed.
+    Raises InputError when the words do not fit the options: one line; SystemExit after help was printed.
     """
     complaint = io.StringIO()
     try:
@@ -95,10 +90,7 @@ def one_line(boxed: str) -> str:
 def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
     """Return width and height from a text like ``1280x720``.
 
-    Raises
-    ------
-    ParameterError
-        When it is none, or beyond the limits.
+    Raises ParameterError when it is none, or beyond the limits.
     """
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
@@ -112,13 +104,7 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
 
 
 def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Check the value of an option.
-
-    Raises
-    ------
-    ParameterError
-        When it is out of range.
-    """
+    """Check the value of an option. Raises ParameterError when it is out of range."""
     if not low <= value <= high:
         wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
         raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
@@ -130,10 +116,8 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
     {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
 
-    Raises
-    ------
-    ParameterError
-        When a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is given twice.
+    Raises ParameterError when a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is
+    given twice.
     """
     gains: dict[str, Any] = {}
     for text in texts:

@@ -15,11 +15,7 @@ _LISTED = 5
 def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator[str]:
     """Yield the lines of a report, with what was otherwise in a former one.
 
-    Parameters
-    ----------
-    report : MapReport
-    former : MapReport or None
-        Of the same map before it was changed; None for none.
+    `former`: of the same map before it was changed; None for none.
     """
     rows, was = _rows(report), {} if former is None else _rows(former)
     told = [(title, _changed(value, was.get(title), former)) for title, value in rows.items()]

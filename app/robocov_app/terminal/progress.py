@@ -12,13 +12,7 @@ from contextlib import contextmanager
 def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
     """Show how far `label` is; the value is a function to be called with the number done so far.
 
-    Parameters
-    ----------
-    label : str
-        What is being done: "simulating".
-    total : int
-    quiet : bool
-        Show nothing.
+    `label`: what is being done: "simulating". `quiet`: show nothing.
     """
     if quiet:
         yield lambda done: None
