@@ -5,7 +5,6 @@ Takes longer than a frame: a window asks a `measurement_worker`, which has a pro
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,8 +53,6 @@ class Measurement:
     problems : tuple of Problem
     radius : float, m
         Of the robots that were asked about.
-    seconds : float
-        What it took.
     """
 
     free_area: float
@@ -67,24 +64,19 @@ class Measurement:
     vertices: int
     problems: tuple[Problem, ...]
     radius: float
-    seconds: float
 
 
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
-    """Measure a sketch; one that has no boundary, or a broken one, has as much free space as can be made out.
+    """Measure a sketch for robots of a radius, m.
 
-    Parameters
-    ----------
-    sketch : Sketch
-    radius : float, m
-        Of the robots.
+    One that has no boundary, or a broken one, has as much free space as can be made out.
     """
-    began = time.perf_counter()
     found, free = examined(sketch, radius)
     narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
     gap = narrow[0] if narrow else narrowest_gap(free)
     reached, untouched = reach_of(free, radius)
-    impassable = shapely.union_all([*map(_disc_in, narrow), untouched]) & free
+    discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
+    impassable = shapely.union_all([*discs, untouched]) & free
     marks = _polygons(impassable)
     owners = [BOUNDARY, *(item.key for item in sketch.obstacles)]
     return Measurement(
@@ -97,7 +89,6 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
         vertices=sum(len(points) for owner in owners for _, points, _ in rings_of(sketch, owner)),
         problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, free, radius)),
         radius=radius,
-        seconds=time.perf_counter() - began,
     )
 
 
@@ -156,11 +147,6 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     return counts
 
 
-def _disc_in(gap: Gap) -> BaseGeometry:
-    """Return the largest disc that passes a gap, in the midst of it."""
-    return shapely.Point(_middle(gap)).buffer(gap.width / 2)
-
-
 def _middle(gap: Gap) -> tuple[float, float]:
     (ax, ay), (bx, by) = gap.between
     return (ax + bx) / 2, (ay + by) / 2
@@ -175,7 +161,7 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
         if mark not in found:
             at = place_words(*_middle(gap))
             words = f"the gap at {at} is {gap.width:.3g} m wide: too narrow for robots of radius {radius:g} m"
-            found[mark] = Problem(words, LineString(gap.between), None, False)
+            found[mark] = Problem(words, LineString(gap.between), None, False, "narrow")
     problems = list(found.values())
     more = problems[_MOST_GAPS:]
     if more:
@@ -198,7 +184,7 @@ def _cut_off(reached: tuple[BaseGeometry, ...], free: MultiPolygon, radius: floa
         f"{area:.3g} m² are cut off from the largest"
     )
     where = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
-    return [Problem(words, where, None, False)]
+    return [Problem(words, where, None, False, "cut off")]
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -29,7 +29,6 @@ from robocov.environment import (
     Ring,
     Start,
     StartSpec,
-    WallObstacle,
     in_the_way,
     swept_area,
 )
@@ -37,22 +36,114 @@ from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.selection import display_name, rings_of
+from robocov_app.editor.model.selection import numbered_name, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
+
+Kind: TypeAlias = Literal[
+    "other", "no boundary", "crossing", "spot", "no room", "outside", "twice", "double", "sealed", "narrow",
+    "cut off",
+]  # fmt: skip
+"""What a problem is of, for those that mend it: see `robocov_app.editor.edits.fixes`."""
 
 _FLAT = 1e-9
 """An outline whose area is below this part of its width or height squared is a line."""
 
 _LONGEST_NAME = 100
+_LONGEST_TEXT = 10_000
 _MOST_PLACES = 20
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+_MAP_PLACE = re.compile(
+    r"obstacles\[(\d+)\](?:\.(vertices|points|holes|path\.points)\[(\d+)\])?(?:\[(\d+)\])?(?:\[\d\])?"
+    r"|starts(?:\.(\w+)|\[\"([^\"]*)\"\])(?:\.positions\[(\d+)\])?(?:\[\d\])?"
+    r"|boundary\[(\d+)\](?:\[\d\])?"
+)
 
 
-class Fault(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Something that is wrong, or may be.
+
+    Attributes
+    ----------
+    words : str
+        A sentence for people.
+    where : shapely geometry or None
+        The place: a point, an edge, an area; None where it is nowhere, such as a missing boundary.
+    of : Owner or None
+        The key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole.
+    grave : bool
+        The map cannot run so; else it is a warning.
+    kind : str
+    """
+
+    words: str
+    where: BaseGeometry | None
+    of: Owner | None
+    grave: bool
+    kind: Kind = "other"
+
+
+class _Fault(NamedTuple):
     """What is wrong with a part: words that follow its name and a colon, and the place."""
 
     words: str
     where: BaseGeometry | None
+    kind: Kind = "other"
+
+
+def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> tuple[Problem, ...]:
+    """Return all that is wrong, the grave first; `radius` is that of the robots, m, for the warnings.
+
+    There is a grave one exactly when ``sketch.environment()`` raises.
+    """
+    return examined(sketch, radius)[0]
+
+
+def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
+    """Return all that is wrong, and the free space as far as there is one."""
+    found = [*_map_faults(sketch), *_part_faults(sketch)]
+    if found:
+        free = _rough_free(sketch)
+        found += _space_faults(sketch, free, {problem.of for problem in found})
+    else:
+        environment = sketch.unchecked()
+        free = environment.free
+        try:
+            # whatever the rules are, these are they
+            validate(draft_document(sketch), "map")
+            check_rules(environment, "map")
+        except MapError as error:
+            otherwise = Problem(in_words(str(error), sketch), None, None, True)
+            found = list(_space_faults(sketch, free, set())) or [otherwise]
+    return (*found, *_warnings(sketch, free, radius, {problem.of for problem in found})), free
+
+
+def in_words(message: str, sketch: Sketch) -> str:
+    """Return a message of the map's rules with the names of things instead of places in a file.
+
+    >>> in_words('map: starts["a b"].positions[1]: x', Sketch())
+    'start “a b”, place 2: x'
+    """
+
+    def named(match: re.Match[str]) -> str:
+        number, rings, index, inner, name, quoted, position, corner = match.groups()
+        if corner is not None:
+            return f"boundary, corner {int(corner) + 1}"
+        if number is None:
+            start = f"start “{name if name is not None else quoted}”"
+            return start if position is None else f"{start}, place {int(position) + 1}"
+        if int(number) >= len(sketch.obstacles):
+            return match[0]
+        what = numbered_name(sketch, sketch.obstacles[int(number)].key)
+        if rings is None:
+            return what
+        if rings == "holes":
+            hole = f"{what}, hole {int(index) + 1}"
+            return hole if inner is None else f"{hole}, corner {int(inner) + 1}"
+        kind = {"vertices": "corner", "points": "point", "path.points": "way point"}[rings]
+        return f"{what}, {kind} {int(index) + 1}"
+
+    return _MAP_PLACE.sub(named, message.removeprefix("map: "))
 
 
 def place_words(x: float, y: float) -> str:
@@ -64,8 +155,34 @@ def place_words(x: float, y: float) -> str:
     return f"({x:.5g}, {y:.5g})"
 
 
-def label_faults(name: str) -> Iterator[str]:
-    """Yield what is wrong with the name of something."""
+# the map as a whole, and its parts one by one
+
+
+def _map_faults(sketch: Sketch) -> Iterator[Problem]:
+    for words in _label_faults(sketch.name):
+        yield Problem(f"the map {words}", None, None, True)
+    if len(sketch.description) > _LONGEST_TEXT:
+        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None, None, True)
+    if sketch.boundary is None:
+        words = "there is no boundary: draw one round all that is free"
+        yield Problem(words, None, BOUNDARY, True, "no boundary")
+
+
+def _part_faults(sketch: Sketch) -> Iterator[Problem]:
+    faults: list[tuple[Owner, _Fault]] = []
+    if sketch.boundary is not None:
+        faults += [(BOUNDARY, fault) for fault in _ring_faults(sketch.boundary, "it")]
+    faults += [(item.key, fault) for item in sketch.obstacles for fault in _shape_faults(item.shape)]
+    for owner, (words, where, kind) in faults:
+        yield Problem(f"{numbered_name(sketch, owner)}: {words}", where, owner, True, kind)
+    for name, spec in sketch.starts:
+        for words in _label_faults(name):
+            yield Problem(f"a start {words}", None, name, True)
+        for words, where, kind in _start_faults(spec):
+            yield Problem(f"{numbered_name(sketch, name)}: {words}", where, name, True, kind)
+
+
+def _label_faults(name: str) -> Iterator[str]:
     if not name:
         yield "has no name"
     elif len(name) > _LONGEST_NAME:
@@ -74,37 +191,44 @@ def label_faults(name: str) -> Iterator[str]:
         yield "has a name with line breaks or other control characters"
 
 
-def shape_faults(shape: Obstacle) -> Iterator[Fault]:
-    """Yield what is wrong with an obstacle."""
+def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
     if shape.name is not None:
-        yield from (Fault(words, None) for words in label_faults(shape.name))
+        yield from (_Fault(words, None) for words in _label_faults(shape.name))
     if isinstance(shape, PolygonObstacle):
         yield from _polygon_faults(shape)
     elif isinstance(shape, CircleObstacle):
         yield from _size_faults("radius", shape.radius, shape.center)
         yield from _far_faults((shape.center,))
     else:
-        yield from _wall_faults(shape)
+        yield from _size_faults("width", shape.width, shape.points[0] if shape.points else None)
+        far = list(_far_faults(shape.points))
+        yield from far
+        points = np.array(shape.points, dtype=float).reshape(-1, 2)
+        extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+        if not far and (len(points) < 2 or extent < SMALLEST):
+            yield _Fault("it has no length: it needs two points that are apart", _drawn(points))
+        elif not far and extent > LARGEST:
+            words = f"it is {extent:.5g} m long: at most {LARGEST / 1000:g} km are possible"
+            yield _Fault(words, _drawn(points))
 
 
-def start_faults(spec: StartSpec) -> Iterator[Fault]:
-    """Yield what is wrong with a start, wherever it lies."""
+def _start_faults(spec: StartSpec) -> Iterator[_Fault]:
     if isinstance(spec, DiscStart):
         yield from _size_faults("radius", spec.radius, spec.center)
         yield from _far_faults((spec.center,))
     elif isinstance(spec, PointsStart):
         if not spec.positions:
-            yield Fault("has no places: it needs one a robot", None)
+            yield _Fault("has no places: it needs one a robot", None)
         yield from _far_faults(spec.positions)
         seen: set[Point] = set()
         for place in spec.positions:
             if place in seen:
                 words = f"the place {place_words(*place)} is given twice: every robot needs its own"
-                yield Fault(words, shapely.Point(place))
+                yield _Fault(words, shapely.Point(place), "spot")
             seen.add(place)
 
 
-def ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Fault]:
+def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[_Fault]:
     """Yield what is wrong with a closed outline, which messages call `what`."""
     points = np.array(ring, dtype=float).reshape(-1, 2)
     far = list(_far_faults(ring))
@@ -113,30 +237,28 @@ def ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Fault]:
         return
     count = len(np.unique(points, axis=0)) if len(points) else 0
     if count < 3:
-        corners = "no corners" if count == 0 else "one corner" if count == 1 else "two corners"
-        yield Fault(f"{what} has {corners}: it needs three", _drawn(points))
+        corners = ("no corners", "one corner", "two corners")[count]
+        yield _Fault(f"{what} has {corners}: it needs three", _drawn(points))
         return
     extent = np.ptp(points, axis=0)
+    polygon = Polygon(points)
     if extent.max() > LARGEST:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        yield Fault(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
-        return
-    polygon = Polygon(points)
-    hull = shapely.convex_hull(polygon)
-    if extent.min() < SMALLEST or hull.area <= _FLAT * float(extent.max()) ** 2:
-        yield Fault(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
+        yield _Fault(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
+    elif extent.min() < SMALLEST or shapely.convex_hull(polygon).area <= _FLAT * float(extent.max()) ** 2:
+        yield _Fault(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
     elif not polygon.is_valid:
         places = _meetings(points, polygon)
         (x, y), more = places[0], len(places) - 1
         others = f" and at {more} more places" if more > 1 else " and at one more place" if more else ""
         words = f"{what} crosses or touches itself at {place_words(x, y)}{others}"
-        yield Fault(words, MultiPoint(places[:_MOST_PLACES]))
+        yield _Fault(words, MultiPoint(places[:_MOST_PLACES]), "crossing")
 
 
-def _polygon_faults(shape: PolygonObstacle) -> Iterator[Fault]:
-    found = list(ring_faults(shape.vertices))
+def _polygon_faults(shape: PolygonObstacle) -> Iterator[_Fault]:
+    found = list(_ring_faults(shape.vertices))
     for hole in shape.holes:
-        found += ring_faults(hole, "a hole")
+        found += _ring_faults(hole, "a hole")
     yield from found
     if found or not shape.holes or shape.polygon.is_valid:
         return
@@ -145,43 +267,26 @@ def _polygon_faults(shape: PolygonObstacle) -> Iterator[Fault]:
     for hole in shape.holes:
         inner = Polygon(hole)
         if not shell.covers(inner):
-            yield Fault("a hole sticks out of its outline", inner - shell)
+            yield _Fault("a hole sticks out of its outline", inner - shell, "crossing")
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
-            yield Fault("a hole meets the outline or another hole: it must be apart from them", inner)
+            words = "a hole meets the outline or another hole: it must be apart from them"
+            yield _Fault(words, inner, "crossing")
         else:
             good.append(hole)
 
 
-def _wall_faults(shape: WallObstacle) -> Iterator[Fault]:
-    points = np.array(shape.points, dtype=float).reshape(-1, 2)
-    yield from _size_faults("width", shape.width, shape.points[0] if shape.points else None)
-    far = list(_far_faults(shape.points))
-    yield from far
-    if far:
-        return
-    extent = np.ptp(points, axis=0) if len(points) else np.zeros(2)
-    if len(points) < 2 or extent.max() < SMALLEST:
-        yield Fault("it has no length: it needs two points that are apart", _drawn(points))
-    elif extent.max() > LARGEST:
-        yield Fault(
-            f"it is {extent.max():.5g} m long: at most {LARGEST / 1000:g} km are possible", _drawn(points)
-        )
+def _size_faults(what: str, size: float, at: Point | None) -> Iterator[_Fault]:
+    if not SMALLEST <= size <= LARGEST:
+        limit = f"at least {1000 * SMALLEST:g} mm" if size < SMALLEST else f"at most {LARGEST / 1000:g} km"
+        where = None if at is None else shapely.Point(at)
+        yield _Fault(f"its {what} is {size:.5g} m: {limit} is possible", where)
 
 
-def _size_faults(what: str, size: float, at: Point | None) -> Iterator[Fault]:
-    if SMALLEST <= size <= LARGEST:
-        return
-    limit = f"at least {1000 * SMALLEST:g} mm" if size < SMALLEST else f"at most {LARGEST / 1000:g} km"
-    yield Fault(f"its {what} is {size:.5g} m: {limit} is possible", None if at is None else shapely.Point(at))
-
-
-def _far_faults(points: Ring) -> Iterator[Fault]:
+def _far_faults(points: Ring) -> Iterator[_Fault]:
     for x, y in points:
         if not max(abs(x), abs(y)) <= FARTHEST:
-            words = (
-                f"{place_words(x, y)} is too far away: maps reach {FARTHEST / 1000:.0f} km from their origin"
-            )
-            yield Fault(words, shapely.Point(x, y))
+            limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
+            yield _Fault(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 
 
@@ -209,86 +314,7 @@ def _meetings(points: Array, polygon: Polygon) -> list[Point]:
     return [(x, y) for x, y in meeting.tolist()]
 
 
-_LONGEST_TEXT = 10_000
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """Something that is wrong, or may be.
-
-    Attributes
-    ----------
-    words : str
-        A sentence for people.
-    where : shapely geometry or None
-        The place: a point, an edge, an area; None where it is nowhere, such as a missing boundary.
-    of : Owner or None
-        The key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole.
-    grave : bool
-        The map cannot run so; else it is a warning.
-    """
-
-    words: str
-    where: BaseGeometry | None
-    of: Owner | None
-    grave: bool
-
-
-def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> tuple[Problem, ...]:
-    """Return all that is wrong, the grave first.
-
-    There is a grave one exactly when ``sketch.environment()`` raises. `radius` is that of the robots, m, for
-    the warnings.
-    """
-    return examined(sketch, radius)[0]
-
-
-def runnable(found: tuple[Problem, ...]) -> bool:
-    """Return whether none of the problems keeps the map from running."""
-    return not any(problem.grave for problem in found)
-
-
-def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Return all that is wrong, and the free space as far as there is one."""
-    found = [*_map_faults(sketch), *_part_faults(sketch)]
-    if found:
-        free = _rough_free(sketch)
-        found += _space_faults(sketch, free, {problem.of for problem in found})
-    else:
-        environment = sketch.unchecked()
-        free = environment.free
-        try:
-            # whatever the rules are, these are they
-            validate(draft_document(sketch), "map")
-            check_rules(environment, "map")
-        except MapError as error:
-            otherwise = Problem(str(error).removeprefix("map: "), None, None, True)
-            found = list(_space_faults(sketch, free, set())) or [otherwise]
-    return (*found, *_warnings(sketch, free, radius, {problem.of for problem in found})), free
-
-
-def _map_faults(sketch: Sketch) -> Iterator[Problem]:
-    """Yield what is wrong with the map as a whole."""
-    for words in label_faults(sketch.name):
-        yield Problem(f"the map {words}", None, None, True)
-    if len(sketch.description) > _LONGEST_TEXT:
-        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None, None, True)
-    if sketch.boundary is None:
-        yield Problem("there is no boundary: draw one round all that is free", None, BOUNDARY, True)
-
-
-def _part_faults(sketch: Sketch) -> Iterator[Problem]:
-    """Yield what is wrong with the parts one by one."""
-    for fault in ring_faults(sketch.boundary, "it") if sketch.boundary is not None else ():
-        yield Problem(f"boundary: {fault.words}", fault.where, BOUNDARY, True)
-    for item in sketch.obstacles:
-        for fault in shape_faults(item.shape):
-            yield Problem(f"{display_name(sketch, item.key)}: {fault.words}", fault.where, item.key, True)
-    for name, spec in sketch.starts:
-        for words in label_faults(name):
-            yield Problem(f"a start {words}", None, name, True)
-        for fault in start_faults(spec):
-            yield Problem(f"{display_name(sketch, name)}: {fault.words}", fault.where, name, True)
+# the free space, and the starts in it
 
 
 def _rough_free(sketch: Sketch) -> MultiPolygon:
@@ -299,9 +325,8 @@ def _rough_free(sketch: Sketch) -> MultiPolygon:
         return MultiPolygon()
     inside = shapely.make_valid(Polygon(sketch.boundary))
     solid = shapely.union_all(sketch.geometries) if len(sketch.geometries) else MultiPolygon()
-    parts = [part for part in shapely.get_parts(inside - solid) if isinstance(part, Polygon)]
     # what is left of a broken outline may be collections of collections
-    parts = [part for part in parts if part.area > 0.0]
+    parts = [p for p in shapely.get_parts(inside - solid) if isinstance(p, Polygon) and p.area > 0.0]
     parts.sort(key=lambda part: (-part.area, part.bounds))
     return MultiPolygon([shapely.orient_polygons(part) for part in parts])
 
@@ -312,16 +337,14 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
         return
     if free.is_empty:
         if BOUNDARY not in faulty:
-            hull = shapely.convex_hull(shapely.MultiPoint(sketch.boundary))
+            hull = shapely.convex_hull(MultiPoint(sketch.boundary))
             yield Problem("no free space is left inside the boundary", hull, BOUNDARY, True)
         return
     for name, spec in sketch.starts:
         if isinstance(spec, PointsStart):
             yield from _blocked_places(sketch, name, spec, free)
         elif name not in faulty:
-            words = _no_room(name, spec, free, DEFAULT_RADIUS)
-            if words:
-                yield Problem(words, _disc(spec), name, True)
+            yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
 
 
 def _blocked_places(sketch: Sketch, name: str, spec: PointsStart, free: MultiPolygon) -> Iterator[Problem]:
@@ -332,26 +355,46 @@ def _blocked_places(sketch: Sketch, name: str, spec: PointsStart, free: MultiPol
         near = sketch.tree.query(points[k], predicate="intersects")
         what = "outside the boundary"
         if len(near):
-            what = f"inside {display_name(sketch, sketch.obstacles[int(near.max())].key)}"
-        at = place_words(*spec.positions[k])
-        words = f"{display_name(sketch, name)}: place {k + 1} at {at} is {what}"
-        yield Problem(words, points[k], name, True)
+            what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
+        words = f"{_spot(name, spec, k)} is {what}"
+        yield Problem(words, points[k], name, True, "spot")
 
 
-def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float) -> str:
-    """Return what is to be said of a start in which no robot finds room; empty if one does."""
+def _spot(name: str, spec: PointsStart, k: int) -> str:
+    return f"start “{one_line(name)}”: place {k + 1} at {place_words(*spec.positions[k])}"
+
+
+def _no_room(
+    name: str, spec: StartSpec, free: MultiPolygon, radius: float, *, grave: bool
+) -> Iterator[Problem]:
     try:
         Start(name, spec, free).sample(1, radius=radius)
     except StartError:
-        what = "its disc" if isinstance(spec, DiscStart) else "the free space"
-        return f"start “{one_line(name)}”: {what} has no room for a robot of radius {radius:g} m"
-    return ""
+        is_disc = isinstance(spec, DiscStart)
+        what = "its disc" if is_disc else "the free space"
+        words = f"start “{one_line(name)}”: {what} has no room for a robot of radius {radius:g} m"
+        where = shapely.Point(spec.center).buffer(spec.radius) if isinstance(spec, DiscStart) else None
+        yield Problem(words, where, name, grave, "no room" if is_disc else "other")
 
 
-def _disc(spec: StartSpec) -> BaseGeometry | None:
-    if isinstance(spec, DiscStart):
-        return shapely.Point(spec.center).buffer(spec.radius)
-    return None
+def _tight_places(name: str, spec: PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
+    """Warn of places where a robot meets a wall, or another robot: each where it is."""
+    points = shapely.points(np.array(spec.positions, dtype=float))
+    away = shapely.distance(points, free.boundary)
+    for k in np.flatnonzero(away < radius).tolist():
+        words = f"{_spot(name, spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
+        yield Problem(words, points[k], name, False, "spot")
+    tree = shapely.STRtree(points)
+    pairs = tree.query(points, predicate="dwithin", distance=2 * radius).T
+    for i, j in sorted((i, j) for i, j in pairs.tolist() if i < j):
+        gap = math.dist(spec.positions[i], spec.positions[j])
+        if gap < 2 * radius:
+            apart = f"are {gap:.3g} m apart: robots need {2 * radius:g} m"
+            words = f"{_spot(name, spec, i)} and place {j + 1} {apart}"
+            yield Problem(words, MultiPoint([points[i], points[j]]), name, False, "spot")
+
+
+# warnings
 
 
 def _warnings(
@@ -370,14 +413,9 @@ def _warnings(
         if name in faulty:
             continue
         if isinstance(spec, PointsStart):
-            try:
-                Start(name, spec, free).sample(len(spec.positions), radius=radius)
-            except StartError as error:
-                yield Problem(one_line(error), shapely.MultiPoint(spec.positions), name, False)
+            yield from _tight_places(name, spec, free, radius)
         elif radius > DEFAULT_RADIUS:
-            words = _no_room(name, spec, free, radius)
-            if words:
-                yield Problem(words, _disc(spec), name, False)
+            yield from _no_room(name, spec, free, radius, grave=False)
 
 
 def _outside(sketch: Sketch) -> Iterator[Problem]:
@@ -387,8 +425,8 @@ def _outside(sketch: Sketch) -> Iterator[Problem]:
     outside = ~shapely.intersects(inside, sketch.geometries) | shapely.touches(inside, sketch.geometries)
     for k in np.flatnonzero(outside & ~shapely.is_empty(sketch.geometries)).tolist():
         item = sketch.obstacles[k]
-        words = f"{display_name(sketch, item.key)} lies outside the boundary"
-        yield Problem(words, item.geometry, item.key, False)
+        words = f"{numbered_name(sketch, item.key)} lies outside the boundary"
+        yield Problem(words, item.geometry, item.key, False, "outside")
 
 
 def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
@@ -401,26 +439,23 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
             continue
         area = swept_area(item.shape.polygon, item.shape.path)
         met, beyond = in_the_way(area, standing, inside)
-        names, places = [display_name(sketch, key) for key in met], list(met.values())
+        names, places = [numbered_name(sketch, key) for key in met], list(met.values())
         if beyond is not None:
             names, places = [*names, "the boundary"], [*places, beyond]
         if names:
-            words = f"{display_name(sketch, item.key)} moves through {listed(names)}"
+            words = f"{numbered_name(sketch, item.key)} moves through {listed(names)}"
             yield Problem(words, shapely.union_all(places), item.key, False)
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:
     """Warn of obstacles that lie twice in the same place, as after pasting twice."""
-    below: dict[object, int] = {}
+    below: set[object] = set()
     for item in sketch.obstacles:
-        shape = item.shape
-        if item.geometry.is_empty:
-            continue
-        form = tuple(value for name, value in vars(shape).items() if name not in ("name", "polygon"))
-        if (type(shape), form) in below:
-            words = f"{display_name(sketch, item.key)} lies on another one that is just the same"
-            yield Problem(words, item.geometry, item.key, False)
-        below[(type(shape), form)] = item.key
+        form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
+        if form in below and not item.geometry.is_empty:
+            words = f"{numbered_name(sketch, item.key)} lies on another one that is just the same"
+            yield Problem(words, item.geometry, item.key, False, "twice")
+        below.add(form)
 
 
 def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
@@ -432,8 +467,8 @@ def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
             twice = [at for at, after in zip(ring, following, strict=False) if at == after]
             if twice:
                 at = place_words(*twice[0])
-                words = f"{display_name(sketch, owner)}: two vertices lie in the same place, {at}"
-                yield Problem(words, shapely.MultiPoint(twice), owner, False)
+                words = f"{numbered_name(sketch, owner)}: two vertices lie in the same place, {at}"
+                yield Problem(words, MultiPoint(twice), owner, False, "double")
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
@@ -444,13 +479,11 @@ def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
             slivers.append(part)
             continue
         spot = part.representative_point()
-        words = (
-            f"the room of {part.area:.3g} m² round {place_words(spot.x, spot.y)} is sealed: no way leads in"
-        )
-        yield Problem(words, part, None, False)
+        at = place_words(spot.x, spot.y)
+        words = f"the room of {part.area:.3g} m² round {at} is sealed: no way leads in"
+        yield Problem(words, part, None, False, "sealed")
     if slivers:
         area = sum(part.area for part in slivers)
         what = counted(len(slivers), "sealed pocket")
-        is_are = "are" if len(slivers) > 1 else "is"
-        words = f"{what} {is_are} smaller than a robot, {area:.2g} m² together"
-        yield Problem(words, MultiPolygon(slivers), None, False)
+        words = f"{what} {'are' if len(slivers) > 1 else 'is'} smaller than a robot, {area:.2g} m² together"
+        yield Problem(words, MultiPolygon(slivers), None, False, "sealed")

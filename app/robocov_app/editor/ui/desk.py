@@ -9,6 +9,7 @@ from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.validation import in_words
 from robocov_app.editor.tools.handles import Handle, handled, handles
 from robocov_app.editor.tools.snap_targets import Snapper, vertex_count
 from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
@@ -283,7 +284,7 @@ class Desk:
         try:
             words = action()
         except RobocovError as error:
-            self.say(plain(str(error)), trouble=True)
+            self.say(in_words(str(error), self.sketch), trouble=True)
         else:
             if isinstance(words, str):
                 self.say(words)
@@ -393,12 +394,3 @@ class Desk:
 def _require_length(what: str, length: float, most: float) -> None:
     if not SMALLEST <= length <= most:
         raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
-
-
-def plain(message: str) -> str:
-    """Return a message without the places in files that mean nothing in a window.
-
-    >>> plain("map: obstacles[2]: crosses itself")
-    'obstacles[2]: crosses itself'
-    """
-    return message.removeprefix("map: ")

@@ -18,7 +18,7 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.model.validation import problems, runnable
+from robocov_app.editor.model.validation import in_words, problems
 
 
 def hall(*shapes, starts=(), **others) -> Sketch:
@@ -41,7 +41,7 @@ def runs(sketch: Sketch) -> bool:
 @given(st.one_of(drafts(), sound_sketches()))
 def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
     found = problems(sketch)
-    assert runnable(found) == runs(sketch), [problem.words for problem in found]
+    assert any(problem.grave for problem in found) != runs(sketch), [problem.words for problem in found]
     keys = {item.key for item in sketch.obstacles} | {name for name, _ in sketch.starts} | {BOUNDARY, None}
     for problem in found:
         assert problem.of in keys
@@ -54,7 +54,7 @@ def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
 
 @pytest.mark.parametrize("name", bundled_maps())
 def test_bundled_maps_have_nothing_grave(name):
-    assert runnable(problems(Sketch.from_environment(load_map(name))))
+    assert not any(each.grave for each in problems(Sketch.from_environment(load_map(name))))
 
 
 BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
@@ -106,13 +106,13 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             hall(PolygonObstacle(((1.0, 1.0),))),
-            "polygon: its outline has one corner: it needs three",
+            "polygon 1: its outline has one corner: it needs three",
             (1.0, 1.0),
             0,
         ),
         (
             hall(PolygonObstacle(BOX, (((2.0, 2.0), (5.0, 2.0), (5.0, 2.5), (2.0, 2.5)),))),
-            "polygon: a hole sticks out of its outline",
+            "polygon 1: a hole sticks out of its outline",
             (4.0, 2.25),
             0,
         ),
@@ -126,32 +126,32 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
                     ),
                 )
             ),
-            "polygon: a hole meets the outline or another hole: it must be apart from them",
+            "polygon 1: a hole meets the outline or another hole: it must be apart from them",
             (2.1, 2.1),
             0,
         ),
         (
             hall(PolygonObstacle(BOX, (((1.5, 1.5), (2.0, 1.5)),))),
-            "polygon: a hole has two corners: it needs three",
+            "polygon 1: a hole has two corners: it needs three",
             (1.75, 1.5),
             0,
         ),
         (
             hall(CircleObstacle((2.0, 3.0), 0.0, "")),
-            "circle: its radius is 0 m: at least 1 mm is possible",
+            "circle 1: its radius is 0 m: at least 1 mm is possible",
             (2.0, 3.0),
             0,
         ),
-        (hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle: has no name", None, 0),
+        (hall(CircleObstacle((2.0, 3.0), 1.0, "")), "circle 1: has no name", None, 0),
         (
             hall(WallObstacle(((2.0, 3.0),), 0.1)),
-            "wall: it has no length: it needs two points that are apart",
+            "wall 1: it has no length: it needs two points that are apart",
             (2.0, 3.0),
             0,
         ),
         (
             hall(WallObstacle(((2.0, 3.0), (4.0, 3.0)), -1.0)),
-            "wall: its width is -1 m: at least 1 mm is possible",
+            "wall 1: its width is -1 m: at least 1 mm is possible",
             (2.0, 3.0),
             0,
         ),
@@ -215,11 +215,11 @@ def test_what_is_broken_keeps_nothing_else_from_being_found():
     )
     words = [problem.words for problem in problems(sketch) if problem.grave]
     assert words == [
-        "polygon: its outline crosses or touches itself at (2, 2)",
-        "wall: it has no length: it needs two points that are apart",
-        "start “a”: place 1 at (6, 6) is inside circle",
+        "polygon 1: its outline crosses or touches itself at (2, 2)",
+        "wall 3: it has no length: it needs two points that are apart",
+        "start “a”: place 1 at (6, 6) is inside circle 2",
         # of the bow tie's two halves, one place lies in one; the other is free
-        "start “b”: place 1 at (1.5, 2) is inside polygon",
+        "start “b”: place 1 at (1.5, 2) is inside polygon 1",
     ]
 
 
@@ -236,13 +236,13 @@ def test_warnings_of_what_may_be_a_mistake():
     ]
     # one that only touches from outside does nothing either
     beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
-    assert warned(hall(beside)) == ["polygon lies outside the boundary"]
+    assert warned(hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")
     assert warned(hall(twice, replace(twice, name="b"))) == [
         "circle “b” lies on another one that is just the same"
     ]
     doubled = PolygonObstacle(((1.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.0, 3.0)))
-    assert warned(hall(doubled)) == ["polygon: two vertices lie in the same place, (1, 1)"]
+    assert warned(hall(doubled)) == ["polygon 1: two vertices lie in the same place, (1, 1)"]
     ended = WallObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 1.0)), 0.1)
     assert not [words for words in warned(hall(ended)) if "two vertices" in words]
 
@@ -283,8 +283,39 @@ def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     assert not [words for words in warned(sketch, 0.2) if "start" in words]
     words = [words for words in warned(sketch, 0.5) if "start" in words]
     assert words[0] == "start “a”: its disc has no room for a robot of radius 0.5 m"
-    assert "0.5 m apart" in words[1]
+    assert words[1] == "start “b”: place 1 at (1, 1) and place 2 are 0.5 m apart: robots need 1 m"
     assert warned(hall(starts=(("all", UniformStart()),)), 3.9) == []
     assert warned(hall(starts=(("all", UniformStart()),)), 4.0) == [
         "start “all”: the free space has no room for a robot of radius 4 m"
     ]
+
+
+def test_each_spot_that_is_too_tight_is_told_of_where_it_is():
+    spots = ((0.1, 1.0), (5.0, 5.0), (5.3, 5.0), (11.95, 7.0))
+    found = problems(hall(starts=(("a", PointsStart(spots)),)), 0.2)
+    assert [(problem.words, problem.where.centroid.coords[0]) for problem in found] == [
+        ("start “a”: place 1 at (0.1, 1) is 0.1 m from a wall: robots need 0.2 m", (0.1, 1.0)),
+        (
+            "start “a”: place 4 at (11.95, 7) is 0.05 m from a wall: robots need 0.2 m",
+            (11.95, 7.0),
+        ),
+        (
+            "start “a”: place 2 at (5, 5) and place 3 are 0.3 m apart: robots need 0.4 m",
+            (5.15, 5.0),
+        ),
+    ]
+
+
+def test_messages_of_the_map_name_things_and_where_they_are():
+    pillar = CircleObstacle((1.0, 1.0), 0.3, "pillar")
+    sketch = hall(pillar, PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 3.0))))
+    for message, words in [
+        ("map: obstacles[0]: is odd", "circle “pillar”: is odd"),
+        ("map: obstacles[1].vertices[0]: is odd", "polygon 2, corner 1: is odd"),
+        ("map: obstacles[1].vertices[2][1]: nan, but", "polygon 2, corner 3: nan, but"),
+        ("map: obstacles[1].holes[0][3]: is odd", "polygon 2, hole 1, corner 4: is odd"),
+        ("map: obstacles[9]: is odd", "obstacles[9]: is odd"),
+        ("starts.corner.positions[1]: is odd", "start “corner”, place 2: is odd"),
+        ("boundary[3]: is odd", "boundary, corner 4: is odd"),
+    ]:
+        assert in_words(message, sketch) == words

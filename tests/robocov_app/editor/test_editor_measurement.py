@@ -170,7 +170,6 @@ def test_every_draft_can_be_read_out(sketch, radius):
     assert [problem.words for problem in result.problems][: len(problems(sketch, radius))] == [
         problem.words for problem in problems(sketch, radius)
     ]
-    assert math.isfinite(result.seconds)
 
 
 def test_broken_parts_count_as_far_as_they_are_sound():
