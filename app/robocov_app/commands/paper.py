@@ -93,7 +93,7 @@ def command(options: Arguments) -> int:
         together,
     )
     from robocov_app.replication.writing import save_claims, save_page, save_pictures
-    from robocov_app.sweep.pool import processors
+    from robocov_app.sweep.executors import processors
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite
 
@@ -173,7 +173,7 @@ def print_claims(claims: Sequence[Claim]) -> None:
 
 
 def _announce(forecast: Forecast, name: str, means: Means) -> None:
-    from robocov_app.sweep.telling import duration
+    from robocov_app.sweep.sweeping import duration
 
     if forecast.left == 0:
         words = f"all {forecast.runs:,} runs are there"

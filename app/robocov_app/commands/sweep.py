@@ -13,9 +13,8 @@ from robocov.errors import ParameterError
 from robocov_app.terminal.arguments import in_range
 
 if TYPE_CHECKING:
-    from robocov_app.sweep.rehearsal import Rehearsal
     from robocov_app.sweep.study import Study
-    from robocov_app.sweep.sweeping import Totals
+    from robocov_app.sweep.sweeping import Rehearsal, Totals
 
 FAILED, INTERRUPTED = 1, 130
 
@@ -110,12 +109,12 @@ def _print_totals(totals: Totals, runs: int, out: Path) -> None:
 
 
 def _rehearse(options: Arguments, study: Study, out: Path) -> int:
-    from robocov_app.sweep.pool import processors
-    from robocov_app.sweep.rehearsal import rehearsed
+    from robocov_app.sweep.executors import processors
+    from robocov_app.sweep.sweeping import rehearsed
 
     workers = options.workers or processors()
     if options.scheduler is not None:
-        from robocov_app.sweep.cluster import Cluster
+        from robocov_app.sweep.executors import Cluster
 
         with Cluster(options.scheduler) as cluster:
             workers = max(1, cluster.threads)
@@ -131,7 +130,7 @@ def _rehearse(options: Arguments, study: Study, out: Path) -> int:
 
 def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
     """Print what a sweep would take."""
-    from robocov_app.sweep.telling import duration
+    from robocov_app.sweep.sweeping import duration
 
     for name, count in rehearsal.axes.items():
         print(f"{name:<20} {count:>7}")

@@ -221,7 +221,7 @@ def forecast_beyond(folder: Path, plan: Plan, workers: int, *, alone: bool) -> F
     controllers count as well. The time for the references of maps and for the timing of steps is not in it.
     """
     from robocov_app.sweep.performing import perform
-    from robocov_app.sweep.task import tasks_of
+    from robocov_app.sweep.study import tasks_of
 
     studies = beyond_studies.all_studies(plan)
     tuning = rival_gains_study(plan)
@@ -341,7 +341,7 @@ def _timed_outcomes(folder: Path, study: Study, laws: Sequence[Contender]) -> Ou
 def _degraded(folder: Path, plan: Plan) -> list[Degradation]:
     """Compare runs under bad conditions with those under ideal ones; all of them are there."""
     from robocov_app.sweep.ledger import Ledger
-    from robocov_app.sweep.task import tasks_of
+    from robocov_app.sweep.study import tasks_of
 
     conditions = beyond_studies.conditions_plan(plan)
     homes: dict[str, Ledger] = {}

@@ -31,7 +31,7 @@ from robocov_app.replication.steps import BLOCK, MAP
 from robocov_app.replication.strips import Strip, strips
 from robocov_app.replication.verdicts import amount
 from robocov_app.replication.writing import told_counts
-from robocov_app.sweep.circumstances import UNITS
+from robocov_app.sweep.study import UNITS
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -15,10 +15,8 @@ from robocov.controllers import controller_kind
 from robocov.errors import RobocovError, counted
 from robocov.mapfile import load_map
 from robocov_app.figures.statistics import Interval, bootstrap
-from robocov_app.sweep.circumstances import TeamValue
 from robocov_app.sweep.performing import Outcome, perform
-from robocov_app.sweep.study import TEAM, Study, StudyMap
-from robocov_app.sweep.task import Task, tasks_of
+from robocov_app.sweep.study import TEAM, Study, StudyMap, Task, TeamValue, tasks_of
 
 Performing: TypeAlias = Callable[[Sequence[Task]], Iterable[Outcome]]
 """Does tasks, and gives their outcomes in the same order."""

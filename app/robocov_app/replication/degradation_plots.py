@@ -10,7 +10,7 @@ from robocov.errors import ParameterError
 from robocov_app.figures.curves import curve_styles
 from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
-from robocov_app.sweep.circumstances import UNITS
+from robocov_app.sweep.study import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Doing the runs of several studies with one crew: a process that has been started does all of them."""
+"""Doing the runs of several studies with one executor: a process that has been started does all of them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov_app.replication.studying import Stopped, swept
+from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import opened
-from robocov_app.sweep.pool import LocalPool
-from robocov_app.sweep.sweeping import worked_off
-from robocov_app.sweep.task import tasks_of
-from robocov_app.sweep.telling import Count, told
+from robocov_app.sweep.study import tasks_of
+from robocov_app.sweep.sweeping import Count, told, worked_off
 
 if TYPE_CHECKING:
     from robocov_app.replication.studying import Means
     from robocov_app.sweep.ledger import Ledger
     from robocov_app.sweep.performing import Outcome
-    from robocov_app.sweep.study import Study
-    from robocov_app.sweep.task import Task
+    from robocov_app.sweep.study import Study, Task
 
 
 def swept_together(studies: Mapping[str, Study], folder: Path, means: Means, title: str) -> None:

@@ -214,7 +214,7 @@ def worst_runs(
     import numpy as np
 
     from robocov_app.sweep.performing import simulated
-    from robocov_app.sweep.task import tasks_of
+    from robocov_app.sweep.study import tasks_of
 
     gap = outcomes.of(law.key, "gap")
     order = [k for k in np.argsort(-gap, kind="stable").tolist() if np.isfinite(gap[k])]
@@ -261,7 +261,7 @@ def forecast(folder: Path, plan: Plan, workers: int, *, figures_only: bool = Fal
     Which gains are best is not known yet: it is taken that none of them are the shared ones.
     """
     from robocov_app.sweep.performing import perform
-    from robocov_app.sweep.task import tasks_of
+    from robocov_app.sweep.study import tasks_of
 
     studies = planned.figure_studies(plan)
     counts: dict[str, int] = {"rapf": 0, "rpf": 0, "lloyd": 0}
@@ -309,7 +309,7 @@ def runs_there(folder: Path, name: str, study: Study | None = None) -> int:
 
     Of a study that is given only its own: runs of a former one, of an older version say, may lie beside.
     """
-    from robocov_app.sweep.task import tasks_of
+    from robocov_app.sweep.study import tasks_of
 
     there = {each.name for each in (folder / "studies" / name / "runs").glob("[!.]*")}
     return len(there if study is None else there.intersection(task.name for task in tasks_of(study)))

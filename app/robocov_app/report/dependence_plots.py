@@ -16,7 +16,7 @@ from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, p
 from robocov_app.report.groups import Group, by_controller, dependences, medians, settings
 from robocov_app.report.result_plots import PANEL, RELATIVE, SCALE, Plot
 from robocov_app.report.svg import inline_svg
-from robocov_app.sweep.circumstances import UNITS, WORDS
+from robocov_app.sweep.study import UNITS, WORDS
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value

@@ -12,7 +12,7 @@ from robocov.errors import counted
 from robocov_app.render.phi import density_words
 from robocov_app.report.groups import gain_text, setting_label, variants
 from robocov_app.report.pairs import MOST_SAID
-from robocov_app.sweep.circumstances import UNITS, circumstance_text
+from robocov_app.sweep.study import UNITS, parameter_text
 
 if TYPE_CHECKING:
     from robocov_app.report.gathering import Entry, Result
@@ -237,7 +237,7 @@ def _team_text(result: Result) -> str:
         parts = [_parameter(str(key), value) for key, value in team.items()]
     for name, _ in result.entries[0].team if result.entries else ():
         values = list(dict.fromkeys(dict(entry.team)[name] for entry in result.entries))
-        several = ", ".join(circumstance_text(name, value) for value in values)
+        several = ", ".join(parameter_text(name, value) for value in values)
         parts.append(f"{name.replace('_', ' ')} {several}")
     return ", ".join(part for part in parts if part)
 
@@ -250,7 +250,7 @@ def _parameter(key: str, value: Any) -> str:
     for name, unit in UNITS.items():
         if key == name or key.startswith(f"{name}_"):
             if isinstance(value, str):
-                return f"{name.replace('_', ' ')} {circumstance_text(name, value)}"
+                return f"{name.replace('_', ' ')} {parameter_text(name, value)}"
             if value is None:
                 return f"{name.replace('_', ' ')} without limit"
             if isinstance(value, int | float):

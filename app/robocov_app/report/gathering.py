@@ -19,7 +19,7 @@ from robocov.metrics import mean_over_run
 from robocov.metrics.results import read_history, read_results
 from robocov.record import Record
 from robocov_app.runs.saved import load_saved, roster_of
-from robocov_app.sweep.circumstances import UNITS, circumstance_column
+from robocov_app.sweep.study import UNITS, parameter_column
 from robocov_app.sweep.table import gain_column
 
 if TYPE_CHECKING:
@@ -308,7 +308,7 @@ def _of_sweep(folder: Path) -> Result:
                 controller=controller,
                 label=printable(_label(controller)),
                 robots=int(row["robots"]),
-                team=tuple((name, row.get(circumstance_column(name))) for name in swept),
+                team=tuple((name, row.get(parameter_column(name))) for name in swept),
                 start=printable(str(row["start"])),
                 seed=row["seed"],
                 gains=_gains({name: row.get(gain_column(name)) for name in gains.get(controller, ())}),

@@ -12,7 +12,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers.gains import value_text
 from robocov_app.figures.curves import curve_styles, styles_of
-from robocov_app.sweep.circumstances import circumstance_text
+from robocov_app.sweep.study import parameter_text
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
@@ -132,7 +132,7 @@ def setting_label(result: Result, setting: tuple[object, ...]) -> str:
         parts.append(f"{robots} robots")
     assert isinstance(team, tuple)
     for parameter, value in team:
-        parts.append(f"{parameter.replace('_', ' ')} {circumstance_text(parameter, value)}")
+        parts.append(f"{parameter.replace('_', ' ')} {parameter_text(parameter, value)}")
     return ", ".join(parts)
 
 

@@ -24,7 +24,7 @@ from robocov_app.sweep.performing import FIGURES, made_with
 
 if TYPE_CHECKING:
     from robocov_app.sweep.performing import Outcome
-    from robocov_app.sweep.task import Task
+    from robocov_app.sweep.study import Task
 
 RUNS = "runs"
 """Name of the folder of the runs' folders."""

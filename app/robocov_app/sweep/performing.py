@@ -22,8 +22,7 @@ from robocov.metrics.run_metrics import figures_of
 from robocov.record import ARRAYS, versions
 from robocov_app.runs.run import cost_columns, cost_rows
 from robocov_app.runs.spec import RunSpec
-from robocov_app.sweep.circumstances import conditions_of
-from robocov_app.sweep.study import source_json, team_of
+from robocov_app.sweep.study import conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.metrics import CostHistory
     from robocov.record import Record
-    from robocov_app.sweep.task import Task
+    from robocov_app.sweep.study import Task
     from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4

@@ -1,27 +1,140 @@
-"""A study: what a sweep runs."""
+"""A study, what a sweep runs, and its tasks: one run each."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
+from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
+from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.controllers import controller_kind
+from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import Source, own_modules
+from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, place, shown, unknown_name
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
+from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.options import MOST_ROWS
-from robocov_app.sweep.circumstances import GROUPS, TeamValue, condition_axes, conditions_of
-from robocov_app.sweep.gain_choices import NO_LIMIT, Gains, Sampling, Wanted, once, whole
+from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, once, whole
 
-if TYPE_CHECKING:
-    from robocov.environment import Environment
+TeamValue: TypeAlias = float | str | None
+"""A value of what is varied of team and conditions."""
+
+WORDS = ("fail", "join")
+"""Conditions that are texts: ``3@20 5@40`` are two failures, in one run."""
+
+CONDITIONS = (*LIMITS, *WORDS)
+"""The conditions that a study may sweep."""
+
+GROUPS = "groups"
+"""Robots that differ, as JSON: the groups of a team file."""
+
+UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
+"""Units of all that may be varied."""
+
+_KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m"}
+_KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
+"""Units in the names of columns."""
+
+
+def parameter_column(name: str) -> str:
+    """Return the name of the column of a parameter of the team, or of a condition.
+
+    >>> parameter_column("max_speed"), parameter_column("delay"), parameter_column("loss")
+    ('max_speed_m_s', 'delay_s', 'loss')
+    """
+    return f"{name}{_KEY_UNITS[UNITS[name]]}"
+
+
+def parameter_text(name: str, value: TeamValue) -> str:
+    """Return a value with its unit.
+
+    >>> parameter_text("groups", '[{"count": 2, "max_speed": 0.5}, {"count": 1}]')
+    '2 with max speed 0.5 m/s; 1 as the rest'
+    >>> parameter_text("delay", 0.5), parameter_text("loss", 0.2), parameter_text("fail", "")
+    ('0.5 s', '0.2', 'none')
+    """
+    if name in WORDS:
+        return str(value) or "none"
+    if name == GROUPS:
+        return "; ".join(map(_group_text, json.loads(str(value))))
+    return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
+
+
+def _group_text(group: Mapping[str, Any]) -> str:
+    own = [
+        f"{name.replace('_', ' ')} {value if isinstance(value, str) else f'{value:g}'} {UNITS[name]}"
+        for name, value in group.items()
+        if name != "count"
+    ]
+    return f"{group['count']} {'with ' + ', '.join(own) if own else 'as the rest'}"
+
+
+def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str, list[TeamValue]]:
+    """Return the values of each condition that is given.
+
+    `robots`: the sizes of teams. Raises ParameterError on an unknown name, or a value that cannot be used;
+    the message begins with its place.
+    """
+    axes: dict[str, list[TeamValue]] = {}
+    for name, values in given.items():
+        if name not in CONDITIONS:
+            raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
+        several = isinstance(values, Sequence) and not isinstance(values, str)
+        path = ("conditions", name)
+        axes[name] = [
+            _value(name, value, (*path, k) if several else path)
+            for k, value in enumerate(values if several else (values,))
+        ]
+        if not axes[name]:
+            raise ParameterError(f"conditions.{name}: none, but at least one value was wanted")
+        once(axes[name], path)
+    return axes
+
+
+def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
+    """Return the conditions among what a study varies; None where they are ideal.
+
+    Raises ParameterError when they cannot be for so many robots.
+    """
+    values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
+    conditions = Conditions(
+        **values,
+        failures=tuple(parsed_entry(Failure, word) for word in str(parameters.get("fail", "")).split()),
+        joins=tuple(parsed_entry(Join, word) for word in str(parameters.get("join", "")).split()),
+        seed=seed,
+    )
+    conditions.check_team(robots)
+    return None if conditions.ideal else conditions
+
+
+def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
+    if name in WORDS:
+        if not isinstance(value, str):
+            raise ParameterError(f'{place(path)}: {shown(value)}, but a text, as in "3@20", was wanted')
+        kind: type[Failure | Join] = Failure if name == "fail" else Join
+        try:
+            return " ".join(str(parsed_entry(kind, word)) for word in value.split())
+        except ParameterError as error:
+            raise ParameterError(f"{place(path)}: {error}") from None
+    if name == "message_rate" and value in (None, NO_LIMIT):
+        return None
+    try:
+        made = Conditions(**{name: value, **({} if name == "forget_after" else {"forget_after": 1e6})})  # type: ignore[arg-type]
+    except ParameterError as error:
+        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+    number: float = getattr(made, name)
+    return number
+
 
 MOST_RUNS = 1_000_000
 
@@ -349,3 +462,96 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     if GROUPS in team:
         return team_of_groups(json.loads(str(team[GROUPS])), ("team", "group"), values)
     return Team.homogeneous(robots, **values)
+
+
+_FORMAT = "robocov-task 1"
+"""Version of the digest; that the same inputs give other results is told by `made_with`."""
+
+_SHORT = 24
+"""Characters of each name in the name of a folder."""
+
+_DIGITS = 10
+"""Hexadecimal digits of the digest in the name of a folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One run; nothing but this is needed to do it, on whatever machine.
+
+    `map`: what the study calls the map. `document`: the whole map as JSON. `source`: of a controller of one's
+    own: its file, and its author's modules that it imports. `gains`: all of them. `team`: as
+    `Team.homogeneous` takes them, None for a range without limit; and the conditions that the study gives.
+    `duration`, `dt` in s. `cost_hz`, `record_hz` in Hz. `metrics`: whether the table is to hold the metrics
+    of the end. `digest`: of all of this but where files are: tasks of one digest have one result.
+    """
+
+    map: str
+    document: str
+    controller: str
+    source: Source | None
+    gains: Mapping[str, Value]
+    robots: int
+    team: Mapping[str, TeamValue]
+    start: str
+    seed: int
+    duration: float
+    dt: float
+    lattice: int
+    cost_hz: float
+    record_hz: float
+    metrics: bool = False
+    digest: str = ""
+
+    @property
+    def name(self) -> str:
+        """The name of the run's folder."""
+        words = (self.map, self.controller.rpartition(":")[2], self.robots, self.start, self.seed)
+        return "-".join([*(_fit(str(word)) for word in words), self.digest[:_DIGITS]])
+
+
+def tasks_of(study: Study) -> Iterator[Task]:
+    """Yield the runs of a study in their fixed order, that of the rows of its table.
+
+    Maps are outermost; then robots, the rest of the team, starts and seeds; controllers and their gains
+    are innermost.
+    """
+    once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
+    once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
+    if study.metrics:
+        once["metrics"] = True
+    laws: list[tuple[dict[str, Any], dict[str, Any]]] = []  # what tasks hold of them, what their digests say
+    for name in study.controllers:
+        source = study.sources.get(name)
+        said: dict[str, Any] = {"source": None, "path": None}
+        if source is not None:
+            said["source"] = _digest(source.text)
+            if source.modules:
+                said["modules"] = {key: _digest(module.text) for key, module in source.modules.items()}
+        for choice in study.gains_of(name).choices:
+            own = {"controller": name, "gains": dict(choice)}
+            laws.append(({**own, "source": source}, {**own, **said}))
+    for each in study.maps:
+        document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
+        short = {"document": _digest(document)}
+        for robots in study.robots:
+            for team in study.teams:
+                for start in study.starts_on(each):
+                    for seed in study.seeds:
+                        place = {"map": each.name, "robots": robots, "start": start, "seed": seed}
+                        for law, words in laws:
+                            inputs: dict[str, Any] = {**once, **place, "team": dict(team)}
+                            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
+                            yield Task(**inputs, **law, document=document, digest=digest)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _fit(word: str) -> str:
+    """Return a word as it can be a part of a folder's name on any system.
+
+    >>> _fit("Two rooms: a/b")
+    'Two-rooms-a-b'
+    """
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", word).strip(".-")[:_SHORT] or "x"

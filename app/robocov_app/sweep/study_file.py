@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 from robocov.errors import InputError, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.sweep.gain_choices import NO_LIMIT, Method, Range, Sampling, Scale, once
+from robocov_app.sweep.gains import NO_LIMIT, Method, Range, Sampling, Scale, once
 from robocov_app.sweep.study import ALL, MOST_RUNS, Study, StudyMap
 
 if TYPE_CHECKING:

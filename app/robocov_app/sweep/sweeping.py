@@ -2,31 +2,156 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from itertools import compress, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robocov.compiled import compile_kernels
-from robocov.errors import OutputError, ParameterError, RobocovError, shown
-from robocov_app.sweep.ledger import difference_of, opened, study_bytes
-from robocov_app.sweep.pool import LocalPool, processors
+from robocov.errors import OutputError, ParameterError, RobocovError, counted, shown
+from robocov_app.sweep.executors import Executor, LocalPool, processors
+from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened, study_bytes
+from robocov_app.sweep.performing import Outcome, perform, prepared
+from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
-from robocov_app.sweep.task import tasks_of
-from robocov_app.sweep.telling import Count, told
 from robocov_app.terminal.interruption import Interruption
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from rich.progress import Progress
 
-    from robocov_app.sweep.crew import Crew
-    from robocov_app.sweep.ledger import Entry, Ledger
-    from robocov_app.sweep.performing import Outcome
-    from robocov_app.sweep.study import Study
-    from robocov_app.sweep.task import Task
+
+PERIOD = 10.0
+"""Seconds between two lines where there is no terminal."""
+
+
+@dataclass
+class Count:
+    """How many runs there are, and what became of them so far.
+
+    `done`, `failed`: those of this sweep. `reused`: those that were there already. `lost`: workers that have
+    ended in the midst of a run. `waiting`: what everything waits for; empty where somebody is at work.
+    `began`, s: when it began, by the clock of `time.perf_counter`.
+    """
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    reused: int = 0
+    lost: int = 0
+    waiting: str = ""
+    began: float = field(default_factory=time.perf_counter)
+
+    @property
+    def rate(self) -> float:
+        """Runs a second; 0 before the first one."""
+        seconds = time.perf_counter() - self.began
+        return (self.done + self.failed) / seconds if seconds > 0 else 0.0
+
+    @property
+    def left(self) -> float | None:
+        """Seconds to the end, None before the first run."""
+        rest = self.total - self.done - self.failed - self.reused
+        return rest / self.rate if self.rate else None
+
+    @property
+    def ahead(self) -> str:
+        """Estimated time left, or the reason why everything waits."""
+        return self.waiting or (f"{duration(self.left)} left" if self.left else "")
+
+    def __str__(self) -> str:
+        words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
+        words += [f"{self.failed} failed"] * (self.failed > 0)
+        words += [f"{self.reused} were there"] * (self.reused > 0)
+        words += [f"{counted(self.lost, 'worker')} lost"] * (self.lost > 0)
+        if self.rate > 0:
+            words.append(f"{self.rate:.0f} a second" if self.rate >= 10 else f"{self.rate:.2g} a second")
+        return ", ".join(words)
+
+
+class Teller:
+    """Is called whenever the count has changed, or some time has passed; this one says nothing."""
+
+    def __call__(self, count: Count) -> None:
+        """Say how far it is."""
+
+    def say(self, line: str) -> None:
+        """Say something else."""
+
+
+class _Lines(Teller):
+    def __init__(self, title: str) -> None:
+        self._title, self._said, self._waiting = title, time.perf_counter(), ""
+
+    def __call__(self, count: Count, *, at_once: bool = False) -> None:
+        now = time.perf_counter()
+        due = now - self._said >= PERIOD and not count.waiting  # that is told once
+        if at_once or due or count.waiting != self._waiting:
+            self._said, self._waiting = now, count.waiting
+            self.say(", ".join(filter(None, (str(count), count.ahead))))
+
+    def say(self, line: str) -> None:
+        sys.stderr.write(f"{self._title}: {line}\n")
+        sys.stderr.flush()
+
+
+class _Bar(Teller):
+    def __init__(self, bar: Progress, title: str, total: int) -> None:
+        self._bar, self._task = bar, bar.add_task(title, total=total, said="", left="")
+
+    def __call__(self, count: Count) -> None:
+        done = count.done + count.failed + count.reused
+        self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
+
+    def say(self, line: str) -> None:
+        self._bar.console.print(line, markup=False, highlight=False)
+
+
+@contextmanager
+def told(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
+    """Give a function to be called with the count when it has changed, and now and then.
+
+    `quiet`: say nothing.
+    """
+    if quiet:
+        yield Teller()
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TextColumn("{task.fields[said]}", markup=False),
+            TextColumn("{task.fields[left]}", markup=False),
+        )
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            yield _Bar(bar, title, count.total)
+    else:
+        lines = _Lines(title)
+        yield lines
+        lines(count, at_once=True)
+
+
+def duration(seconds: float) -> str:
+    """Return a time for people.
+
+    >>> duration(8.2), duration(95), duration(4000), duration(200000)
+    ('8 s', '1 min 35 s', '1 h 6 min', '2 d 7 h')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    if whole < 86400:
+        return f"{whole // 3600} h {whole % 3600 // 60} min"
+    return f"{whole // 86400} d {whole % 86400 // 3600} h"
+
 
 MOST_WORKERS = 1024
 
@@ -125,11 +250,11 @@ def sweep(
             tell.say(line)
         rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
-        def hired() -> Crew:
+        def hired() -> Executor:
             if scheduler is None:
                 compile_kernels()
                 return LocalPool(min(workers or processors(), sum(survey.todo)))
-            from robocov_app.sweep.cluster import Cluster
+            from robocov_app.sweep.executors import Cluster
 
             return Cluster(scheduler)
 
@@ -168,7 +293,7 @@ def sweep(
 
 def worked_off(
     tasks: Iterable[Task],
-    hired: Callable[[], Crew],
+    hired: Callable[[], Executor],
     count: Count,
     stop: Interruption,
     keep: Callable[[Task, Outcome], object],
@@ -179,17 +304,17 @@ def worked_off(
     there is one.
     """
     with ExitStack() as stack:
-        crew: Crew | None = None
+        executor: Executor | None = None
         left = iter(tasks)
         task = next(left, None)
-        while (task is not None or (crew is not None and crew.busy)) and not stop.requested:
-            if crew is None:
-                crew = stack.enter_context(hired())
-            while task is not None and not crew.full:
-                crew.submit(task)
+        while (task is not None or (executor is not None and executor.busy)) and not stop.requested:
+            if executor is None:
+                executor = stack.enter_context(hired())
+            while task is not None and not executor.full:
+                executor.submit(task)
                 task = next(left, None)
-            back = crew.next(_PATIENCE)
-            count.waiting, count.lost = crew.waiting, crew.lost
+            back = executor.next(_PATIENCE)
+            count.waiting, count.lost = executor.waiting, executor.lost
             if count.waiting and not count.done + count.failed:
                 count.began = time.perf_counter()
             if back is not None:
@@ -242,3 +367,73 @@ class _Rows:
             self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
         if entry.error is not None and (entry.error in self.errors or len(self.errors) < _ERRORS):
             self.errors.setdefault(entry.error, task.name)
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """What a sweep would take.
+
+    `left`: those that are not done yet. `axes`: how many values there are of each thing that the study
+    varies; their product is `runs` where all maps have as many starts, and all controllers as many gains.
+    `run`: name of the run that was done. `error`: why that failed. `seconds_a_run` in s. `seconds`, s: for
+    all that are left, on so many workers. `bytes`: for all runs together. `notes`: what of that which is
+    there is done again, and why.
+    """
+
+    runs: int
+    left: int
+    axes: dict[str, int]
+    run: str
+    error: str | None
+    seconds_a_run: float
+    bytes_a_run: int
+    seconds: float
+    bytes: int
+    notes: list[str]
+
+
+def rehearsed(
+    study: Study,
+    folder: Path | None,
+    *,
+    workers: int,
+    retry_failed: bool = False,
+    keep_versions: bool = False,
+) -> Rehearsal:
+    """Do the first run that is left, or else the first, and write nothing.
+
+    `folder`: where runs may be that are done already. `workers`: on which the time is estimated.
+    `retry_failed`, `keep_versions`: as of a sweep.
+    """
+    survey = Survey(bytearray(b"\x01") * len(study))
+    if folder is not None:
+        ledger = Ledger(folder)
+        survey = ledger.survey(tasks_of(study), retry_failed=retry_failed, keep_versions=keep_versions)
+    left = sum(survey.todo)
+    chosen = next(compress(tasks_of(study), survey.todo), None) or next(tasks_of(study))
+    prepared(chosen)  # once for all runs on a map
+    began = time.perf_counter()
+    outcome = perform(chosen)
+    seconds = time.perf_counter() - began
+    size = sum(map(len, outcome.files.values()))
+    return Rehearsal(
+        runs=len(study),
+        left=left,
+        axes=axes_of(study),
+        run=chosen.name,
+        error=outcome.error,
+        seconds_a_run=seconds,
+        bytes_a_run=size,
+        seconds=seconds * left / max(1, min(workers, left)),
+        bytes=size * len(study),
+        notes=survey.words(keep_versions=keep_versions),
+    )
+
+
+def axes_of(study: Study) -> dict[str, int]:
+    """Return how many values there are of each thing that a study varies."""
+    axes: dict[str, Any] = {"maps": study.maps, "robots": study.robots, "teams": study.teams}
+    axes |= {"starts": [name for each in study.maps for name in study.starts_on(each)]}
+    axes |= {"seeds": study.seeds, "controllers": study.controllers}
+    sizes = {name: len(values) for name, values in axes.items()}
+    return sizes | {f"gains of {name}": len(study.gains_of(name).choices) for name in study.controllers}

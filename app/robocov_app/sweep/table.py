@@ -13,8 +13,8 @@ from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.files.atomic import on_disk, writable
-from robocov_app.sweep.circumstances import CONDITIONS, UNITS, WORDS, circumstance_column
 from robocov_app.sweep.performing import FIGURES, TIMED
+from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, parameter_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from robocov_app.sweep.ledger import Entry
-    from robocov_app.sweep.study import Study
-    from robocov_app.sweep.task import Task
+    from robocov_app.sweep.study import Study, Task
 
 CSV, PARQUET = "results.csv", "results.parquet"
 
@@ -97,7 +96,7 @@ def columns_of(study: Study) -> tuple[Column, ...]:
                 gains[name] = gains[name]._replace(kind="string")
     team = (
         Column(
-            circumstance_column(name),
+            parameter_column(name),
             "string" if name in WORDS else "double",
             UNITS[name],
             f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}",
@@ -111,7 +110,7 @@ def columns_of(study: Study) -> tuple[Column, ...]:
 def gain_column(name: str) -> str:
     """Return the name of the column of a gain: its own, unless another column has it."""
     taken = {column.name for column in (*_BEFORE, _DURATION, *_FIGURES, _TIME, *_METRICS, *_AFTER)}
-    taken |= {circumstance_column(name) for name in UNITS}
+    taken |= {parameter_column(name) for name in UNITS}
     return f"gain_{name}" if name in taken else name
 
 
@@ -124,7 +123,7 @@ def row_of(task: Task, entry: Entry) -> dict[str, Any]:
         "start": task.start,
         "seed": task.seed,
         **{gain_column(name): value for name, value in task.gains.items()},
-        **{circumstance_column(name): value for name, value in task.team.items()},
+        **{parameter_column(name): value for name, value in task.team.items()},
         "duration_s": task.duration,
         **entry.figures,
         "run": task.name,

@@ -33,8 +33,7 @@ from robocov_app.replication.evidence import evidence_rows
 from robocov_app.replication.goals import QUESTIONS
 from robocov_app.replication.outcomes import joined
 from robocov_app.replication.pages import Image
-from robocov_app.sweep.study import Study
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import Study, tasks_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-beyond")]
 

@@ -8,7 +8,7 @@ from robocov_app.replication.beyond_plan import IN_CLAIMS, OURS
 from robocov_app.replication.contenders import best
 from robocov_app.replication.plan import FULL, QUICK, claim_maps, claims_study, tuning_maps
 from robocov_app.replication.verdicts import LEAST_MAPS
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import tasks_of
 
 both = pytest.mark.parametrize(
     "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]

@@ -7,7 +7,7 @@ import pytest
 from robocov.errors import RobocovError
 from robocov_app.replication.degradation import AXES, QUICK, Degradation, DegradationPlan, degradations
 from robocov_app.sweep.performing import FIGURES, Outcome, failed
-from robocov_app.sweep.task import Task
+from robocov_app.sweep.study import Task
 
 TINY = DegradationPlan(
     maps=("rooms",),

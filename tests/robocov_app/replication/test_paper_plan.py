@@ -8,7 +8,7 @@ from robocov_app.replication import plan as planned
 from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, best
 from robocov_app.replication.maps import KINDS
 from robocov_app.replication.plan import FULL, QUICK
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import tasks_of
 
 BEST = {
     "rapf": best("rapf", {"k_rep": 0.3, "rho_0": 3.0, "k_att": 30.0, "attraction_limit": None}),

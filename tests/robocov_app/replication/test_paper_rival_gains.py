@@ -19,7 +19,7 @@ from robocov_app.replication.rival_gains import (
     studied_rival_gains,
     tuned_rivals,
 )
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import tasks_of
 
 DEFAULTS = gain_values(make_controller("range-limited"))
 

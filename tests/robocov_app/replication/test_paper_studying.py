@@ -26,7 +26,7 @@ from robocov_app.replication.claims import compared
 from robocov_app.replication.tables import ORDER, law_rows, map_rows
 from robocov_app.replication.words import arrival, seen
 from robocov_app.replication.writing import page, save_claims, save_page, save_pictures
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import tasks_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 

@@ -17,11 +17,11 @@ from swept import controller, small_study, tables
 
 from robocov.errors import InputError, OutputError
 from robocov_app.cli import main
-from robocov_app.sweep import cluster as cluster_module
-from robocov_app.sweep.cluster import Cluster
+from robocov_app.sweep import executors as cluster_module
+from robocov_app.sweep.executors import Cluster
 from robocov_app.sweep.performing import perform
+from robocov_app.sweep.study import tasks_of
 from robocov_app.sweep.sweeping import Totals, sweep
-from robocov_app.sweep.task import tasks_of
 
 distributed = pytest.importorskip("distributed")
 
@@ -47,8 +47,8 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
     with a_cluster(processes=False) as cluster:
         address = cluster.scheduler_address
         assert sweep(study, tmp_path / "there", scheduler=address, quiet=True) == expected
-        with Cluster(address) as crew:
-            assert (crew.threads, crew.most) == (2, 4)
+        with Cluster(address) as executor:
+            assert (executor.threads, executor.most) == (2, 4)
         file = tmp_path / "study.toml"
         file.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
         words = ("sweep", str(file), "--dry-run", "--scheduler", address)
@@ -73,15 +73,15 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
 def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster_module, "_LOOK", 0.05)
     task = next(tasks_of(small_study()))
-    with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as crew:
-        crew.submit(task)
-        assert crew.next(0.1) is None
-        assert crew.waiting == f"no workers are connected to {cluster.scheduler_address}; waiting"
+    with a_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
+        executor.submit(task)
+        assert executor.next(0.1) is None
+        assert executor.waiting == f"no workers are connected to {cluster.scheduler_address}; waiting"
         cluster.scale(1)
-        while (back := crew.next(0.1)) is None:
+        while (back := executor.next(0.1)) is None:
             pass
         assert back[1].error is None
-        while crew.waiting:  # until it looks again
+        while executor.waiting:  # until it looks again
             pass
 
 
@@ -95,9 +95,9 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
     here = perform(task)
     for path in tmp_path.iterdir():
         path.unlink()
-    with a_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as crew:
-        crew.submit(task)
-        while (back := crew.next(0.1)) is None:
+    with a_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
+        executor.submit(task)
+        while (back := executor.next(0.1)) is None:
             pass
     assert back[1] == here
     assert here.error is None
@@ -106,15 +106,15 @@ def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
 def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:
     name = controller(tmp_path, "        time.sleep(0.02)\n")
     study = small_study(controllers=(name,), seeds=range(12))
-    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as crew:
+    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
         for task in tasks_of(study):
-            crew.submit(task)
-        while crew.next(0.1) is None:
+            executor.submit(task)
+        while executor.next(0.1) is None:
             pass
         cluster.close()
         with pytest.raises(OutputError, match=r"--scheduler: inproc://.*: the runs cannot go on: "):
-            while crew.busy:
-                crew.next(0.1)
+            while executor.busy:
+                executor.next(0.1)
 
 
 def test_nobody_at_the_address_is_one_line(
@@ -154,11 +154,11 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
 
     task = next(tasks_of(small_study()))
     monkeypatch.setattr(cluster_module, "perform", unknown)
-    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as crew:
-        crew.submit(task)
+    with a_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
+        executor.submit(task)
         with pytest.raises(OutputError, match="ModuleNotFoundError: No module named 'robocov_app'"):
-            while crew.busy:
-                crew.next(0.1)
+            while executor.busy:
+                executor.next(0.1)
 
 
 def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:

@@ -16,7 +16,7 @@ from robocov.errors import InputError, OutputError
 from robocov_app.sweep import ledger as ledger_module
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, is_sweep, opened
 from robocov_app.sweep.performing import Outcome, perform
-from robocov_app.sweep.task import Task, tasks_of
+from robocov_app.sweep.study import Task, tasks_of
 
 STUDY = small_study().to_json()
 DONE = Outcome(

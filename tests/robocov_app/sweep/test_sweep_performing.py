@@ -18,9 +18,8 @@ from robocov.metrics import cost_history, summarise
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
 from robocov_app.sweep.performing import FIGURES, Outcome, perform, prepared, simulated
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
 from robocov_app.sweep.table import columns_of
-from robocov_app.sweep.task import Task, tasks_of
 
 
 def first(study: Study) -> Task:

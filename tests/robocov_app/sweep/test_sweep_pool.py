@@ -11,11 +11,10 @@ import pytest
 from swept import controller, small_study
 
 from robocov.errors import OutputError
-from robocov_app.sweep import pool as pool_module
-from robocov_app.sweep.crew import Crew, Lost, Returned
+from robocov_app.sweep import executors as pool_module
+from robocov_app.sweep.executors import Executor, LocalPool, Lost, Returned, processors
 from robocov_app.sweep.performing import Outcome, perform
-from robocov_app.sweep.pool import LocalPool, processors
-from robocov_app.sweep.task import Task, tasks_of
+from robocov_app.sweep.study import Task, tasks_of
 
 PATIENCE = 60.0
 
@@ -25,21 +24,21 @@ KILLED = Lost("its process ended (signal 9)", "", blamed=False)
 CRASHED = Lost("its process ended (exit status 3)", "Fatal", blamed=True)
 
 
-def done_by(crew: Crew, tasks: list[Task]) -> dict[str, Outcome]:
-    """Let a crew do tasks; return what came of them by name."""
+def done_by(executor: Executor, tasks: list[Task]) -> dict[str, Outcome]:
+    """Let a executor do tasks; return what came of them by name."""
     outcomes: dict[str, Outcome] = {}
     end = time.monotonic() + PATIENCE
     for task in tasks:
-        crew.submit(task)
-    while crew.busy:
+        executor.submit(task)
+    while executor.busy:
         assert time.monotonic() < end
-        back = crew.next(0.1)
+        back = executor.next(0.1)
         if back is not None:
             outcomes[back[0].name] = back[1]
     return outcomes
 
 
-class Scripted(Crew):
+class Scripted(Executor):
     """Returns what it is told to, first in, first out; remembers what was out at the same time."""
 
     def __init__(self, most: int, script: dict[str, list[Outcome | Lost]]) -> None:
@@ -72,46 +71,46 @@ def tasks() -> list[Task]:
 
 
 def test_no_more_is_handed_out_than_is_wanted(tasks: list[Task]) -> None:
-    with Scripted(2, {}) as crew:
-        assert not crew.full
+    with Scripted(2, {}) as executor:
+        assert not executor.full
         for task in tasks[:2]:
-            crew.submit(task)
-        assert crew.full
-        assert done_by(crew, tasks[2:]) == {task.name: FINE for task in tasks}
-        assert max(count for _, count in crew.together) == 2
+            executor.submit(task)
+        assert executor.full
+        assert done_by(executor, tasks[2:]) == {task.name: FINE for task in tasks}
+        assert max(count for _, count in executor.together) == 2
 
 
 def test_a_task_that_is_not_to_blame_is_done_alone_and_does_not_fail_for_others(tasks: list[Task]) -> None:
     name = tasks[1].name
-    with Scripted(3, {name: [KILLED, KILLED, FINE]}) as crew:
-        assert done_by(crew, tasks) == {task.name: FINE for task in tasks}
-    assert [count for other, count in crew.together if other == name][1:] == [1, 1]
+    with Scripted(3, {name: [KILLED, KILLED, FINE]}) as executor:
+        assert done_by(executor, tasks) == {task.name: FINE for task in tasks}
+    assert [count for other, count in executor.together if other == name][1:] == [1, 1]
 
 
 def test_a_task_that_ends_its_worker_alone_twice_has_failed(tasks: list[Task]) -> None:
     name = tasks[1].name
-    with Scripted(3, {name: [KILLED, KILLED, KILLED]}) as crew:
-        outcomes = done_by(crew, tasks)
+    with Scripted(3, {name: [KILLED, KILLED, KILLED]}) as executor:
+        outcomes = done_by(executor, tasks)
     assert outcomes.pop(name).error == "its process ended (signal 9)"
     assert outcomes == {task.name: FINE for task in tasks if task.name != name}
 
 
 def test_a_task_that_is_to_blame_holds_nobody_up(tasks: list[Task]) -> None:
     name = tasks[1].name
-    with Scripted(3, {name: [CRASHED, CRASHED]}) as crew:
-        outcomes = done_by(crew, tasks)
+    with Scripted(3, {name: [CRASHED, CRASHED]}) as executor:
+        outcomes = done_by(executor, tasks)
     assert outcomes[name].error == "its process ended (exit status 3)"
-    assert [count for other, count in crew.together if other == name] == [3, 3]
+    assert [count for other, count in executor.together if other == name] == [3, 3]
     assert len(outcomes) == len(tasks)
 
 
 def test_workers_that_end_again_and_again_end_the_sweep() -> None:
     tasks = list(tasks_of(small_study(seeds=range(20))))
-    with Scripted(2, {task.name: [KILLED] * 9 for task in tasks}) as crew:
+    with Scripted(2, {task.name: [KILLED] * 9 for task in tasks}) as executor:
         told = pytest.raises(OutputError, match=r"workers have ended one after the other.*signal 9")
         with told:
-            done_by(crew, tasks)
-    assert crew.lost == 21
+            done_by(executor, tasks)
+    assert executor.lost == 21
 
 
 def test_processes_do_what_this_one_does(tasks: list[Task]) -> None:

@@ -8,9 +8,8 @@ import pytest
 from swept import HALL, ROOM, controller, small_study
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.sweep.gain_choices import Range, Sampling
-from robocov_app.sweep.study import Study, StudyMap, team_of
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.gains import Range, Sampling
+from robocov_app.sweep.study import Study, StudyMap, tasks_of, team_of
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 

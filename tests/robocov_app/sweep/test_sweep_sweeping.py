@@ -22,12 +22,11 @@ from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.sweep import sweeping
-from robocov_app.sweep.crew import Crew, Returned
+from robocov_app.sweep.executors import Executor, Returned
 from robocov_app.sweep.ledger import opened
 from robocov_app.sweep.performing import made_with, perform
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.sweeping import Totals, sweep
-from robocov_app.sweep.task import Task, tasks_of
 from robocov_app.terminal.interruption import Interruption
 
 PATIENCE = 60.0
@@ -41,7 +40,7 @@ LINUX = pytest.mark.skipif(
 )
 
 
-class Here(Crew):
+class Here(Executor):
     """Does tasks in this process, the last one first, as many at once as it may."""
 
     def __init__(self, most: int = 5) -> None:
@@ -78,9 +77,9 @@ class Here(Crew):
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> Here:
     """Sweeps are done in this process."""
-    crew = Here()
-    monkeypatch.setattr(sweeping, "LocalPool", lambda workers: crew)
-    return crew
+    executor = Here()
+    monkeypatch.setattr(sweeping, "LocalPool", lambda workers: executor)
+    return executor
 
 
 @pytest.fixture(scope="module")

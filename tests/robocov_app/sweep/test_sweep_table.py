@@ -16,9 +16,8 @@ from robocov.errors import OutputError
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.performing import FIGURES
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study import Study, tasks_of
 from robocov_app.sweep.table import Table, columns_of, gain_column, row_of
-from robocov_app.sweep.task import tasks_of
 
 FIGURED = Entry(
     {

@@ -13,8 +13,7 @@ from swept import HALL, ROOM, controller, small_study
 
 from robocov.mapfile import load_map
 from robocov_app.sweep.performing import simulated
-from robocov_app.sweep.study import StudyMap
-from robocov_app.sweep.task import tasks_of
+from robocov_app.sweep.study import StudyMap, tasks_of
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 

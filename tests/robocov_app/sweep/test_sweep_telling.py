@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from robocov_app.sweep import telling
-from robocov_app.sweep.telling import Count, told
+from robocov_app.sweep import sweeping as telling
+from robocov_app.sweep.sweeping import Count, told
 
 
 class Clock:

@@ -1,0 +1,410 @@
+"""Executors of a sweep's tasks: processes of this machine, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import logging
+import math
+import os
+import queue
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import uuid
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from typing import IO, Any, NamedTuple, Self, TypeAlias
+
+from robocov.errors import InputError, OutputError
+from robocov_app.sweep.performing import Outcome, failed, perform
+from robocov_app.sweep.study import Task
+from robocov_app.toolkit.worker import READY, asked, ended, receive, started
+
+_ENDS = 2
+"""Workers that may end through a task before it counts as failed."""
+
+_IN_A_ROW = 20
+"""Workers that may end one after the other without a finished run in between."""
+
+
+class Lost(NamedTuple):
+    """A worker has ended in the midst of a task.
+
+    `cause`: one line. `blamed`: whether it is certain that it was this task, and nothing else, that made the
+    worker end.
+    """
+
+    cause: str
+    details: str
+    blamed: bool
+
+
+Returned: TypeAlias = "tuple[Task, Outcome | Lost]"
+
+
+class Executor(ABC):
+    """Does tasks; a context, whose end stops what is going on.
+
+    A task whose worker has ended is done again. Where it is not certain that the task is to blame (another
+    one may have taken all the memory), it is done alone, with nothing else going on. When workers have ended
+    twice through it, it has failed. When workers end again and again, whatever they do, all ends. `lost`: how
+    many workers have ended in the midst of a task.
+    """
+
+    def __init__(self) -> None:
+        self._backlog: deque[Task] = deque()
+        self._alone: deque[Task] = deque()
+        self._ends: Counter[str] = Counter()
+        self._out = 0
+        self._lonely = False  # whether the one that is out is to be alone
+        self.lost = self._in_a_row = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    @abstractmethod
+    def __exit__(self, *exception: object) -> None: ...
+
+    @property
+    @abstractmethod
+    def most(self) -> int:
+        """How many tasks should be handed out at once, so that nobody is idle."""
+
+    @abstractmethod
+    def _hand_out(self, task: Task) -> None: ...
+
+    @abstractmethod
+    def _returned(self, timeout: float) -> Returned | None:
+        """Return a task that was handed out, and what came of it; None where none is for so many seconds."""
+
+    @property
+    def waiting(self) -> str:
+        """Reason why no worker is at work, in words; empty where one is."""
+        return ""
+
+    @property
+    def busy(self) -> int:
+        """How many tasks were submitted and have not come back."""
+        return self._out + len(self._backlog) + len(self._alone)
+
+    @property
+    def full(self) -> bool:
+        """Whether more tasks would only wait."""
+        return self.busy >= self.most
+
+    def submit(self, task: Task) -> None:
+        """Take a task on."""
+        self._backlog.append(task)
+        self._feed()
+
+    def next(self, timeout: float) -> tuple[Task, Outcome] | None:
+        """Return a task that has come back, in any order; None where none does for so many seconds.
+
+        Raises OutputError when nobody can do tasks any more, or workers end again and again.
+        """
+        self._feed()
+        back = self._returned(timeout)
+        if back is None:
+            return None
+        task, came = back
+        together, self._lonely = self._out > 1, False
+        self._out -= 1
+        self._in_a_row = self._in_a_row + 1 if isinstance(came, Lost) else 0
+        outcome = self._considered(task, came, together) if isinstance(came, Lost) else came
+        self._feed()
+        return None if outcome is None else (task, outcome)
+
+    def _feed(self) -> None:
+        """Hand tasks out, or one alone."""
+        if self._lonely:
+            return
+        if self._alone:
+            if self._out == 0:
+                self._lonely, self._out = True, 1
+                self._hand_out(self._alone.popleft())
+            return
+        while self._backlog and self._out < self.most:
+            self._hand_out(self._backlog.popleft())
+            self._out += 1
+
+    def _considered(self, task: Task, lost: Lost, together: bool) -> Outcome | None:
+        """Return that a task has failed, None where it is to be done again."""
+        self.lost += 1
+        if self._in_a_row > max(_IN_A_ROW, 4 * self.most):
+            raise OutputError(
+                f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}; "
+                f"what is done is kept, and the same command goes on"
+            )
+        if together and not lost.blamed:
+            self._alone.append(task)
+            return None
+        self._ends[task.name] += 1
+        if self._ends[task.name] < _ENDS:
+            (self._backlog if lost.blamed else self._alone).appendleft(task)
+            return None
+        del self._ends[task.name]
+        return failed(lost.cause, lost.details)
+
+
+_STARTS = 3
+"""How often a process may end before it has begun."""
+
+_LAST_WORDS = 4000
+"""Characters of the complaints of a process that ended that are kept."""
+
+_OUTSIDE = -getattr(signal, "SIGKILL", 9)
+"""The status of a process that was ended from outside: by a user, or because memory ran out."""
+
+
+_Event: TypeAlias = "tuple[Task, Outcome | Lost | OutputError]"
+
+
+class LocalPool(Executor):
+    """Processes on this machine, each of which does one task at a time.
+
+    A process that ends is replaced. If it was ended from outside, there may have been too little memory for
+    all of them.
+    """
+
+    def __init__(self, workers: int) -> None:
+        super().__init__()
+        self._tasks: queue.SimpleQueue[Task | None] = queue.SimpleQueue()
+        self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
+        self._hands = [_WorkerThread(self._tasks, self._events) for _ in range(workers)]
+
+    def __exit__(self, *exception: object) -> None:
+        for hand in self._hands:
+            hand.stop()
+        for _ in self._hands:
+            self._tasks.put(None)
+        for hand in self._hands:
+            hand.join()
+
+    @property
+    def most(self) -> int:
+        """As many as there are processes, and one that is ready for the first that comes back."""
+        return len(self._hands) + 1
+
+    def _hand_out(self, task: Task) -> None:
+        self._tasks.put(task)
+
+    def _returned(self, timeout: float) -> Returned | None:
+        try:
+            task, event = self._events.get(timeout=timeout)
+        except queue.Empty:
+            return None
+        if isinstance(event, OutputError):
+            raise event
+        return task, event
+
+
+class _WorkerThread:
+    """A thread that hands tasks to a process, and starts another one when that ends."""
+
+    def __init__(self, tasks: queue.SimpleQueue[Task | None], events: queue.SimpleQueue[_Event]) -> None:
+        self._tasks, self._events = tasks, events
+        self._process: subprocess.Popen[bytes] | None = None
+        self._complaints: IO[bytes] | None = None
+        self._stopped = False
+        self._starting = threading.Lock()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the process, whatever it does."""
+        with self._starting:
+            self._stopped = True
+            if self._process is not None:
+                self._process.kill()
+
+    def join(self) -> None:
+        """Wait until the thread has ended."""
+        self._thread.join()
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None and not self._stopped:
+            try:
+                self._events.put((task, self._done(task)))
+            except OutputError as error:
+                self._events.put((task, error))
+        self._end()
+
+    def _done(self, task: Task) -> Outcome | Lost:
+        if self._process is None or self._process.poll() is not None:
+            self._begin()
+        assert self._process is not None and self._complaints is not None
+        self._complaints.truncate(0)  # what it says of this task, and does not grow for ever
+        reply = asked(self._process, task)
+        if reply is not None and isinstance(reply.answer, Outcome):
+            return reply.answer
+        status, said = self._end()
+        return Lost(f"its process ended ({_cause(status)})", said, blamed=status != _OUTSIDE)
+
+    def _begin(self) -> None:
+        """Start a process, and wait until it is there."""
+        for _ in range(_STARTS):
+            self._end()
+            # appended to, so that it can be emptied
+            self._complaints = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - closed with the process
+            with self._starting:
+                if self._stopped:
+                    break
+                self._process = started("robocov_app.sweep.performing:Performing", stderr=self._complaints)
+            assert self._process.stdout
+            if receive(self._process.stdout) == READY:
+                return
+        said = self._end()[1].strip().splitlines() or ["it says nothing"]
+        raise OutputError(f"no process for the runs can be started: {said[-1]}")
+
+    def _end(self) -> tuple[int, str]:
+        """Make sure that the process has ended; return its status and its last words."""
+        status, said = 0, b""
+        if self._process is not None:
+            status = ended(self._process)
+            self._process = None
+        if self._complaints is not None:
+            self._complaints.seek(0)
+            said = self._complaints.read()[-_LAST_WORDS:]
+            self._complaints.close()
+            self._complaints = None
+        return status, said.decode(errors="replace")
+
+
+def _cause(status: int) -> str:
+    """Return in words how a process ended.
+
+    >>> _cause(-9), _cause(3)
+    ('signal 9', 'exit status 3')
+    """
+    return f"signal {-status}" if status < 0 else f"exit status {status}"
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+PATIENCE = 10.0
+"""Seconds that a scheduler has for an answer."""
+
+_LEAST = 4
+"""Tasks that are handed out to a cluster which has no workers yet."""
+
+_LOOK = 2.0
+"""Seconds between two looks at how many workers there are; they may come and go."""
+
+
+class Cluster(Executor):
+    """The workers of a Dask cluster; they need robocov, and no disk that is shared.
+
+    `address`: of the scheduler: ``tcp://host:8786``. Raises InputError when Dask is not installed, or nobody
+    answers at the address.
+    """
+
+    def __init__(self, address: str) -> None:
+        super().__init__()
+        if importlib.util.find_spec("distributed") is None:
+            raise InputError('--scheduler: Dask is not installed; pip install "robocov[dask]" was wanted')
+        import distributed
+
+        client: Any = distributed.Client  # it has no types
+        self._address = address
+        self._tasks: dict[Any, Task] = {}
+        self._back: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        # a result is that of this sweep alone, whatever else the cluster does
+        self._prefix = f"robocov-{uuid.uuid4().hex[:8]}"
+        self._submitted = 0
+        try:
+            _require_answer(address)
+            self._client = client(address, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError, TypeError, TimeoutError) as error:
+            reason = " ".join(str(error).split()) or f"no answer in {PATIENCE:g} s"
+            raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
+        self._threads, self._asked = 0, -math.inf
+        # what it has to say of a scheduler that goes is said here, in one line
+        self._talk = logging.getLogger("distributed.client")
+        self._level = self._talk.level
+        self._talk.setLevel(logging.CRITICAL)
+
+    def __exit__(self, *exception: object) -> None:
+        with suppress(Exception):  # the scheduler may be gone
+            self._client.cancel(list(self._tasks))
+        with suppress(Exception):
+            self._client.close()
+        self._talk.setLevel(self._level)
+
+    @property
+    def most(self) -> int:
+        """Twice as many as there are threads: on its way to a worker, a task takes time."""
+        return max(_LEAST, 2 * self.threads)
+
+    @property
+    def threads(self) -> int:
+        """How many tasks the cluster does at once."""
+        if time.monotonic() - self._asked > _LOOK:
+            self._threads = 0
+            with suppress(Exception):  # the scheduler may be gone
+                self._threads = sum(self._client.nthreads().values())
+            self._asked = time.monotonic()
+        return self._threads
+
+    @property
+    def waiting(self) -> str:
+        """That there is nobody, where there is nobody."""
+        return "" if self.threads else f"no workers are connected to {self._address}; waiting"
+
+    def _hand_out(self, task: Task) -> None:
+        self._submitted += 1
+        key = f"{self._prefix}-{self._submitted}"
+        future: Any = self._client.submit(perform, task, key=key, pure=False)
+        self._tasks[future] = task
+        future.add_done_callback(self._back.put)
+
+    def _returned(self, timeout: float) -> Returned | None:
+        from distributed import KilledWorker
+
+        try:
+            future = self._back.get(timeout=timeout)
+        except queue.Empty:
+            return None
+        task = self._tasks.pop(future)
+        try:
+            outcome: Outcome = future.result()
+        except KilledWorker as error:
+            # so has every task that waited for the same worker
+            return task, Lost("the process of its worker ended", str(error), blamed=False)
+        except Exception as error:
+            reason = getattr(error, "reason", None) or f"{type(error).__name__}: {error}"
+            reason = " ".join(str(reason).split())
+            raise OutputError(f"--scheduler: {self._address}: the runs cannot go on: {reason}") from error
+        return task, outcome
+
+
+def _require_answer(address: str) -> None:
+    """Greet a scheduler as Dask's own client does, which would wait for an answer for ever.
+
+    Raises OSError, ValueError, TimeoutError when nobody answers there in time.
+    """
+    import distributed
+    from distributed import comm
+
+    if address.startswith("inproc://"):  # it is in this process
+        return
+    security: Any = distributed.Security  # they have no types
+    talk: Any = comm
+
+    async def greet() -> None:
+        arguments = security().get_connection_args("client")
+        line = await asyncio.wait_for(talk.connect(address, timeout=PATIENCE, **arguments), PATIENCE)
+        await line.close()
+
+    # in a notebook, this thread has a loop of events that runs already
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(lambda: asyncio.run(greet())).result()
