@@ -1,19 +1,24 @@
-"""The tool for the density: hot spots by dragging, their weights by typing."""
+"""The tool for the density: hot spots and areas by dragging, their weights by typing."""
 
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from robocov.arrays import Array
+from robocov.density import Gaussian, WeightedArea, WeightedPolygons
 from robocov.environment import Point, Ring
 from robocov_app.editor.edits.density import (
+    Feature,
+    area_added,
+    corner_moved,
+    features_of,
+    moved,
     peak_added,
-    peak_moved,
-    peak_removed,
     peak_sized,
-    peak_weighed,
-    peaks_of,
+    removed,
     spread_of,
+    weighed,
     weight_of,
 )
 from robocov_app.editor.model.geometry import distance
@@ -21,13 +26,13 @@ from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
 
 FIRST_WEIGHT = 4.0
-"""What a new hot spot adds at its centre, until another weight is typed."""
+"""Weight of a new feature, until another weight is typed."""
 
 _CORNERS = 64
 
 
 class DensityTool(Tool):
-    """Adds hot spots, moves, sizes and weighs them, and takes them away."""
+    """Adds hot spots, moves, sizes and weighs them, and takes them away; areas where a map has those."""
 
     name = "density"
     title = "Density"
@@ -42,7 +47,8 @@ class DensityTool(Tool):
         self._from: Point | None = None
         self._at: Point = (0.0, 0.0)
         self._taken: int | None = None
-        self._sizes = False
+        self._corner: int | None = None
+        """Of an area; 0 of a hot spot whose rim was taken."""
 
     @property
     def busy(self) -> bool:
@@ -50,18 +56,17 @@ class DensityTool(Tool):
         return self._from is not None or self.chosen is not None
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        """Take hold of a middle or a rim, else begin a hot spot."""
+        """Take hold of what is there, else begin a feature."""
         self._from, self._at, self.change = event.point, event.point, None
-        self._taken, self._sizes = self._under(context, event)
-        if self._taken is not None and not self._sizes:
+        self._taken, self._corner = _under(features_of(context.sketch), event)
+        if self._taken is not None and self._corner is None:
             self.chosen = self._taken
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
         """Drag."""
         self._at = event.point
-        if self._from is None or distance(self._from, event.raw) < 0.25 * event.reach:
-            return
-        self.change = self._wanted(context, event.point)
+        if self._from is not None and distance(self._from, event.raw) >= 0.25 * event.reach:
+            self.change = self._wanted(context, event.point)
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Make what was dragged; a click on a middle chooses it, elsewhere nothing is chosen."""
@@ -69,13 +74,12 @@ class DensityTool(Tool):
         if begun is None:
             return
         if clicked or change is None:
-            self.chosen = None if self._sizes else self._taken
+            self.chosen = None if self._corner is not None else self._taken
             if self.chosen is not None:
                 context.say("type what it weighs, then Enter; Backspace takes it away")
             return
         context.change(change)
-        count = len(peaks_of(context.sketch))
-        self.chosen = self._taken if self._taken is not None else count - 1
+        self.chosen = self._taken if self._taken is not None else len(features_of(context.sketch)) - 1
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
         """Take it for a press."""
@@ -89,9 +93,9 @@ class DensityTool(Tool):
     def back(self, context: ToolContext) -> bool:
         """Take the chosen one away."""
         chosen, self.chosen = self.chosen, None
-        if chosen is None or chosen >= len(peaks_of(context.sketch)):
+        if chosen is None or chosen >= len(features_of(context.sketch)):
             return False
-        context.change(peak_removed(context.sketch, chosen))
+        context.change(removed(context.sketch, chosen))
         return True
 
     def cancel(self, context: ToolContext) -> bool:
@@ -101,58 +105,88 @@ class DensityTool(Tool):
         return had
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Give the chosen hot spot, or the next one, another weight."""
+        """Give the chosen feature, or the next one, another weight."""
         weight = weight_of(text)
         if self.chosen is not None:
-            context.change(peak_weighed(context.sketch, self.chosen, weight))
+            context.change(weighed(context.sketch, self.chosen, weight))
         self.weight = weight
 
     def preview(self, context: ToolContext) -> Preview | None:
-        """Show all hot spots at one standard deviation, and what the dragged one will be."""
-        peaks = peaks_of(self.change.sketch if self.change is not None else context.sketch)
-        rings = tuple(_ellipse(peak.center, np.array(peak.matrix)) for peak in peaks)
-        dots = tuple(peak.center for peak in peaks)
+        """Show all features, hot spots at one standard deviation, and what the dragged one will be."""
+        features = features_of(self.change.sketch if self.change is not None else context.sketch)
+        dots = tuple(map(_middle, features))
+        dots += tuple(p for each in features if isinstance(each, WeightedArea) for p in each.vertices)
         words = ""
-        if self._from is not None and self._taken is None:
-            words = f"σ {length_words(distance(self._from, self._at))}, weight {self.weight:g}"
-        elif self._from is not None and self._sizes and self._taken is not None:
-            words = f"σ {length_words(spread_of(peaks[self._taken]))}"
-        elif self.chosen is not None and self.chosen < len(peaks):
-            words = f"weight {peaks[self.chosen].weight:g}"
-        if not rings and not words:
+        shown = self._taken if self._taken is not None else len(features) - 1
+        if self._from is not None and self.change is not None and 0 <= shown < len(features):
+            feature = features[shown]
+            size = f"σ {length_words(spread_of(feature))}, " if isinstance(feature, Gaussian) else ""
+            words = f"{size}weight {feature.weight:g}"
+        elif self.chosen is not None and self.chosen < len(features):
+            words = f"weight {features[self.chosen].weight:g}"
+        if not features and not words:
             return None
-        return Preview(words=words, rings=rings, dots=dots, chosen=self.chosen)
+        return Preview(words=words, rings=tuple(map(_outline, features)), dots=dots, chosen=self.chosen)
 
     def shape_of_cursor(self, context: ToolContext) -> str:
         """A move where something can be taken hold of."""
         return "move" if self._taken is not None and self._from is not None else "cross"
 
-    def _under(self, context: ToolContext, event: PointerEvent) -> tuple[int | None, bool]:
-        """Return the hot spot whose middle or rim is under the cursor, and whether it is the rim."""
-        peaks = peaks_of(context.sketch)
-        near = [(distance(peak.center, event.raw), k) for k, peak in enumerate(peaks)]
-        if near and min(near)[0] < event.reach:
-            return min(near)[1], False
-        rims = [(abs(away - spread_of(peaks[k])), k) for away, k in near if peaks[k].sigma is not None]
-        if rims and min(rims)[0] < 0.6 * event.reach:
-            return min(rims)[1], True
-        return None, False
-
-    def _wanted(self, context: ToolContext, point: Point) -> Change | None:
+    def _wanted(self, context: ToolContext, to: Point) -> Change | None:
+        """Return what the drag to a place makes."""
         assert self._from is not None
-        if self._taken is None:
-            return peak_added(context.sketch, self._from, max(distance(self._from, point), 0.02), self.weight)
-        if self._taken >= len(peaks_of(context.sketch)):
+        sketch, begun, number = context.sketch, self._from, self._taken
+        if number is None and isinstance(sketch.density, WeightedPolygons):
+            (ax, ay), (bx, by) = begun, to
+            return area_added(sketch, ((ax, ay), (bx, ay), (bx, by), (ax, by)), self.weight)
+        if number is None:
+            return peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
+        if number >= len(features_of(sketch)):
             return None
-        if self._sizes:
-            return peak_sized(
-                context.sketch, self._taken, distance(peaks_of(context.sketch)[self._taken].center, point)
-            )
-        return peak_moved(context.sketch, self._taken, point)
+        feature = features_of(sketch)[number]
+        if isinstance(feature, Gaussian):
+            if self._corner is not None:
+                return peak_sized(sketch, number, distance(feature.center, to))
+            begun = feature.center
+        elif self._corner is not None:
+            return corner_moved(sketch, number, self._corner, to)
+        return moved(sketch, number, to[0] - begun[0], to[1] - begun[1])
 
 
-def _ellipse(center: Point, covariance: Array) -> Ring:
-    """Return the outline one standard deviation away from the centre."""
+def _under(features: tuple[Feature, ...], event: PointerEvent) -> tuple[int | None, int | None]:
+    """Return the feature under the cursor, and its rim or corner if that is; middles come first."""
+    middles = [(distance(_middle(each), event.raw), k) for k, each in enumerate(features)]
+    if middles and min(middles)[0] < event.reach:
+        return min(middles)[1], None
+    rims: list[tuple[float, int, int]] = []
+    for k, each in enumerate(features):
+        if isinstance(each, WeightedArea):
+            rims += [(distance(point, event.raw), k, c) for c, point in enumerate(each.vertices)]
+        elif each.sigma is not None:
+            rims.append((abs(distance(each.center, event.raw) - each.sigma), k, 0))
+    if rims and min(rims)[0] < 0.6 * event.reach:
+        return min(rims)[1:]
+    inside = [k for k, each in enumerate(features) if isinstance(each, WeightedArea) and _covers(each, event)]
+    return (inside[-1] if inside else None), None
+
+
+def _covers(area: WeightedArea, event: PointerEvent) -> bool:
+    return bool(area.polygon.contains(shapely.Point(event.raw)))
+
+
+def _middle(feature: Feature) -> Point:
+    if isinstance(feature, Gaussian):
+        return feature.center
+    inside = feature.polygon.representative_point()
+    return float(inside.x), float(inside.y)
+
+
+def _outline(feature: Feature) -> Ring:
+    """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
+    return feature.vertices if isinstance(feature, WeightedArea) else _ellipse(feature)
+
+
+def _ellipse(peak: Gaussian) -> Ring:
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    points = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(covariance).T
-    return tuple((x, y) for x, y in (points + np.array(center)).tolist())
+    points: Array = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(peak.matrix).T
+    return tuple((x, y) for x, y in (points + np.array(peak.center)).tolist())

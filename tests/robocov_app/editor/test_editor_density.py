@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedPolygons
-from robocov.environment import CircleObstacle, Environment
+from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
+from robocov.environment import CircleObstacle, Environment, PolygonObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov_app.editor.edits import density as density_edits
 from robocov_app.editor.model.file import opened, saved
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, sketch_text
 from robocov_app.editor.model.validation import problems
 
@@ -79,21 +80,21 @@ class TestEdits:
         change = density_edits.peak_added(sheet(), (3.0, 4.0), 1.5, 4.0)
         assert change.sketch.density == Gaussians((Gaussian((3.0, 4.0), 4.0, sigma=1.5),), 1.0)
         two = density_edits.peak_added(change.sketch, (6.0, 4.0), 0.5, 2.0).sketch
-        assert len(density_edits.peaks_of(two)) == 2
+        assert len(density_edits.features_of(two)) == 2
         assert density_edits.peak_added(heavy(Uniform(3.0)), (6.0, 4.0), 0.5, 2.0).sketch.density.floor == 3.0
 
     def test_with_the_last_one_the_density_goes(self):
-        assert density_edits.peak_removed(heavy(), 0).sketch.density is None
+        assert density_edits.removed(heavy(), 0).sketch.density is None
         assert density_edits.density_removed(heavy()).sketch.density is None
         with pytest.raises(MapError, match="the same already"):
             density_edits.density_removed(sheet())
 
     def test_move_size_weigh(self):
-        moved = density_edits.peak_moved(heavy(), 0, (4.0, 5.0)).sketch
-        assert density_edits.peaks_of(moved)[0].center == (4.0, 5.0)
+        moved = density_edits.moved(heavy(), 0, 1.0, 2.0).sketch
+        assert density_edits.features_of(moved)[0].center == (4.0, 5.0)
         sized = density_edits.peak_sized(moved, 0, 2.5).sketch
-        assert density_edits.peaks_of(sized)[0].sigma == 2.5
-        weighed = density_edits.peak_weighed(sized, 0, 7.0).sketch
+        assert density_edits.features_of(sized)[0].sigma == 2.5
+        weighed = density_edits.weighed(sized, 0, 7.0).sketch
         assert weighed.density == Gaussians((Gaussian((4.0, 5.0), 7.0, sigma=2.5),), 0.5)
         assert density_edits.floor_set(weighed, 0.0).sketch.density.floor == 0.0
 
@@ -101,7 +102,7 @@ class TestEdits:
         slanted = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.6), (0.6, 1.0)))
         sketch = heavy(Gaussians((slanted,), 0.5))
         spread = density_edits.spread_of(slanted)
-        twice = density_edits.peaks_of(density_edits.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
+        twice = density_edits.features_of(density_edits.peak_sized(sketch, 0, 2.0 * spread).sketch)[0]
         assert density_edits.spread_of(twice) == pytest.approx(2.0 * spread)
         assert np.array(twice.matrix) == pytest.approx(4.0 * np.array(slanted.matrix))
 
@@ -111,9 +112,9 @@ class TestEdits:
             (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
             (lambda: density_edits.peak_added(heavy(), (1.0, 1.0), 1.0, 0.0), "weight: 0"),
             (lambda: density_edits.peak_added(heavy(), (1e9, 1.0), 1.0, 1.0), "too far away"),
-            (lambda: density_edits.peak_weighed(heavy(), 0, float("nan")), "weight: nan"),
-            (lambda: density_edits.peak_weighed(heavy(), 0, 1e9), "weight: 1e"),
-            (lambda: density_edits.peak_moved(heavy(), 5, (1.0, 1.0)), "no such hot spot"),
+            (lambda: density_edits.weighed(heavy(), 0, float("nan")), "weight: nan"),
+            (lambda: density_edits.weighed(heavy(), 0, 1e9), "weight: 1e"),
+            (lambda: density_edits.moved(heavy(), 5, 1.0, 1.0), "no such hot spot"),
             (lambda: density_edits.floor_set(sheet(), 0.0), "weight: 0"),
             (lambda: density_edits.peak_added(heavy(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0), "is a polygons"),
         ],
@@ -137,7 +138,7 @@ class TestEdits:
         assert density_edits.density_words(None) == "none: every place counts the same"
         assert density_edits.density_words(ONE) == "1 hot spot, floor 0.5"
         assert density_edits.density_words(KINDS["bilinear"]) == "picture, 13 x 11"
-        assert density_edits.density_words(KINDS["rooms"]) == "polygons, 0.3 to 4"
+        assert density_edits.density_words(KINDS["rooms"]) == "2 areas, 0.3 to 4"
 
 
 def test_with_the_mouse_and_by_typing(tmp_path):
@@ -145,29 +146,29 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         plain = hands.picture()
         hands.key("d")
         hands.drag(*(hands.pixel(point) for point in ((3, 3), (4, 3), (5, 3))))
-        (peak,) = density_edits.peaks_of(hands.sketch)
+        (peak,) = density_edits.features_of(hands.sketch)
         assert peak.center == pytest.approx((3.0, 3.0), abs=0.06)
         assert peak.sigma == pytest.approx(2.0, abs=0.1) and peak.weight == 4.0
         assert not hands.same(plain)
         hands.type("6.5")
         hands.key("return")
-        assert density_edits.peaks_of(hands.sketch)[0].weight == 6.5
+        assert density_edits.features_of(hands.sketch)[0].weight == 6.5
         # the rim
         rim = hands.pixel((peak.center[0], peak.center[1] + peak.sigma))
         hands.wait()
         hands.drag(rim, *(hands.pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
-        assert density_edits.peaks_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
+        assert density_edits.features_of(hands.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
         # the middle
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in (peak.center, (4, 4), (6, 5))))
-        assert density_edits.peaks_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
+        assert density_edits.features_of(hands.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)
         hands.wait()
         hands.drag(*(hands.pixel(point) for point in ((1.5, 8), (1.8, 8), (2, 8))))
-        assert [each.weight for each in density_edits.peaks_of(hands.sketch)] == [6.5, 6.5]
+        assert [each.weight for each in density_edits.features_of(hands.sketch)] == [6.5, 6.5]
         hands.key("backspace")
-        assert len(density_edits.peaks_of(hands.sketch)) == 1
+        assert len(density_edits.features_of(hands.sketch)) == 1
         hands.key("ctrl+z")
-        assert len(density_edits.peaks_of(hands.sketch)) == 2
+        assert len(density_edits.features_of(hands.sketch)) == 2
         hands.wait()
         hands.click_at((6.0, 5.0))
         assert hands.desk.tool.chosen == 0
@@ -194,3 +195,67 @@ def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
         hands.key("escape")
         hands.release()
         assert hands.sketch.density is None and not hands.desk.document.history.can_undo
+
+
+AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
+
+
+class TestAreas:
+    def test_they_are_added_moved_weighed_and_taken_away(self):
+        sketch = density_edits.area_added(sheet(), AREA, 3.0).sketch
+        assert sketch.density == WeightedPolygons((WeightedArea(AREA, 3.0),), 1.0)
+        moved = density_edits.moved(sketch, 0, 1.0, -1.0).sketch
+        assert moved.density.areas[0].vertices[0] == (3.0, 1.0)
+        bent = density_edits.corner_moved(sketch, 0, 2, (7.0, 7.0)).sketch
+        assert bent.density.areas[0].vertices[2] == (7.0, 7.0)
+        lighter = density_edits.weighed(sketch, 0, 0.0).sketch
+        assert lighter.density.areas[0].weight == 0.0 and lighter.density.background == 1.0
+        assert density_edits.floor_set(sketch, 0.0).sketch.density.background == 0.0
+        assert density_edits.removed(sketch, 0).sketch.density is None
+        assert parse_sketch(sketch_text(bent), "again").density == bent.density
+
+    def test_polygons_become_areas_with_their_holes_and_names(self):
+        hole = ((3.0, 3.0), (4.0, 3.0), (4.0, 4.0))
+        sketch, keys = sheet().added(
+            [PolygonObstacle(AREA, (hole,), "ward"), CircleObstacle((8.0, 8.0), 0.5)]
+        )
+        change = density_edits.areas_made(sketch, Selection.of(keys[0]), 5.0)
+        assert change.sketch.density == WeightedPolygons((WeightedArea(AREA, 5.0, (hole,), "ward"),), 1.0)
+        assert len(change.sketch.obstacles) == 1
+        with pytest.raises(MapError, match="select polygons"):
+            density_edits.areas_made(sketch, Selection.of(keys[1]), 5.0)
+
+    @pytest.mark.parametrize(
+        ("act", "words"),
+        [
+            (lambda s: density_edits.area_added(s, AREA[:2], 1.0), "three corners"),
+            (lambda s: density_edits.area_added(s, (*AREA[:2], AREA[3], AREA[2]), 1.0), "crossings"),
+            (lambda s: density_edits.area_added(heavy(), AREA, 1.0), "is a gaussians"),
+            (lambda s: density_edits.corner_moved(s, 0, 9, (0.0, 0.0)), "no such corner"),
+            (lambda s: density_edits.peak_sized(s, 0, 1.0), "no such hot spot"),
+            (lambda s: density_edits.weighed(density_edits.floor_set(s, 0.0).sketch, 0, 0.0), "above 0"),
+        ],
+    )
+    def test_what_cannot_be(self, act, words):
+        with pytest.raises(MapError, match=words):
+            act(density_edits.area_added(sheet(), AREA, 3.0).sketch)
+
+    def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
+        sketch = Sketch.from_environment(load_map("hospital"))
+        with opened_editor(tmp_path, sketch) as hands:
+            hands.key("d")
+            first = hands.sketch.density.areas[0]
+            hands.click_at((5.5, 2.0))
+            assert hands.desk.tool.chosen == 0
+            hands.type("6")
+            hands.key("return")
+            assert hands.sketch.density.areas[0].weight == 6.0
+            hands.wait()
+            hands.drag(*(hands.pixel(point) for point in (first.vertices[2], (11.5, 6.0), (12.0, 6.0))))
+            assert hands.sketch.density.areas[0].vertices[2] == pytest.approx((12.0, 6.0), abs=0.2)
+            hands.wait()
+            hands.drag(*(hands.pixel(point) for point in ((13.0, 9.0), (14.0, 10.0), (15.0, 11.0))))
+            assert len(hands.sketch.density.areas) == len(sketch.density.areas) + 1
+            hands.key("backspace")
+            assert len(hands.sketch.density.areas) == len(sketch.density.areas)
+            assert hands.sketch.environment().density == hands.sketch.density
