@@ -46,13 +46,22 @@ def test_it_comes_where_the_cursor_is(sketch, at):
     assert not change.selection.items & whole.items
 
 
-def test_names_of_starts_stay_apart_and_a_second_boundary_is_a_polygon():
+def test_names_of_starts_stay_apart_and_a_second_boundary_is_left_out_unless_it_is_alone():
     sketch, _ = Sketch(boundary=HALL, starts=(("corner", DiscStart((1.0, 1.0), 0.8)),)).added([BOX])
     change = pasted(sketch, copied(sketch, Selection.all(sketch)))
     assert [name for name, _ in change.sketch.starts] == ["corner", "corner 2"]
     assert change.sketch.boundary == HALL
-    assert change.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
-    assert change.words == "3 things pasted"
+    assert [item.shape for item in change.sketch.obstacles] == [BOX, BOX]
+    assert change.words == "2 things pasted"
+    alone = pasted(sketch, copied(sketch, Selection(boundary=True)))
+    assert alone.sketch.obstacles[-1].shape == PolygonObstacle(HALL)
+
+
+def test_what_was_on_the_grid_stays_on_it():
+    wall = WallObstacle(((1.0, 1.5), (2.0, 1.5)), 0.1)
+    sketch, keys = Sketch(boundary=HALL).added([wall])
+    change = pasted(sketch, copied(sketch, Selection.of(*keys)), (5.13, 3.38), grid=0.5)
+    assert change.sketch.obstacles[-1].shape.points == ((4.5, 3.5), (5.5, 3.5))
 
 
 def test_copying_nothing_is_said():

@@ -22,8 +22,10 @@ from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenths
+from robocov_app.editor.model.hit_test import in_box, owners_at
+from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection, Vertex
-from robocov_app.editor.model.sketch import BOUNDARY, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Sketch, sketch_text
 
 BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "desk")
 PILLAR = CircleObstacle((6.0, 4.0), 0.5, "pillar")
@@ -118,7 +120,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: properties.widened(s, Selection.of(0), 0.2), "select walls"),
         (lambda s: properties.widened(s, ALL, -0.2), "at least 1 mm"),
         (lambda s: properties.sized(s, Selection.of(0), 0.2), "select circles"),
-        (lambda s: properties.raised(s, ALL, "left"), "top, up, down or bottom"),
+        (lambda s: properties.raised(s, ALL, "left"), "top or bottom"),
         (lambda s: properties.start_first(s, "none"), "no start “none”"),
         (lambda s: properties.made_polygons(s, Selection.of(0)), "select circles or walls"),
         (lambda s: properties.made_boundary(s, Selection.of(1)), "select one polygon"),
@@ -310,7 +312,7 @@ def test_widths_and_radii(sketch):
 
 @pytest.mark.parametrize(
     ("where", "order"),
-    [("top", [1, 2, 3, 0]), ("up", [1, 0, 2, 3]), ("down", [0, 1, 2, 3]), ("bottom", [0, 1, 2, 3])],
+    [("top", [1, 2, 3, 0]), ("bottom", [0, 1, 2, 3])],
 )
 def test_order(where, order):
     sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
@@ -319,11 +321,37 @@ def test_order(where, order):
 
 def test_several_things_keep_their_order_among_each_other():
     sketch, _ = Sketch().added([BOX, PILLAR, WALL, PILLAR])
-    for where, order in [("up", [0, 3, 1, 2]), ("down", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
+    for where, order in [("bottom", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
         change = properties.raised(sketch, Selection.of(1, 2), where)
         assert [item.key for item in change.sketch.obstacles] == order
-    there = properties.raised(sketch, Selection.of(2, 3), "up")
+    there = properties.raised(sketch, Selection.of(2, 3), "top")
     assert there.sketch == sketch
+
+
+def test_groups_locks_and_what_is_hidden_are_kept_in_the_map(sketch):
+    change = properties.grouped(sketch, Selection.of(0, 1))
+    assert change.words == "2 obstacles grouped as “group 1”"
+    assert properties.grouped(change.sketch, Selection.of(1, 2)).sketch.item(2).group == "group 2"
+    assert Selection.of(0).with_groups(change.sketch) == Selection.of(0, 1)
+    assert Selection.of(2).with_groups(change.sketch) == Selection.of(2)
+    held = properties.locked(change.sketch, Selection.of(0))
+    assert held.words.endswith("locked") and held.selection == Selection()
+    unseen = properties.hidden(held.sketch, Selection.of(1, 2)).sketch
+    assert owners_at(unseen, (2.0, 1.5), 0.1) == owners_at(unseen, (6.0, 4.0), 0.1) == ()
+    assert not in_box(unseen, (-50.0, -50.0), (50.0, 50.0)).items and not Selection.all(unseen).items
+    assert parse_sketch(sketch_text(unseen), "again") == unseen
+    assert Sketch.from_environment(unseen.environment()) == unseen
+    shown = properties.hidden(unseen, Selection.of(1, 2), False)
+    assert shown.sketch == held.sketch and shown.words == "2 obstacles shown"
+    apart = properties.ungrouped(held.sketch, Selection.of(0, 1, 2))
+    assert not any(item.group for item in apart.sketch.obstacles)
+    for deed, words in [
+        (lambda: properties.grouped(sketch, Selection.of(0)), "two or more"),
+        (lambda: properties.ungrouped(sketch, Selection.of(0)), "in a group"),
+        (lambda: properties.locked(sketch, Selection()), "select obstacles"),
+    ]:
+        with pytest.raises(MapError, match=words):
+            deed()
 
 
 def test_starts_have_an_order_and_kinds(sketch):

@@ -26,19 +26,16 @@ from robocov_app.editor.model.sketch import Item, Sketch
 def united(sketch: Sketch, selection: Selection) -> Change:
     """Unite the selected obstacles: at least two."""
     items = _chosen(sketch, selection, "unite")
-    whole = _union(items)
-    return _in_place(sketch, items, [whole], f"{counted(len(items), 'obstacle')} united")
+    return _in_place(sketch, items, [_union(items)], f"{counted(len(items), 'obstacle')} united")
 
 
 def subtracted(sketch: Sketch, selection: Selection) -> Change:
     """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
-    lowest, *uppers = _chosen(sketch, selection, "subtract")
+    lowest, *uppers = items = _chosen(sketch, selection, "subtract")
     left = shapely.difference(lowest.geometry, _union(uppers), grid_size=GRID)
     what = display_name(sketch, lowest.key)
-    cutters = counted(len(uppers), "obstacle")
-    return _in_place(
-        sketch, [lowest, *uppers], [left], f"{cutters} cut out of {what}", f"nothing is left of {what}"
-    )
+    words = f"{counted(len(uppers), 'obstacle')} cut out of {what}"
+    return _in_place(sketch, items, [left], words, f"nothing is left of {what}")
 
 
 def intersected(sketch: Sketch, selection: Selection) -> Change:
@@ -51,11 +48,11 @@ def intersected(sketch: Sketch, selection: Selection) -> Change:
 
 def divided(sketch: Sketch, selection: Selection) -> Change:
     """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
-    lowest, *uppers = _chosen(sketch, selection, "divide")
+    lowest, *uppers = items = _chosen(sketch, selection, "divide")
     cutter = _union(uppers)
     outside = shapely.difference(lowest.geometry, cutter, grid_size=GRID)
     parts = [outside, _intersection(lowest.geometry, cutter)]
-    return _in_place(sketch, [lowest, *uppers], parts, f"{display_name(sketch, lowest.key)} divided")
+    return _in_place(sketch, items, parts, f"{display_name(sketch, lowest.key)} divided")
 
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
@@ -91,12 +88,11 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
         raise MapError("the boundary must be sound first")
     inside = Polygon(sketch.boundary)
     shapely.prepare(inside)
-    shapes: dict[int, Sequence[Obstacle]] = {}
-    for item in sketch.obstacles:
-        if selection.items and item.key not in selection.items:
-            continue
-        if not inside.covers(item.geometry):
-            shapes[item.key] = outlines(_intersection(item.geometry, inside), item.shape.name)
+    shapes: dict[int, Sequence[Obstacle]] = {
+        item.key: outlines(_intersection(item.geometry, inside), item.shape.name)
+        for item in sketch.obstacles
+        if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
+    }
     if not shapes:
         raise MapError("nothing sticks out of the boundary")
     return replace_obstacles(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
@@ -110,26 +106,25 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
     everything = not (selection.items or selection.boundary)
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:
-        if (everything or item.key in selection.items) and isinstance(item.shape, PolygonObstacle):
-            shape = item.shape
-            if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
-                shapes[item.key] = outlines(item.geometry, shape.name)
+        shape = item.shape
+        if not isinstance(shape, PolygonObstacle) or not (everything or item.key in selection.items):
+            continue
+        if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
+            shapes[item.key] = outlines(item.geometry, shape.name)
     boundary = sketch.boundary
     if (everything or selection.boundary) and boundary is not None and len(boundary) >= 3:
         polygon = Polygon(boundary)
         if not polygon.is_valid:
             parts = outlines(shapely.make_valid(polygon))
             boundary = parts[0].vertices if parts else None
-    count = len(shapes) + (boundary is not sketch.boundary)
+    redrawn = boundary is not sketch.boundary
+    count = len(shapes) + redrawn
     if not count:
         raise MapError("there is nothing to repair: no outline crosses itself")
-    change = replace_obstacles(
-        replace(sketch, boundary=boundary), shapes, f"{counted(count, 'outline')} repaired"
-    )
-    with_boundary = replace(
-        change.selection, boundary=boundary is not sketch.boundary and boundary is not None
-    )
-    return replace(change, selection=with_boundary)
+    words = f"{counted(count, 'outline')} repaired"
+    change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
+    selected = replace(change.selection, boundary=redrawn and boundary is not None)
+    return replace(change, selection=selected)
 
 
 def _union(items: Sequence[Item]) -> BaseGeometry:

@@ -7,22 +7,19 @@ or a list of points, which becomes a polygon.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from robocov.environment import PolygonObstacle
+from robocov.environment import Obstacle, Point, PolygonObstacle
 from robocov.errors import MapError
 from robocov.files.strictjson import parse
 from robocov.mapfile import dump_document
 from robocov.mapfile.models import FORMAT as MAP_FORMAT
 from robocov.mapfile.models import VERSION
 from robocov_app.editor.edits.create import free_name
-from robocov_app.editor.edits.transform import Affine, bounds_of, moved
+from robocov_app.editor.edits.transform import bounds_of, moved
 from robocov_app.editor.model.parser import sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document
-
-if TYPE_CHECKING:
-    from robocov.environment import Point
 
 FORMAT = "robocov-clipboard"
 """What the copied text says that it is."""
@@ -41,10 +38,11 @@ def copied(sketch: Sketch, selection: Selection) -> str:
     return dump_document({**draft_document(part), "format": FORMAT})
 
 
-def pasted(sketch: Sketch, text: str, at: Point | None = None) -> Change:
+def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | None = None) -> Change:
     """Paste what `copied` returned; it is selected then.
 
-    A boundary becomes the map's if it has none, else a polygon. Starts get free names.
+    A boundary becomes the map's if it has none; else it is left out, or a polygon if it was copied alone.
+    Starts get free names.
 
     Parameters
     ----------
@@ -52,13 +50,15 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None) -> Change:
     text : str
     at : (x, y) or None, m
         Where the middle of its bounding box is to be; None leaves it where it was.
+    grid : float or None, m
+        What is on this grid stays on it: it moves by multiples of that.
     """
     part = _part(text)
-    shapes = [(item.shape, item.note) for item in part.obstacles]
-    if part.boundary is not None and sketch.boundary is not None:
+    shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]
+    new_boundary = part.boundary is not None and sketch.boundary is None
+    if part.boundary is not None and not (new_boundary or shapes or part.starts):
         shapes.append((PolygonObstacle(part.boundary), ""))
     after, keys = sketch.added(shapes)
-    new_boundary = part.boundary is not None and sketch.boundary is None
     if new_boundary:
         after = replace(after, boundary=part.boundary)
     names = []
@@ -69,11 +69,12 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None) -> Change:
     if not selection:
         raise MapError("there is nothing to paste in what was copied")
     bounds = bounds_of(after, selection)
-    # by nothing too: what is pasted lies on tenths of millimetres, as far as maps reach
-    shift = Affine()
+    by = (0.0, 0.0)
     if at is not None and bounds is not None:
-        shift = Affine.shift(at[0] - (bounds[0] + bounds[2]) / 2, at[1] - (bounds[1] + bounds[3]) / 2)
-    after = moved(after, selection, shift.x0, shift.y0).sketch
+        by = at[0] - (bounds[0] + bounds[2]) / 2, at[1] - (bounds[1] + bounds[3]) / 2
+        by = (grid * round(by[0] / grid), grid * round(by[1] / grid)) if grid else by
+    # by nothing too: what is pasted lies on tenths of millimetres, as far as maps reach
+    after = moved(after, selection, *by).sketch
     return Change(after, selection, f"{selection.words(after)} pasted")
 
 
@@ -95,9 +96,7 @@ def _map_of(value: Any) -> dict[str, Any]:
     if isinstance(value, dict):
         if value.get("format") == FORMAT:
             return {**value, "format": MAP_FORMAT}
-        if "format" in value:
-            return value
-        return {**empty, "obstacles": [value]}
+        return value if "format" in value else {**empty, "obstacles": [value]}
     if isinstance(value, list) and value and all(isinstance(each, dict) for each in value):
         return {**empty, "obstacles": value}
     if not isinstance(value, list) or len(value) < 3:

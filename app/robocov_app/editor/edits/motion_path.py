@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from robocov.environment import Obstacle, ObstaclePath, Point, Repeat
+from robocov.environment import ObstaclePath, Point
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
-from robocov_app.editor.model.geometry import nearest_on, ring_near
+from robocov_app.editor.model.geometry import nearest_on, point_near
 from robocov_app.editor.model.selection import Change, Selection, display_name
 from robocov_app.editor.model.sketch import Item, Sketch
 
@@ -36,33 +36,25 @@ def goes(path: ObstaclePath) -> bool:
 def way_point_added(
     sketch: Sketch, key: int, point: Point, at: int | None = None, speed: float = FIRST_SPEED
 ) -> Change:
-    """Add a way point; the first one makes a path from the obstacle's middle to there.
+    """Add a way point, as the last or before way point `at`.
 
-    Parameters
-    ----------
-    sketch : Sketch
-    key : int
-        Of the obstacle.
-    point : (x, y), m
-    at : int or None
-        Before which way point; None adds it as the last.
-    speed : float, m/s
-        Of a new path.
+    The first one makes a path from the obstacle's middle to there, at a speed in m/s.
     """
     path = path_of(sketch, key)
     if path is None:
-        begin = middle_of(sketch.item(key))
-        path = ObstaclePath((begin, _place(point)), _speed(speed), "back-and-forth")
+        path = ObstaclePath(
+            (_middle_of(sketch.item(key)), point_near(point)), _speed(speed), "back-and-forth"
+        )
         return _put(sketch, key, path, "moves")
     where = len(path.points) if at is None else at
-    points = (*path.points[:where], _place(point), *path.points[where:])
+    points = (*path.points[:where], point_near(point), *path.points[where:])
     return _put(sketch, key, replace(path, points=points), "way point added")
 
 
 def way_point_moved(sketch: Sketch, key: int, number: int, point: Point) -> Change:
     """Move a way point. With the first one, the obstacle keeps its place at time zero."""
     path = _path(sketch, key, number)
-    points = (*path.points[:number], _place(point), *path.points[number + 1 :])
+    points = (*path.points[:number], point_near(point), *path.points[number + 1 :])
     return _put(sketch, key, replace(path, points=points), "way point moved")
 
 
@@ -77,28 +69,24 @@ def way_point_removed(sketch: Sketch, key: int, number: int) -> Change:
 
 def path_removed(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles stand."""
-    chosen = _moving_of(sketch, selection)
-    shapes = {key: replace(sketch.item(key).shape, path=None) for key in chosen}
-    words = f"{Selection.of(*chosen).words(sketch)}: path taken away"
-    return Change(sketch.with_shapes(shapes), selection, words)
+    return _with_paths(sketch, selection, dict.fromkeys(_moving_of(sketch, selection)), "path taken away")
 
 
 def path_turned(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles come back the way they went, or if they do that go in a loop."""
-    chosen = _moving_of(sketch, selection)
-    loops = all(_repeat(sketch, key) == "back-and-forth" for key in chosen)
-    repeat: Repeat = "loop" if loops else "back-and-forth"
-    shapes = {key: _with_path(sketch, key, repeat=repeat) for key in chosen}
-    words = "goes in a loop" if loops else "goes back and forth"
-    return Change(sketch.with_shapes(shapes), selection, f"{Selection.of(*chosen).words(sketch)}: {words}")
+    paths = _moving_of(sketch, selection)
+    if all(path.repeat == "back-and-forth" for path in paths.values()):
+        loops = {key: replace(path, repeat="loop") for key, path in paths.items()}
+        return _with_paths(sketch, selection, loops, "goes in a loop")
+    turned = {key: replace(path, repeat="back-and-forth") for key, path in paths.items()}
+    return _with_paths(sketch, selection, turned, "goes back and forth")
 
 
 def path_paced(sketch: Sketch, selection: Selection, speed: float) -> Change:
     """Let the selected obstacles move at another speed, m/s."""
-    chosen, speed = _moving_of(sketch, selection), _speed(speed)
-    shapes = {key: _with_path(sketch, key, speed=speed) for key in chosen}
-    words = f"{Selection.of(*chosen).words(sketch)}: {speed:g} m/s"
-    return Change(sketch.with_shapes(shapes), selection, words)
+    paths, speed = _moving_of(sketch, selection), _speed(speed)
+    paced = {key: replace(path, speed=speed) for key, path in paths.items()}
+    return _with_paths(sketch, selection, paced, f"{speed:g} m/s")
 
 
 def speed_of(text: str) -> float:
@@ -107,14 +95,6 @@ def speed_of(text: str) -> float:
         return _speed(float(text.strip().removesuffix("m/s")))
     except ValueError:
         raise MapError(f"“{text}”, but a speed in m/s was wanted, as in 0.5") from None
-
-
-def middle_of(item: Item) -> Point:
-    """Return the middle of an obstacle's bounding box, m."""
-    if item.geometry.is_empty:
-        raise MapError("what covers nothing cannot move")
-    low_x, low_y, high_x, high_y = item.geometry.bounds
-    return _place(((low_x + high_x) / 2.0, (low_y + high_y) / 2.0))
 
 
 def way_point_at(path: ObstaclePath, point: Point, reach: float) -> int | None:
@@ -162,36 +142,32 @@ def _path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
     return path
 
 
-def _repeat(sketch: Sketch, key: int) -> str | None:
-    path = path_of(sketch, key)
-    return None if path is None else path.repeat
+def _middle_of(item: Item) -> Point:
+    """Return the middle of an obstacle's bounding box, m."""
+    if item.geometry.is_empty:
+        raise MapError("what covers nothing cannot move")
+    low_x, low_y, high_x, high_y = item.geometry.bounds
+    return point_near(((low_x + high_x) / 2.0, (low_y + high_y) / 2.0))
 
 
-def _moving_of(sketch: Sketch, selection: Selection) -> list[int]:
-    chosen = [key for key in moving(sketch) if key in selection.items]
-    if not chosen:
+def _moving_of(sketch: Sketch, selection: Selection) -> dict[int, ObstaclePath]:
+    paths = {key: path_of(sketch, key) for key in moving(sketch) if key in selection.items}
+    if not paths:
         raise MapError("select an obstacle that moves first; the tool Path gives one a path")
-    return chosen
+    return {key: path for key, path in paths.items() if path is not None}
 
 
-def _with_path(
-    sketch: Sketch, key: int, *, speed: float | None = None, repeat: Repeat | None = None
-) -> Obstacle:
-    shape = sketch.item(key).shape
-    assert shape.path is not None
-    speed, repeat = speed or shape.path.speed, repeat or shape.path.repeat
-    return replace(shape, path=replace(shape.path, speed=speed, repeat=repeat))
+def _with_paths(
+    sketch: Sketch, selection: Selection, paths: dict[int, ObstaclePath] | dict[int, None], words: str
+) -> Change:
+    shapes = {key: replace(sketch.item(key).shape, path=path) for key, path in paths.items()}
+    return Change(sketch.with_shapes(shapes), selection, f"{Selection.of(*paths).words(sketch)}: {words}")
 
 
 def _speed(speed: float) -> float:
     if not SLOWEST <= speed <= FASTEST:
         raise MapError(f"speed: {speed:g} m/s, but {SLOWEST:g} to {FASTEST:g} m/s was wanted")
     return float(f"{speed:.6g}")
-
-
-def _place(point: Point) -> Point:
-    (place,) = ring_near(np.array([point], dtype=float))
-    return place
 
 
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:

@@ -1,17 +1,11 @@
-"""Edits of whole things: drawn, moved, turned, scaled, mirrored, copied, deleted, named.
-
-Each takes a sketch and what is selected, and returns the `Change`; it raises a MapError, a sentence for
-people, where it cannot be done. Coordinates come out to the tenth of a millimetre. What is moved comes from
-the selection's obstacles, starts and boundary, and its single vertices.
-
-What draws is in `adding`, what moves in `placing`; all of it can be had from here.
-"""
+"""Edits of what things are: deleted, named, noted, sized, ordered, grouped, locked, hidden."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import count
 
-from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, StartSpec, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import vertices
@@ -33,9 +27,7 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
     kept = tuple(pair for pair in sketch.starts if pair[0] not in selection.starts)
     after = replace(after, starts=kept, boundary=None if selection.boundary else sketch.boundary)
     others = Selection(vertices=selection.vertices).within(after)
-    if others:
-        after = vertices.deleted(after, others).sketch
-    return Change(after, Selection(), words)
+    return Change(vertices.deleted(after, others).sketch if others else after, Selection(), words)
 
 
 def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
@@ -63,12 +55,50 @@ def noted(sketch: Sketch, selection: Selection, note: str) -> Change:
     if len(note) > _LONGEST_TEXT:
         raise MapError(f"a note has at most {_LONGEST_TEXT} characters")
     note = encodable(note.strip())
+    what = f"note on {Selection(items=selection.items).words(sketch)}"
+    return _marked(sketch, selection, what if note else f"{what} taken away", note=note)
+
+
+def grouped(sketch: Sketch, selection: Selection, name: str = "") -> Change:
+    """Put the selected obstacles into a group, a new one without a name: a click selects all of it."""
+    if len(selection.items) < 2:
+        raise MapError("select two or more obstacles to group")
+    taken = {item.group for item in sketch.obstacles}
+    name = label_of(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
+    words = f"{Selection(items=selection.items).words(sketch)} grouped as “{name}”"
+    return _marked(sketch, selection, words, group=name)
+
+
+def ungrouped(sketch: Sketch, selection: Selection) -> Change:
+    """Take the selected obstacles out of their groups."""
+    keys = [key for key in selection.items if sketch.item(key).group]
+    if not keys:
+        raise MapError("select obstacles that are in a group")
+    return _marked(sketch, Selection.of(*keys), f"{Selection.of(*keys).words(sketch)} ungrouped", group="")
+
+
+def locked(sketch: Sketch, selection: Selection, on: bool = True) -> Change:
+    """Lock obstacles, so that the mouse cannot take them, or unlock them."""
+    words = f"{Selection(items=selection.items).words(sketch)} {'locked' if on else 'unlocked'}"
+    return _marked(sketch, selection, words, locked=on)
+
+
+def hidden(sketch: Sketch, selection: Selection, on: bool = True) -> Change:
+    """Hide obstacles in the editor, or show them again; robots meet them all the same."""
+    words = f"{Selection(items=selection.items).words(sketch)} {'hidden' if on else 'shown'}"
+    return _marked(sketch, selection, words, hidden=on)
+
+
+def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | bool) -> Change:
+    if not selection.items:
+        raise MapError("select obstacles first")
     items = tuple(
-        replace(item, note=note) if item.key in selection.items else item for item in sketch.obstacles
+        replace(item, **marks) if item.key in selection.items else item  # type: ignore[arg-type]
+        for item in sketch.obstacles
     )
-    what = Selection(items=selection.items).words(sketch)
-    words = f"note on {what}" if note else f"note on {what} taken away"
-    return Change(replace(sketch, obstacles=items), selection, words)
+    gone = selection.items if marks.get("locked") or marks.get("hidden") else frozenset()
+    left = replace(selection, items=selection.items - gone) if gone else selection
+    return Change(replace(sketch, obstacles=items), left, words)
 
 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
@@ -90,14 +120,12 @@ def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
     """Make the selected walls so many metres wide."""
     if not SMALLEST <= width <= LARGEST:
         raise MapError(f"a width of at least {1000 * SMALLEST:g} mm was wanted")
-    shapes: dict[int, Obstacle] = {}
-    for key in selection.items:
-        shape = sketch.item(key).shape
-        if isinstance(shape, WallObstacle):
-            shapes[key] = replace(shape, width=tenths(width))
-    if not shapes:
+    chosen = {key: sketch.item(key).shape for key in selection.items}
+    walls = {key: shape for key, shape in chosen.items() if isinstance(shape, WallObstacle)}
+    if not walls:
         raise MapError("select walls first")
-    words = f"{Selection.of(*shapes).words(sketch)} made {tenths(width):g} m wide"
+    words = f"{Selection.of(*walls).words(sketch)} made {tenths(width):g} m wide"
+    shapes = {key: replace(wall, width=tenths(width)) for key, wall in walls.items()}
     return Change(sketch.with_shapes(shapes), selection, words)
 
 
@@ -105,82 +133,65 @@ def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Give the selected circles and discs that radius, m."""
     if not SMALLEST <= radius <= LARGEST:
         raise MapError(f"a radius of at least {1000 * SMALLEST:g} mm was wanted")
+    radius = tenths(radius)
     shapes: dict[int, Obstacle] = {}
     for key in selection.items:
         shape = sketch.item(key).shape
         if isinstance(shape, CircleObstacle):
-            shapes[key] = replace(shape, radius=tenths(radius))
-    discs = [name for name in selection.starts if isinstance(sketch.start(name), DiscStart)]
+            shapes[key] = replace(shape, radius=radius)
+    after, discs = sketch.with_shapes(shapes), []
+    for name in selection.starts:
+        spec = sketch.start(name)
+        if isinstance(spec, DiscStart):
+            discs.append(name)
+            after = after.with_start(name, replace(spec, radius=radius))
     if not shapes and not discs:
         raise MapError("select circles first, or starts that are discs")
-    after = sketch.with_shapes(shapes)
-    for name in discs:
-        spec = after.start(name)
-        assert isinstance(spec, DiscStart)
-        after = after.with_start(name, replace(spec, radius=tenths(radius)))
     what = Selection.of(*shapes, *discs).words(sketch)
-    return Change(after, selection, f"{what} given a radius of {tenths(radius):g} m")
+    return Change(after, selection, f"{what} given a radius of {radius:g} m")
 
 
 def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
-    """Change the order of the selected obstacles: to the "top", "up", "down", to the "bottom"."""
+    """Change the order of the selected obstacles: to the "top" or to the "bottom"."""
     if not selection.items:
         raise MapError("select obstacles first")
-    chosen = [item for item in sketch.obstacles if item.key in selection.items]
-    others = [item for item in sketch.obstacles if item.key not in selection.items]
-    if where == "top":
-        order = others + chosen
-    elif where == "bottom":
-        order = chosen + others
-    elif where in ("up", "down"):
-        order = list(sketch.obstacles) if where == "down" else list(reversed(sketch.obstacles))
-        for k in range(1, len(order)):
-            if order[k].key in selection.items and order[k - 1].key not in selection.items:
-                order[k - 1], order[k] = order[k], order[k - 1]
-        order = order if where == "down" else order[::-1]
-    else:
-        raise MapError("top, up, down or bottom was wanted")
-    ways = {"top": "brought to the top", "up": "raised", "down": "lowered", "bottom": "sent to the bottom"}
-    words = f"{Selection(items=selection.items).words(sketch)} {ways[where]}"
-    return Change(replace(sketch, obstacles=tuple(order)), selection, words)
+    chosen = tuple(item for item in sketch.obstacles if item.key in selection.items)
+    others = tuple(item for item in sketch.obstacles if item.key not in selection.items)
+    orders = {
+        "top": (others + chosen, "brought to the top"),
+        "bottom": (chosen + others, "sent to the bottom"),
+    }
+    if where not in orders:
+        raise MapError("top or bottom was wanted")
+    order, way = orders[where]
+    words = f"{Selection(items=selection.items).words(sketch)} {way}"
+    return Change(replace(sketch, obstacles=order), selection, words)
 
 
 def start_first(sketch: Sketch, name: str) -> Change:
     """Make a start the map's default: the first."""
     if name not in dict(sketch.starts):
         raise MapError(f"there is no start “{one_line(name)}”")
-    first = [pair for pair in sketch.starts if pair[0] == name]
-    rest = [pair for pair in sketch.starts if pair[0] != name]
-    after = replace(sketch, starts=(*first, *rest))
-    return Change(after, Selection.of(name), f"start “{one_line(name)}” made the default")
-
-
-def start_replaced(sketch: Sketch, name: str, spec: StartSpec) -> Change:
-    """Give a start another kind or place."""
-    if name not in dict(sketch.starts):
-        raise MapError(f"there is no start “{one_line(name)}”")
-    return Change(sketch.with_start(name, spec), Selection.of(name), f"start “{one_line(name)}” changed")
+    starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
+    words = f"start “{one_line(name)}” made the default"
+    return Change(replace(sketch, starts=starts), Selection.of(name), words)
 
 
 def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     """Turn the selected circles and walls into polygons, whose vertices can be edited one by one."""
-    chosen = {key for key in selection.items if not isinstance(sketch.item(key).shape, PolygonObstacle)}
+    chosen = [key for key in selection.items if not isinstance(sketch.item(key).shape, PolygonObstacle)]
     if not chosen:
         raise MapError("select circles or walls first")
-    shapes = {
-        key: tuple(
-            replace(polygon, path=item.shape.path) for polygon in outlines(item.geometry, item.shape.name)
-        )
-        for key in chosen
-        for item in (sketch.item(key),)
-    }
-    for key, polygons in shapes.items():
+    shapes = {}
+    for key in chosen:
+        item = sketch.item(key)
+        polygons = outlines(item.geometry, item.shape.name)
         if not polygons:
             raise MapError(f"the {display_name(sketch, key)} covers nothing: it cannot become a polygon")
-    change = replace_obstacles(
-        sketch, shapes, f"{Selection(items=frozenset(chosen)).words(sketch)} turned into polygons"
-    )
-    return replace(change, selection=change.selection.plus(replace(selection, vertices=frozenset())))
+        shapes[key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
+    words = f"{Selection.of(*chosen).words(sketch)} turned into polygons"
+    change = replace_obstacles(sketch, shapes, words)
+    return replace(change, selection=change.selection.plus(selection.without_vertices()))
 
 
 def made_boundary(sketch: Sketch, selection: Selection) -> Change:
@@ -194,8 +205,6 @@ def made_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 def underlaid(sketch: Sketch, background: Background | None) -> Change:
     """Put a picture under the map, change it, or take it away."""
-    if background is None:
-        words = "picture taken away"
-    else:
-        words = "picture laid under" if sketch.background is None else "picture changed"
+    words = "picture laid under" if sketch.background is None else "picture changed"
+    words = "picture taken away" if background is None else words
     return Change(replace(sketch, background=background), Selection(), words)

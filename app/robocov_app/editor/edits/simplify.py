@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import BoolArray
 from robocov.environment import Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
@@ -128,7 +128,8 @@ def _straight(ring: Ring, degrees: float, *, closed: bool) -> Ring:
     # level edges give their ends the same y, upright ones the same x
     for axis, flat in ((1, size[:, 1] <= slope * size[:, 0]), (0, size[:, 0] <= slope * size[:, 1])):
         for run in _runs(flat & (size.max(axis=1) > 0.0)):
-            moved[run, axis] = _level(points[run, axis])
+            values = points[run, axis]
+            moved[run, axis] = (values.min() + values.max()) / 2
     if closed and (len({tuple(p) for p in moved.tolist()}) < 3 or Polygon(moved).area == 0.0):
         return ring
     return ring_near(moved)
@@ -141,16 +142,10 @@ def _runs(flat: BoolArray) -> list[list[int]]:
         return []
     first = int(np.flatnonzero(~flat)[0]) + 1
     runs: list[list[int]] = []
-    for step in range(count):
-        k = (first + step) % count
+    for k in (np.arange(first, first + count) % count).tolist():
         if not flat[k]:
             continue
-        if runs and runs[-1][-1] == k:
-            runs[-1].append((k + 1) % count)
-        else:
-            runs.append([k, (k + 1) % count])
+        if not runs or runs[-1][-1] != k:
+            runs.append([k])
+        runs[-1].append((k + 1) % count)
     return runs
-
-
-def _level(values: Array) -> float:
-    return float((values.min() + values.max()) / 2)

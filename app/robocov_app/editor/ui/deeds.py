@@ -164,7 +164,8 @@ def paste(desk: Desk, at: Point | None) -> None:
     text = desk.pasteboard.get()
     if not text.strip():
         raise MapError("the clipboard is empty")
-    desk.change(pasted(desk.sketch, text, at))
+    grid = desk.grid if "grid" in desk.snaps else None
+    desk.change(pasted(desk.sketch, text, at, grid))
 
 
 def nudge(desk: Desk, x: int, y: int) -> None:
