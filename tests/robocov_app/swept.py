@@ -1,10 +1,14 @@
 """Small studies and what comes of them, for the tests of sweeps."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.executors import Executor, Returned
+from robocov_app.sweep.performing import perform
+from robocov_app.sweep.study import Study, StudyMap, Task
 
 ROOM = Environment(
     "A room",
@@ -60,3 +64,24 @@ def tables(folder: Path) -> list[bytes]:
 def run_folders(folder: Path) -> list[str]:
     runs = folder / "runs"
     return sorted(path.name for path in runs.iterdir()) if runs.is_dir() else []
+
+
+class InProcess(Executor):
+    """Does tasks in this process, in place of a `LocalPool`."""
+
+    most = 2
+
+    def __init__(self, workers: int) -> None:
+        super().__init__()
+        self._tasks: list[Task] = []
+
+    def __exit__(self, *exception: object) -> None: ...
+
+    def _hand_out(self, task: Task) -> None:
+        self._tasks.append(task)
+
+    def _returned(self, timeout: float) -> Returned | None:
+        if not self._tasks:
+            return None
+        task = self._tasks.pop(0)
+        return task, perform(task)

@@ -38,6 +38,7 @@ def test_what_cannot_be_is_named(options: ConditionOptions, message: str) -> Non
         options.conditions(0, 6)
 
 
+@pytest.mark.slow
 def test_a_run_under_conditions_can_be_repeated_from_its_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from driven_window import opened
 from reported_results import entry, result_of
-from swept import ROOM, small_study
+from swept import ROOM, InProcess, small_study
 
 from robocov.errors import InputError, ParameterError
 from robocov.mapfile import save_map
@@ -48,6 +48,7 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_command_line_takes_words_and_the_record_keeps_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -106,10 +107,13 @@ def test_words_go_with_samples_of_ranges() -> None:
 def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("words") / "out"
     gains = {"rapf": {"target": ["centroid", "median"]}}
-    sweep(small_study(gains=gains), folder, workers=1, quiet=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
+        sweep(small_study(gains=gains), folder, quiet=True)
     return folder
 
 
+@pytest.mark.slow
 def test_tables_hold_words(swept_folder: Path, tmp_path: Path) -> None:
     table = pq.read_table(swept_folder / "results.parquet")
     words = table.column("target").to_pylist()

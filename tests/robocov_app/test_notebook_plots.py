@@ -23,6 +23,15 @@ from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.theme_css import hex_code
+from robocov_app.runs import building
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(request, monkeypatch):
+    """Pictures of distances from few sites, which are soon there, but in the thorough run."""
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr(building, "PICTURE_LATTICE", 32)
+
 
 RUN = run_of(ROOMS, 5)
 COST = CoverageCost(ROOMS, 32)
@@ -56,6 +65,7 @@ class TestAxes:
         with pytest.raises(ParameterError, match="unknown theme 'drak': did you mean 'dark'"):
             thing.plot(theme="drak")
 
+    @pytest.mark.slow
     def test_the_users_style_is_neither_heeded_nor_changed(self, thing):
         wanted, _ = thing.plot(size=(500, 400))._repr_png_()
         theirs = {"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "image.cmap": "jet"}
@@ -158,6 +168,7 @@ class TestDistances:
         (image,) = RESULT.plot(axes).images
         assert image.get_size()[1] >= 1000
 
+    @pytest.mark.slow
     def test_a_coarse_lattice_is_replaced_by_one_that_can_be_drawn(self):
         coarse, fine = (CoverageCost(ROOMS, n)(RUN.positions[-1]) for n in (16, 256))
         words = [text.get_text() for text in coarse.plot().figure.texts]
@@ -166,6 +177,7 @@ class TestDistances:
         pictures = [result.plot().images[0].get_array() for result in (coarse, fine)]
         np.testing.assert_array_equal(*pictures)
 
+    @pytest.mark.slow
     def test_robots_have_the_radius_that_they_are_said_to_have(self):
         def size(**options):
             (discs,) = [c for c in RESULT.plot(**options).collections if len(c.get_offsets()) == 5]

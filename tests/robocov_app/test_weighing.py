@@ -92,6 +92,7 @@ def test_the_optimum_by_another_density_is_another(maps, capsys) -> None:
     assert max(x + y for x, y in first["positions_m"]) > max(x + y for x, y in second["positions_m"]) + 0.5
 
 
+@pytest.mark.slow
 def test_a_report_shows_and_tells_it(maps, capsys, tmp_path) -> None:
     plain, heavy, _ = maps
     for name, path in (("plain", plain), ("heavy", heavy)):

@@ -51,13 +51,12 @@ def built_cost(
     return cost
 
 
-def cost_for_pictures(
-    environment: Environment, cost: CoverageCost, least: int = PICTURE_LATTICE
-) -> CoverageCost:
+def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int | None = None) -> CoverageCost:
     """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one.
 
     Maps of many vertices are drawn as they were measured: finer pictures would double what a run takes.
     """
+    least = least or PICTURE_LATTICE
     if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
         return cost
     return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)

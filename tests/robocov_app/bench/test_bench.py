@@ -105,6 +105,7 @@ def cost_map(vertices, real=cost.random_map):
     return real(min(vertices, 20))
 
 
+@pytest.mark.slow
 def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     small(monkeypatch)
     target = tmp_path / "ratios.png"
@@ -157,6 +158,7 @@ def test_robots_of_the_benchmark_move_a_little_and_stay_free():
         evaluated(places.now)
 
 
+@pytest.mark.slow
 def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")

@@ -146,6 +146,7 @@ def read_until(stream: int, wanted: bytes, seconds: float = 30.0) -> bytes:
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("terminal", [False, True])
+@pytest.mark.slow
 def test_watching_from_outside(file: Path, terminal: bool) -> None:
     ours, theirs = pty.openpty() if terminal else os.pipe()
     process = subprocess.Popen(
@@ -172,6 +173,7 @@ def test_watching_from_outside(file: Path, terminal: bool) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.slow
 def test_watching_costs_next_to_nothing(file: Path) -> None:
     with subprocess.Popen(
         [*COMMAND, "check", "--watch", str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE

@@ -16,6 +16,7 @@ def frames(folder: Path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("words", [("run", "trap"), ("compare", "trap", "--controllers", "rapf", "lloyd")])
+@pytest.mark.slow
 def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: Path) -> None:
     for name, more in (
         ("plain", ()),
@@ -42,6 +43,7 @@ def test_unknown_layers_are_named_before_anything_is_made(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_cost_draws_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     robots = tmp_path / "robots.json"
     robots.write_text(json.dumps([[1.0, 1.0], [8.0, 4.0]]))

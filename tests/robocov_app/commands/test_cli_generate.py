@@ -79,6 +79,7 @@ def test_overwriting_replaces_maps_and_nothing_else(
     assert (other.read_text(), mine.read_text()) == ("mine", "{}")
 
 
+@pytest.mark.slow
 def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
     maps = {
@@ -157,6 +158,7 @@ def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_maps_that_are_done(tmp_path: Path) -> None:
     words = ["generate", "--kind", "caves", "--count", "5000", "--out", str(tmp_path / "maps")]
     process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

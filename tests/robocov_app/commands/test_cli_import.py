@@ -126,6 +126,7 @@ def test_help_names_every_format(capsys: pytest.CaptureFixture[str]) -> None:
         assert name in text
 
 
+@pytest.mark.slow
 def test_a_large_map_is_soon_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # 1200 x 1200 cells of halls with pillars: a map of this size must not be a matter of minutes
     pixels = np.full((1200, 1200), 254, dtype=np.uint8)

@@ -97,6 +97,7 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
     assert "other rooms than the best covers" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     light, dark = tmp_path / "light.png", tmp_path / "dark.png"
     assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
@@ -143,6 +144,7 @@ def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.Ca
     assert len(json.loads(file.read_bytes())) == 6
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     file = tmp_path / "best.json"
     words = ("optimum", "museum", "--restarts", "100000", "--robots", "20", "--positions", str(file))

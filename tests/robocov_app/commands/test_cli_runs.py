@@ -67,6 +67,7 @@ def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture
     assert row["interrupted"] is False
 
 
+@pytest.mark.slow
 def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):
         answer(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
@@ -286,6 +287,7 @@ def test_a_controller_that_fails_is_named_with_its_line(
     assert not out.exists(), "a folder with nothing in it is not left behind"
 
 
+@pytest.mark.slow
 def test_records_of_large_teams_are_thinned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,6 +48,7 @@ def test_a_sweep_answers_in_words(study: Path, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.startswith("0 runs done, 8 were there already\n")
 
 
+@pytest.mark.slow
 def test_a_sweep_answers_in_json(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,6 +148,7 @@ def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureF
     assert not (study.parent / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_the_same_command_goes_on(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -185,6 +187,7 @@ def test_something_else_that_has_a_name_of_ours_is_one_line(
     assert (out / name).exists() and (name == "runs" or (out / name / "mine").is_dir())
 
 
+@pytest.mark.slow
 def test_a_run_of_a_sweep_can_be_seen_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = study.parent / "out"
     answer(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")

@@ -18,6 +18,7 @@ from robocov_app.cli import main
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="needs a limit on the size of files")
 @pytest.mark.parametrize("earlier", [False, True])
 @pytest.mark.parametrize(("limit", "file"), [(2_000, "record.npz"), (45_000, "trajectories.png")])
+@pytest.mark.slow
 def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
     tmp_path: Path, limit: int, file: str, *, earlier: bool
 ) -> None:
@@ -118,6 +119,7 @@ def test_a_folder_without_permission_is_one_line(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
     words = ("--duration", "3000", "--lattice", "16", "--size", "480x320")
     for patience in (1.0, 5.0, 25.0):  # until it is under way
@@ -146,6 +148,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.slow
 def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
     """In a terminal Ctrl-C goes to the whole process group, the encoder included."""
     import imageio_ffmpeg
@@ -185,6 +188,7 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["controllers", "maps", "check rooms", "schema"])
+@pytest.mark.slow
 def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
     done = subprocess.run(
         [*COMMAND, *command.split()],
@@ -198,6 +202,7 @@ def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
+@pytest.mark.slow
 def test_nobody_listening_is_no_error(tmp_path: Path) -> None:
     words = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
     done = subprocess.run(f"{' '.join([*COMMAND, *words])} >&-", shell=True, capture_output=True, check=False)
@@ -250,6 +255,7 @@ def test_names_with_brackets_are_words(tmp_path: Path, capsys: pytest.CaptureFix
     assert "[bold]R[/] [/] $x" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_had_enough_is_no_error() -> None:
     done = subprocess.run(
         f"{sys.executable} -m robocov_app schema | head -c 10",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from called import complaint
-from swept import ROOM, controller
+from swept import ROOM, InProcess, controller
 
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
@@ -50,6 +50,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "planted.py").write_text((folder / "mine.py").read_text())
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
         for command in (
             ["run", room, "--controller", name, "--out", str(folder / "run")],
             ["run", room, "--controller", "planted", "--out", str(folder / "offered")],
@@ -114,6 +115,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     ],
     ids=" ".join,
 )
+@pytest.mark.slow
 def test_no_command_runs_the_code_of_results(
     shared: Path,
     tmp_path: Path,
@@ -144,6 +146,7 @@ def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not (shared / "marker").exists()
 
 
+@pytest.mark.slow
 def test_who_opens_a_run_may_load_its_controller(
     shared: Path,
     windows: list[Session],

@@ -33,6 +33,7 @@ def test_gymnasiums_check_passes(changes: dict[str, Any]) -> None:
     check_env(gymnasium.make(ID, render_mode="rgb_array", size=(160, 120), **SMALL, **changes).unwrapped)
 
 
+@pytest.mark.slow
 def test_the_id_is_known_once_the_module_is() -> None:
     assert gymnasium.spec("robocov/Coverage-v0").entry_point == "robocov_app.learning.gym:CoverageEnv"
     assert gymnasium.make("robocov/Coverage-v0", **SMALL).unwrapped.task.robots == 3
@@ -133,6 +134,7 @@ def test_public_names() -> None:
         learning.nothing
 
 
+@pytest.mark.slow
 def test_a_policy_loads_neither() -> None:
     script = "import sys, robocov_app.learning as learning\n"
     script += "learning.PolicyController, learning.ControllerPolicy, learning.CoverageTask\n"

@@ -211,6 +211,7 @@ class Outwards(PolicyController):
 '''
 
 
+@pytest.mark.slow
 def test_the_command_line_takes_a_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(MINE)
     name = f"{tmp_path / 'mine.py'}:Outwards"

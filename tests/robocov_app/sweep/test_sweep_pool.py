@@ -118,6 +118,7 @@ def test_processes_do_what_this_one_does(tasks: list[Task]) -> None:
         assert done_by(pool, tasks) == {task.name: perform(task) for task in tasks}
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
     """Both kinds of ends, what is said and read in a controller, and a process that is killed once."""
     flag = tmp_path / "killed"
@@ -151,6 +152,7 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="looks at processes as Linux shows them")
+@pytest.mark.slow
 def test_nothing_is_left_of_a_pool(tmp_path: Path) -> None:
     awake = tmp_path / "awake"
     name = controller(tmp_path, f"        time.sleep(60)\n        Path({str(awake)!r}).touch()\n")
@@ -176,6 +178,7 @@ def children() -> set[int]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="others notice it when Python has its turn again")
+@pytest.mark.slow
 def test_a_worker_ends_with_its_parent_also_in_the_midst_of_what_is_not_python(tmp_path: Path) -> None:
     flag = tmp_path / "asleep"
     law = (

@@ -99,6 +99,7 @@ def rows(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_the_number_of_workers_changes_nothing(
     study: Study, undisturbed: list[bytes], tmp_path: Path
 ) -> None:

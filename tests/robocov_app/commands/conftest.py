@@ -1,0 +1,13 @@
+import pytest
+from swept import InProcess
+
+from robocov_app.runs import building
+from robocov_app.sweep import sweeping
+
+
+@pytest.fixture(autouse=True)
+def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr(building, "PICTURE_LATTICE", 32)
+        monkeypatch.setattr(sweeping, "LocalPool", InProcess)
