@@ -2,27 +2,34 @@ import math
 from dataclasses import replace
 
 import pytest
-from drawn_sketches import anywhere, backgrounds
+from drawn_sketches import backgrounds
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov_app.editor.model.background import (
     Background,
+    levelled,
     picture_laid,
-    shifted,
     to_scale,
-    turned,
 )
+from robocov_app.editor.model.geometry import cos_sin
 
 PLAN = Background("plan.png", (400, 300), 0.05, (1.0, 2.0))
+
+
+def pixel_at(background: Background, place):
+    dx, dy = place[0] - background.corner[0], place[1] - background.corner[1]
+    cos, sin = cos_sin(background.turn)
+    x, y = cos * dx + sin * dy, cos * dy - sin * dx
+    return x / background.scale, background.pixels[1] - y / background.scale
 
 
 @given(backgrounds, st.floats(-100, 5000), st.floats(-100, 5000))
 def test_pixels_and_places_belong_together(background, x, y):
     place = background.place_of((x, y))
     size = max(1.0, *map(abs, background.corner), *map(abs, place)) / background.scale
-    assert background.pixel_at(place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
+    assert pixel_at(background, place) == pytest.approx((x, y), abs=1e-9 * max(size, 1.0))
 
 
 def test_pixels_count_downwards_from_the_upper_left_corner():
@@ -78,7 +85,7 @@ places = st.tuples(st.floats(-20, 20), st.floats(-20, 20))
 def test_two_clicked_points_come_to_be_so_far_apart(background, offset, metres):
     background = replace(background, corner=(3.0, -2.0), scale=0.02)
     a, b = background.place_of((0, 0)), background.place_of((offset[0] + 5, offset[1]))
-    pixel_a, pixel_b = background.pixel_at(a), background.pixel_at(b)
+    pixel_a, pixel_b = pixel_at(background, a), pixel_at(background, b)
     scaled = to_scale(background, a, b, metres)
     assert math.dist(scaled.place_of(pixel_a), scaled.place_of(pixel_b)) == pytest.approx(metres)
     assert scaled.place_of(pixel_a) == pytest.approx(a, abs=1e-6)
@@ -96,16 +103,16 @@ def test_what_gives_no_scale_is_said():
             to_scale(PLAN, a, b, metres)
 
 
-@given(backgrounds, anywhere, st.floats(-720, 720))
-def test_turning_keeps_the_point_and_the_lengths(background, about, degrees):
-    background = replace(background, scale=0.02, corner=(1.0, 2.0))
-    about = (about[0] / 1e5, about[1] / 1e5)
-    after = turned(background, degrees, about)
-    assert after.place_of(background.pixel_at(about)) == pytest.approx(about, abs=1e-6)
-    assert -180.0 <= after.turn <= 180.0
-    a, b = background.place_of((0, 0)), after.place_of((0, 0))
-    assert math.dist(a, about) == pytest.approx(math.dist(b, about), abs=1e-6)
-
-
-def test_it_is_moved_by_two_points():
-    assert shifted(PLAN, (1.0, 1.0), (3.0, 0.5)).corner == (3.0, 1.5)
+@given(backgrounds, st.tuples(st.integers(10, 99), st.integers(-99, 99)))
+def test_two_clicked_points_come_to_lie_level_or_upright(background, offset):
+    background = replace(background, corner=(3.0, -2.0), scale=0.02)
+    a, b = background.place_of((0, 0)), background.place_of(offset)
+    level = levelled(background, a, b)
+    there, end = level.place_of((0, 0)), level.place_of(offset)
+    assert there == pytest.approx(a, abs=1e-6)
+    assert min(abs(end[0] - a[0]), abs(end[1] - a[1])) < 1e-6
+    assert math.dist(there, end) == pytest.approx(math.dist(a, b))
+    assert abs(math.remainder(level.turn - background.turn, 360.0)) <= 45.0 + 1e-6
+    assert -180.0 <= level.turn <= 180.0
+    with pytest.raises(MapError, match="farther apart"):
+        levelled(background, a, a)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Annotated, Any, ClassVar
 
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.model.geometry import cos_sin
-
-if TYPE_CHECKING:
-    from robocov.environment import Point
 
 MOST_PIXELS = 64_000_000
 """Pixels of the largest picture that is taken."""
@@ -38,12 +39,14 @@ class Background:
     shown : bool
     """
 
-    path: str
-    pixels: tuple[int, int]
-    scale: float = 0.01
-    corner: Point = (0.0, 0.0)
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    path: Annotated[str, Field(min_length=1)]
+    pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
+    scale: Annotated[float, Field(gt=0.0)] = 0.01
+    corner: tuple[float, float] = (0.0, 0.0)
     turn: float = 0.0
-    opacity: float = 0.5
+    opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     shown: bool = True
 
     def place_of(self, pixel: Point) -> Point:
@@ -52,61 +55,34 @@ class Background:
         cos, sin = cos_sin(self.turn)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
 
-    def pixel_at(self, place: Point) -> Point:
-        """Return the pixel at a place of the map, which may lie beside the picture."""
-        dx, dy = place[0] - self.corner[0], place[1] - self.corner[1]
-        cos, sin = cos_sin(self.turn)
-        x, y = cos * dx + sin * dy, cos * dy - sin * dx
-        return x / self.scale, self.pixels[1] - y / self.scale
-
     @property
     def corners(self) -> tuple[Point, Point, Point, Point]:
         """Where its corners lie, m: lower left, lower right, upper right, upper left."""
         width, height = self.pixels
-        pixels: tuple[Point, Point, Point, Point] = ((0, height), (width, height), (width, 0), (0, 0))
-        a, b, c, d = (self.place_of(pixel) for pixel in pixels)
-        return a, b, c, d
+        left, right = self.place_of((0, height)), self.place_of((width, height))
+        return left, right, self.place_of((width, 0)), self.place_of((0, 0))
 
     def document(self) -> dict[str, Any]:
         """Return it as it stands in a map."""
-        return {
-            "path": self.path,
+        held = asdict(self) | {
             "pixels": list(self.pixels),
-            "scale": _short(self.scale),
             "corner": [_short(value) for value in self.corner],
-            "turn": _short(self.turn),
-            "opacity": _short(self.opacity),
-            "shown": self.shown,
         }
+        return held | {name: _short(held[name]) for name in ("scale", "turn", "opacity")}
 
     @classmethod
     def of_document(cls, document: Any) -> Background | None:
         """Return the picture that stands in a map; None where that is something else."""
         if not isinstance(document, dict) or set(document) != {item.name for item in fields(cls)}:
             return None
-        pixels, corner = document["pixels"], document["corner"]
-        numbers = [document["scale"], document["turn"], document["opacity"]]
-        for pair in (pixels, corner):
-            if not isinstance(pair, list) or len(pair) != 2:
-                return None
-            numbers += pair
-        if not all(_is_number(value) for value in numbers) or not isinstance(document["shown"], bool):
+        try:
+            found = _ADAPTER.validate_json(json.dumps(document), strict=True)
+        except ValidationError:
             return None
-        width, height = pixels
-        sound = type(width) is type(height) is int and width > 0 < height and width * height <= MOST_PIXELS
-        if not (sound and isinstance(document["path"], str) and document["path"]):
-            return None
-        if not (document["scale"] > 0.0 and 0.0 <= document["opacity"] <= 1.0):
-            return None
-        return cls(
-            document["path"],
-            (width, height),
-            float(document["scale"]),
-            (float(corner[0]), float(corner[1])),
-            float(document["turn"]),
-            float(document["opacity"]),
-            document["shown"],
-        )
+        return found if math.prod(found.pixels) <= MOST_PIXELS else None
+
+
+_ADAPTER = TypeAdapter(Background)
 
 
 def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
@@ -124,8 +100,7 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
     apart = math.dist(a, b)
     if not (math.isfinite(metres) and metres > 0.0):
         raise MapError("the length between the two points must be above 0 m")
-    if apart < 2 * background.scale:
-        raise MapError("click two points of the picture that are farther apart")
+    _require_apart(background, apart)
     factor = metres / apart
     if not 1e-6 <= background.scale * factor <= 1e3:
         raise MapError(f"a pixel would be {background.scale * factor:.3g} m wide: is {metres:g} m right?")
@@ -134,24 +109,21 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
     return replace(background, scale=background.scale * factor, corner=moved)
 
 
-def turned(background: Background, degrees: float, about: Point) -> Background:
-    """Return the picture turned counter-clockwise about a place, m."""
-    cos, sin = cos_sin(degrees)
-    dx, dy = background.corner[0] - about[0], background.corner[1] - about[1]
-    corner = about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy
-    turn = math.remainder(background.turn + degrees, 360.0)
+def levelled(background: Background, a: Point, b: Point) -> Background:
+    """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
+    _require_apart(background, math.dist(a, b))
+    angle = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    cos, sin = cos_sin(90.0 * round(angle / 90.0) - angle)
+    dx, dy = background.corner[0] - a[0], background.corner[1] - a[1]
+    corner = a[0] + cos * dx - sin * dy, a[1] + sin * dx + cos * dy
+    turn = math.remainder(background.turn + 90.0 * round(angle / 90.0) - angle, 360.0)
     return replace(background, corner=corner, turn=turn)
 
 
-def shifted(background: Background, a: Point, b: Point) -> Background:
-    """Return the picture moved so that what lay at `a` lies at `b`, m."""
-    corner = background.corner[0] + b[0] - a[0], background.corner[1] + b[1] - a[1]
-    return replace(background, corner=corner)
+def _require_apart(background: Background, apart: float) -> None:
+    if apart < 2 * background.scale:
+        raise MapError("click two points of the picture that are farther apart")
 
 
 def _short(value: float) -> int | float:
     return int(value) if float(value).is_integer() else float(value)
-
-
-def _is_number(value: object) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

@@ -1,4 +1,4 @@
-"""The tool for the picture under the map: two points and a length give its scale, dragging moves it."""
+"""The tool for the picture under the map: two points give its scale or make it level, dragging moves it."""
 
 from __future__ import annotations
 
@@ -7,36 +7,32 @@ from dataclasses import replace
 from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.edits.properties import underlaid
-from robocov_app.editor.model.background import Background, to_scale
+from robocov_app.editor.model.background import Background, levelled, to_scale
 from robocov_app.editor.model.coordinates import length_of
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
 
 
 class ReferenceImageTool(Tool):
-    """Scales and moves the picture."""
+    """Scales, levels and moves the picture."""
 
     name = "picture"
     title = "Picture"
-    hint = "click two points of the picture and type how far apart they are; drag moves the picture"
+    hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
     snaps = False
 
     def __init__(self) -> None:
         super().__init__()
+        self.moved: Background | None = None
+        """The picture where it is being dragged to."""
         self._points: list[Point] = []
         self._at: Point = (0.0, 0.0)
         self._from: Point | None = None
-        self._laid: Background | None = None
 
     @property
     def busy(self) -> bool:
         """Whether a point was clicked."""
         return bool(self._points)
-
-    @property
-    def moved(self) -> Background | None:
-        """The picture where it is being dragged to."""
-        return self._laid
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         """Begin to drag, or to click."""
@@ -51,26 +47,34 @@ class ReferenceImageTool(Tool):
         if self._from is None or background is None or distance(self._from, event.raw) < 0.25 * event.reach:
             return
         dx, dy = event.raw[0] - self._from[0], event.raw[1] - self._from[1]
-        self._laid = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
+        self.moved = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Let the picture lie there, or take the point that was clicked."""
-        begun, laid = self._from, self._laid
-        self._from = self._laid = None
+        begun, moved = self._from, self.moved
+        self._from = self.moved = None
         if begun is None:
             return
-        if laid is not None and not clicked:
-            corner = round(laid.corner[0], 4), round(laid.corner[1], 4)
-            context.change(underlaid(context.sketch, replace(laid, corner=corner)))
+        if moved is not None and not clicked:
+            corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
+            context.change(underlaid(context.sketch, replace(moved, corner=corner)))
             return
         self._points = (
             [*self._points[-1:], event.raw] if len(self._points) == 2 else [*self._points, event.raw]
         )
         if len(self._points) == 2:
-            context.say("type how many metres apart these two points are, then Enter")
+            context.say("type how many metres apart the points are; Enter alone makes their line level")
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
         """Take no notice: two points in one place mean nothing."""
+
+    def finish(self, context: ToolContext) -> bool:
+        """Turn the picture so that the line through the two points is level or upright."""
+        if len(self._points) != 2 or context.sketch.background is None:
+            return False
+        (a, b), self._points = self._points, []
+        context.change(underlaid(context.sketch, levelled(context.sketch.background, a, b)))
+        return True
 
     def enter(self, context: ToolContext, text: str) -> None:
         """Scale the picture."""
@@ -88,16 +92,15 @@ class ReferenceImageTool(Tool):
     def cancel(self, context: ToolContext) -> bool:
         """Forget the points."""
         had = bool(self._points or self._from)
-        self._points, self._from, self._laid = [], None, None
+        self._points, self._from, self.moved = [], None, None
         return had
 
     def preview(self, context: ToolContext) -> Preview | None:
         """Show the two points."""
         if not self._points:
             return None
-        if len(self._points) == 1:
-            return Preview(
-                (self._points[0], self._at), words=f"now {length_words(distance(self._points[0], self._at))}"
-            )
-        words = f"now {length_words(distance(*self._points))}; type how far apart they are"
-        return Preview(tuple(self._points), words=words)
+        line = (*self._points, self._at)[:2]
+        words = f"now {length_words(distance(*line))}"
+        if len(self._points) == 2:
+            words += "; type how far apart they are, or Enter makes them level"
+        return Preview(line, words=words)
