@@ -6,8 +6,7 @@ from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.errors import ParameterError
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.runs.panes import comparison_frames, pane_layout, side_by_side
-from robocov_app.runs.recording import frame_rows
+from robocov_app.runs.film import FilmStyle, comparison_frames, frame_rows, pane_layout, side_by_side
 
 
 def plain(count, width=64, height=48, start=0):
@@ -17,11 +16,10 @@ def plain(count, width=64, height=48, start=0):
 
 
 def film(records, theme="light", colours="robots", size=None, speed=4.0):
-    layout = pane_layout(records, theme, colours, size)
+    style = FilmStyle(theme, colours, fps=5, speed=speed)
+    layout = pane_layout(records, style, size)
     costs = [(record.time[:1], np.array([1.0])) for record in records]
-    return layout, comparison_frames(
-        records, costs, layout, theme=theme, colours=colours, fps=5, speed=speed, hold=0.0
-    )
+    return layout, comparison_frames(records, costs, layout, style)
 
 
 class TestSideBySide:
@@ -54,7 +52,7 @@ class TestLayout:
         [(ROOMS, 1, 1), (ROOMS, 2, 2), (ROOMS, 3, 3), (ROOMS, 4, 2), (CORRIDOR, 3, 1), (SHAFT, 4, 4)],
     )
     def test_wide_maps_stand_below_each_other(self, environment, count, columns):
-        layout = pane_layout([run_of(environment, 3)] * count, "light")
+        layout = pane_layout([run_of(environment, 3)] * count)
         assert layout.columns == columns
         assert layout.size[0] <= 1920 and layout.size[1] <= 1090
         assert layout.size[0] % 2 == layout.size[1] % 2 == 0
@@ -92,12 +90,12 @@ class TestFrames:
     def test_one_legend_explains_what_any_of_them_shows(self):
         without = run_of(ROOMS, 3, controller="rpf")
         with_goals = replace(without, goals=without.positions + 0.1)
-        plain_header = pane_layout([without, without], "light").header
-        both = pane_layout([without, with_goals], "light").header
+        plain_header = pane_layout([without, without]).header
+        both = pane_layout([without, with_goals]).header
         assert plain_header.shape == both.shape
         ink = [int((header != 255).any(axis=2).sum()) for header in (plain_header, both)]
         assert ink[1] > ink[0] + 100  # the cell centroid
-        twice = pane_layout([with_goals, with_goals], "light").header
+        twice = pane_layout([with_goals, with_goals]).header
         assert (twice == both).all()
 
     def test_trajectories_have_the_colours_asked_for(self):

@@ -17,7 +17,8 @@ from robocov.simulation import Simulation
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
-from robocov_app.runs.recording import iter_frames, png_bytes, save_film
+from robocov_app.runs.film import iter_frames
+from robocov_app.runs.recording import png_bytes, save_film
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

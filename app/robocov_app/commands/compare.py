@@ -44,9 +44,9 @@ def command(options: Arguments) -> int:
         gains_for,
         rows_of,
         save_comparison,
-        save_comparison_moving,
     )
-    from robocov_app.runs.run import check_layers, saved_run
+    from robocov_app.runs.film import check_layers, save_moving
+    from robocov_app.runs.run import saved_run
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
 
@@ -76,7 +76,7 @@ def command(options: Arguments) -> int:
                 break
         save_comparison(runs, cost, result.new, options)
         result.keep()
-        save_comparison_moving(runs, cost, result.new, options, stop)
+        save_moving(list(runs.values()), cost, result.new, options, stop)
     if options.json:
         print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, "runs": rows_of(runs)})))
     else:

@@ -105,7 +105,7 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the window, or make frames and a film."""
-    from robocov_app.runs.run import check_layers
+    from robocov_app.runs.film import check_layers
     from robocov_app.runs.saved import load_saved
 
     check_layers(options.film())
@@ -186,17 +186,13 @@ def _spare(out: Path, source: Path, saved: list[Saved]) -> None:
 
 
 def _save_moving(options: RunOptions, saved: list[Saved], out: Path, stop: Interruption) -> None:
-    from robocov_app.runs.compare import save_panes_moving
-    from robocov_app.runs.run import save_run_moving, shown_in_films
+    from robocov_app.runs.film import save_moving
     from robocov_app.runs.saved import roster_of
 
     runs = [_run_of(each) for each in saved]
-    if len(runs) == 1:
-        save_run_moving(runs[0], None, out, options, stop)
-        return
     # robots may have failed at other places in each run: distances are to one map, that without them
     bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
-    save_panes_moving(runs, shown_in_films(bare, None, options), out, options, stop)
+    save_moving(runs, None, out, options, stop, bare=bare if len(runs) > 1 else None)
 
 
 def _run_of(saved: Saved) -> Run:

@@ -37,7 +37,8 @@ def command(options: Arguments) -> int:
     from robocov.mapfile import load_map
     from robocov_app.runs.building import built_cost
     from robocov_app.runs.compare import folder_names
-    from robocov_app.runs.run import check_layers, save_pictures, save_run_moving, saved_run
+    from robocov_app.runs.film import check_layers, save_moving
+    from robocov_app.runs.run import save_pictures, saved_run
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
 
@@ -52,7 +53,7 @@ def command(options: Arguments) -> int:
         run = saved_run(spec, cost, result, "", options, stop)
         save_pictures(run, cost, result.new, options)
         result.keep()
-        save_run_moving(run, cost, result.new, options, stop)
+        save_moving([run], cost, result.new, options, stop)
     if options.json:
         print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, **run.summary})))
     else:

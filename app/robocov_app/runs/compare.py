@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 from robocov.controllers import controller_kind, gains_of
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.runs.run import (
-    FILM_HOLD,
     Run,
     cost_title,
     last_moments,
     save_figures,
-    save_moving,
-    shown_in_films,
     time_curves,
 )
 from robocov_app.terminal.output import finite, write_csv, write_json
@@ -26,8 +23,6 @@ if TYPE_CHECKING:
     from robocov.cost import CoverageCost
     from robocov_app.figures.coverage import Moment
     from robocov_app.runs.options import RunOptions
-    from robocov_app.runs.panes import Shown
-    from robocov_app.terminal.interruption import Interruption
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 
@@ -136,45 +131,4 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
             ),
         },
         quiet=options.json,
-    )
-
-
-def save_comparison_moving(
-    runs: Mapping[str, Run], cost: CoverageCost | None, folder: Path, options: RunOptions, stop: Interruption
-) -> None:
-    """Write ``frames/`` and ``comparison.mp4`` as the options say: all controllers side by side."""
-    if not (options.frames or options.video):
-        return
-    shown = shown_in_films(list(runs.values()), cost, options)
-    save_panes_moving(list(runs.values()), shown, folder, options, stop)
-
-
-def save_panes_moving(
-    runs: Sequence[Run], shown: Shown, folder: Path, options: RunOptions, stop: Interruption
-) -> None:
-    """Write ``frames/`` and ``comparison.mp4`` of runs side by side, with what is to be shown."""
-    from robocov_app.runs.panes import comparison_frames, pane_layout
-    from robocov_app.runs.recording import frame_rows, told_costs
-
-    records = [run.record for run in runs]
-    layout = pane_layout(records, options.theme, options.colours, options.picture_size(), shown)
-    longest = max(records, key=len)
-    total = len(frame_rows(longest.time, options.fps, options.film_speed, FILM_HOLD))
-    save_moving(
-        folder,
-        "comparison.mp4",
-        lambda: comparison_frames(
-            records,
-            [told_costs(run.history) for run in runs],
-            layout,
-            theme=options.theme,
-            colours=options.colours,
-            fps=options.fps,
-            speed=options.film_speed,
-            hold=FILM_HOLD,
-            shown=shown,
-        ),
-        total,
-        options,
-        stop,
     )

@@ -1,4 +1,4 @@
-"""Frames and films of a run, without a display."""
+"""Files of frames and films."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import io
 import os
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TypeAlias
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,115 +18,8 @@ from numpy.typing import NDArray
 from robocov.errors import OutputError, ParameterError, shown
 from robocov.files.atomic import written
 
-if TYPE_CHECKING:
-    from robocov.arrays import Array, IntArray
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
-    from robocov_app.render.field import Fields
-    from robocov_app.render.layers import Layer
-
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB picture, (height, width, 3), 0 to 255."""
-
-Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
-"""Times, s, and mean distances, m; and mean times, s, where robots are not equally fast."""
-
-Progress: TypeAlias = Callable[[int, int | None], None]
-"""Is told how many frames are done, and of how many where that is known."""
-
-_NO_FRAMES = "frames: none were given, but at least one was wanted"
-
-
-def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Return which row of a record each frame shows.
-
-    `time`, (T,) s: ascending. `fps`: frames per second of the film. `speed`: simulated seconds per second of
-    the film. `hold`, s: so long the film stays on the last row at its end. Raises
-    ParameterError when `fps` or `speed` is not positive.
-
-    Examples
-    --------
-    >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
-    [0, 2, 4]
-    """
-    for name, value in (("fps", fps), ("speed", speed)):
-        if not (np.isfinite(value) and value > 0):
-            raise ParameterError(f"{name}: {shown(value)}, but a positive number was wanted")
-    duration = float(time[-1] - time[0])
-    count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
-    at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
-    # half a microsecond forgives the rounding of sums of steps
-    rows = np.searchsorted(time, at + 5e-7, side="right") - 1
-    return np.asarray(np.clip(rows, 0, len(time) - 1), dtype=np.intp)
-
-
-def iter_frames(
-    record: Record,
-    *,
-    size: tuple[int, int] = (1280, 720),
-    theme: str = "light",
-    fps: float = 30.0,
-    speed: float = 1.0,
-    hold: float = 0.0,
-    colours: str = "robots",
-    show: Iterable[str] | None = None,
-    also: Iterable[str] = (),
-    without: Iterable[str] = (),
-    fields: Fields | None = None,
-    layers: Sequence[Layer] | None = None,
-    scale: float | None = None,
-    cost: Costs | None = None,
-    rows: IntArray | None = None,
-) -> Iterator[Frame]:
-    """Draw the frames of a saved run, one at a time.
-
-    `size`: (width, height) in px. `fps`, `speed`, `hold`: see `frame_rows`. `colours`: a hue for each robot,
-    or all in the paper's red. `show`: None shows those that are shown by default. `also`, `without`: changes
-    to that. `fields`: what layers of distances draw; without it they draw nothing. `layers`: from the lowest
-    to the topmost; None for `standard_layers`. `scale`: of text and lines; None for what suits the size.
-    `cost`: times and mean distances, and where robots are not equally fast the mean times until the first is
-    there; each frame says the latest known. See `told_costs`. `rows`, (m,) int or None: the rows to show,
-    instead of those that `fps` and `speed` give. The arrays, (height, width, 3) RGB, are the caller's own.
-    """
-    from robocov_app.render.phi import mean_words
-    from robocov_app.render.picture import Painter, standard_layers
-    from robocov_app.render.record_scene import record_scene
-    from robocov_app.render.theme import theme_named
-
-    layers = standard_layers(colours) if layers is None else layers
-    painter = Painter(record.environment, size, theme_named(theme), layers, scale)
-    if show is not None:
-        painter.show(show)
-    painter.change(also, without)
-    if rows is None:
-        rows = frame_rows(record.time, fps, speed, hold)
-    last, frame = -1, None
-    for row in rows.tolist():
-        if frame is None or row != last:
-            scene = record_scene(
-                record,
-                row,
-                cost=_cost_text(mean_words(record.environment), float(record.time[row]), cost),
-                fields=fields if painter.needs_field else None,
-            )
-            last, frame = row, painter.frame(scene)
-        yield frame
-
-
-def told_costs(history: CostHistory) -> Costs:
-    """Return of a cost history what frames tell."""
-    if history.mean_time is None:
-        return history.time, history.mean_distance
-    return history.time, history.mean_distance, history.mean_time
-
-
-def _cost_text(what: str, time: float, cost: Costs | None) -> str:
-    if cost is None:
-        return ""
-    from robocov_app.render.phi import cost_words
-
-    known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
-    return cost_words(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
 
 
 def png_bytes(frame: Frame) -> bytes:
@@ -155,60 +49,38 @@ def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
         yield frame
 
 
-def save_frames(
-    folder: Path | str, frames: Iterable[Frame], *, total: int | None = None, progress: Progress | None = None
-) -> int:
-    """Write frames as `kept_frames` does, and return how many.
-
-    `total`: number of frames where it is known, for `progress`. `progress`: called with (done, total) after
-    each frame. Raises OutputError when the folder cannot be written.
-    """
-    done = 0
-    for done, _ in enumerate(kept_frames(folder, frames), start=1):
-        if progress is not None:
-            progress(done, total)
-    return done
+def save_frames(folder: Path | str, frames: Iterable[Frame]) -> int:
+    """Write frames as `kept_frames` does, and return how many."""
+    return sum(1 for _ in kept_frames(folder, frames))
 
 
-def save_film(
-    path: Path | str,
-    frames: Iterable[Frame],
-    *,
-    fps: float = 30.0,
-    total: int | None = None,
-    progress: Progress | None = None,
-) -> int:
+def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -> int:
     """Write frames as an MP4 film (H.264, yuv420p: what browsers and slides play); return how many.
 
-    The film is made under another name in the same folder and gets its own at the end: after an error or
-    Ctrl-C there is no half film, and an older one of that name is still there. `path`: its folder is created
-    when it is not there. `frames`: all of one size. H.264 wants even sizes: an odd one gets its last row or
-    column twice. `total`: number of frames where it is known, for `progress`. `progress`: called with (done,
-    total) after each frame. Raises OutputError when the encoder is missing or fails, or the film cannot be
-    written; ParameterError when there are no frames, or frames of different sizes.
+    The film is made under another name in the same folder, made where it is missing, and gets its own at the
+    end: after an error or Ctrl-C there is no half film, and an older one of that name is still there.
+    Frames are of one size; H.264 wants even ones, so an odd one gets its last row or column twice. Raises
+    OutputError when the encoder is missing or fails, or the film cannot be written; ParameterError when there
+    are no frames, or frames of different sizes.
     """
     path = Path(path)
     source = iter(frames)
     first = next(source, None)
     if first is None:
-        raise ParameterError(_NO_FRAMES)
+        raise ParameterError("frames: none were given, but at least one was wanted")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path.parent}: cannot be made ({_reason(error)})") from error
-    done = 0
     with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
-        frame: Frame | None = first
-        while frame is not None:
+        done = 0
+        for frame in chain([first], source):
             if frame.shape != first.shape:
                 raise ParameterError(
                     f"frames: {shown(frame.shape)} after {shown(first.shape)}, but one size was wanted"
                 )
             pipe.write(np.ascontiguousarray(_even(frame)).data)
             done += 1
-            if progress is not None:
-                progress(done, total)
-            frame = next(source, None)
     return done
 
 

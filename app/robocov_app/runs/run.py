@@ -13,7 +13,7 @@ import numpy as np
 from robocov.cost import MomentaryCost
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record
-from robocov_app.runs.building import FILM_LATTICE, built_cost, cost_for_pictures
+from robocov_app.runs.building import built_cost, cost_for_pictures
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
@@ -24,20 +24,11 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from robocov.arrays import Array
     from robocov.cost import CoverageCost
     from robocov.files.result_folder import ResultFolder
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
     from robocov_app.runs.options import RunOptions
-    from robocov_app.runs.panes import Shown
-    from robocov_app.runs.recording import Frame
-
-FILM_SCALE = 1.3
-"""How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
-
-FILM_HOLD = 1.0
-"""Seconds for which a film stays on its last moment."""
 
 STOPPED_SAMPLES = 200
 """Samples of the coverage cost of a run that was stopped."""
@@ -224,112 +215,3 @@ def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, q
                 save_figure(figure, folder / (stem + suffix))
                 done += 1
                 update(done)
-
-
-def save_moving(
-    folder: Path,
-    film: str,
-    frames: Callable[[], Iterator[Frame]],
-    total: int,
-    options: RunOptions,
-    stop: Interruption,
-) -> None:
-    """Write the frames as PNGs, as a film, or both, as the options say; Ctrl-C ends both early."""
-    from robocov_app.runs.recording import kept_frames, save_film, save_frames
-
-    if not (options.frames or options.video):
-        return
-
-    def until_stopped() -> Iterator[Frame]:
-        for frame in frames():
-            yield frame
-            if stop.requested:
-                return
-
-    pictures = folder / "frames"
-    with progress("film" if options.video else "frames", total, quiet=options.json) as update:
-        if not options.video:
-            save_frames(pictures, until_stopped(), progress=lambda done, _: update(done))
-        else:
-            shown = kept_frames(pictures, until_stopped()) if options.frames else until_stopped()
-            save_film(folder / film, shown, fps=options.fps, progress=lambda done, _: update(done))
-
-
-def save_run_moving(
-    run: Run, cost: CoverageCost | None, folder: Path, options: RunOptions, stop: Interruption
-) -> None:
-    """Write ``frames/`` and ``run.mp4`` as the options say; for `cost` see `shown_in_films`."""
-    from robocov_app.runs.recording import frame_rows
-
-    if not (options.frames or options.video):
-        return
-    total = len(frame_rows(run.record.time, options.fps, options.film_speed, FILM_HOLD))
-    shown = shown_in_films([run], cost, options)
-
-    def frames() -> Iterator[Frame]:
-        return frames_of(run, options, options.film_size(), shown)
-
-    save_moving(folder, "run.mp4", frames, total, options, stop)
-
-
-def check_layers(options: RunOptions) -> None:
-    """Make sure, before anything is simulated, that films can show what is wanted.
-
-    Raises ParameterError when there is no such layer.
-    """
-    if options.show or options.hide:
-        from robocov_app.render.picture import checked_layers
-
-        checked_layers("--show", options.show)
-        checked_layers("--hide", options.hide)
-
-
-def shown_in_films(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> Shown:
-    """Return what films of runs on one map show, all on one scale of colours.
-
-    The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
-    Where no `cost` of the map is there, it is made if it is needed.
-    """
-    from robocov_app.render.field import Fields
-    from robocov_app.render.picture import checked_layers
-    from robocov_app.render.shading import round_limit
-    from robocov_app.runs.panes import Shown
-
-    also, without = checked_layers("--show", options.show), checked_layers("--hide", options.hide)
-    if not also & {"distances", "geodesic_cells"}:
-        return Shown(also, without)
-    environment = runs[0].record.environment
-    if cost is None:
-        cost = built_cost(environment, FILM_LATTICE, quiet=options.json)
-    cost = cost_for_pictures(environment, cost, FILM_LATTICE)
-    farthest = max((float(reached.max(initial=0.0)) for reached in _reached(runs, cost)), default=0.0)
-    return Shown(also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
-
-
-def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
-    """Yield the distances at the end of each run that are finite."""
-    momentary = MomentaryCost(cost)
-    for run in runs:
-        record = run.record
-        result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
-        if result is not None:
-            yield result.distances[np.isfinite(result.distances)]
-
-
-def frames_of(run: Run, options: RunOptions, size: tuple[int, int], shown: Shown) -> Iterator[Frame]:
-    """Draw the film frames of a run."""
-    from robocov_app.runs.recording import iter_frames, told_costs
-
-    return iter_frames(
-        run.record,
-        size=size,
-        also=shown.also,
-        without=shown.without,
-        fields=shown.fields,
-        theme=options.theme,
-        colours=options.colours,
-        fps=options.fps,
-        speed=options.film_speed,
-        hold=FILM_HOLD,
-        cost=told_costs(run.history),
-    )

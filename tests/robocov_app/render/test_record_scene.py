@@ -11,7 +11,7 @@ from robocov_app.figures.runs import plot_trajectories
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.record_scene import record_scene
 from robocov_app.render.theme import LIGHT
-from robocov_app.runs.recording import iter_frames
+from robocov_app.runs.film import iter_frames
 
 CART = CircleObstacle((1.0, 3.0), 0.4, "cart", ObstaclePath(((1, 3), (5, 3)), 2.0, "back-and-forth"))
 HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)), (CART,))
