@@ -6,10 +6,10 @@ It is not exact and cannot tell whose a site is. The robots move by up to a quar
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib.util import find_spec
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -17,9 +17,6 @@ import shapely
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from itertools import cycle
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,9 +14,6 @@ from gymnasium.spaces import Box
 
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ROBOTS, LATTICE, TOGETHER = 6, 32, 64
 

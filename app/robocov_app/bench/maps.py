@@ -6,8 +6,8 @@ least that a coverage cost takes.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 from scipy.spatial import cKDTree
 
@@ -15,9 +15,6 @@ from robocov.cost import CoverageCost
 from robocov.mapfile import load_map
 from robocov_app.bench.cost import Places, evaluated
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 TREE = "k-d tree of the robots"
 

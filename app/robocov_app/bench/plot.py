@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from robocov_app.bench.measure import Row
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, plain_style, tone
 from robocov_app.figures.runs import save_figure
 from robocov_app.render.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from matplotlib.axes import Axes
-
-    from robocov_app.bench.measure import Row
 
 WIDTH = 1100
 

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from functools import partial
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
+from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.film import iter_frames
 from robocov_app.runs.recording import png_bytes, save_film
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov.record import Record
 
 SIZE = (1280, 720)
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 from robocov_app.bench.measure import Case, InTurn, Row
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
 

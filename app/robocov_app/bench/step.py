@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
 from scipy.spatial import Delaunay
 
+from robocov.arrays import Array
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from robocov.arrays import Array
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""

@@ -6,17 +6,14 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from functools import partial
 from itertools import count
-from typing import TYPE_CHECKING
 
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 BEFORE = 6.0
 """See `Row.before`."""

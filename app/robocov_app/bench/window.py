@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import pygame
 
@@ -20,9 +20,6 @@ from robocov_app.viewer.screen import undisturbed
 from robocov_app.viewer.session.scenario import Law, Limits, Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import FPS, Window
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SIZE = (1280, 720)
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError, unknown_name
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.robots import Team
+from robocov.robots import Team
 
 Action: TypeAlias = Literal["force", "velocity"]
 """A force in N, or a velocity in m/s."""

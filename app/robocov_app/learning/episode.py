@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from robocov.cost import MomentaryCost
+from robocov.arrays import Array, BoolArray
+from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
+from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError, shown
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import close_pairs
+from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning.driving import driving_forces
+from robocov_app.learning.layout import Rows
 from robocov_app.learning.rewards import reference_distance, shares
 from robocov_app.learning.scenarios import Scenarios, map_of
+from robocov_app.learning.task import CoverageTask
 from robocov_app.runs.spec import RunSpec
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from robocov.arrays import Array, BoolArray
-    from robocov.cost import CoverageCost, CoverageResult
-    from robocov.environment import Environment
-    from robocov.observation.region import Region
-    from robocov.record import Record
-    from robocov_app.learning.layout import Rows
-    from robocov_app.learning.task import CoverageTask
-
 
 _SEEDS = 2**31
 """Starts are drawn with seeds below this."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from robocov.arrays import Array
 from robocov.controllers import informed
-from robocov.observation import Scans
+from robocov.controllers.base import Controller
+from robocov.observation import Scanning, Scans
 from robocov_app.learning.driving import actions_of
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.controllers.base import Controller
-    from robocov.observation import Scanning
-    from robocov_app.learning.episode import Episode
+from robocov_app.learning.episode import Episode
 
 
 class ControllerPolicy:

@@ -7,7 +7,7 @@ both. (gymnasium knows no entry points of packages any more.)
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import gymnasium
 import numpy as np
@@ -15,6 +15,7 @@ from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
+from robocov.arrays import Array
 from robocov.errors import RobocovError
 from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import (
@@ -25,14 +26,11 @@ from robocov_app.learning.episode import (
     checked_actions,
     drawn_episode,
 )
+from robocov_app.learning.layout import Rows
 from robocov_app.learning.pictures import METADATA, Pictures
 from robocov_app.learning.scenarios import Scenarios
 from robocov_app.learning.task import CoverageTask, changed_task
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov_app.learning.layout import Rows
-    from robocov_app.runs.recording import Frame
+from robocov_app.runs.recording import Frame
 
 ID = "robocov/Coverage-v0"
 

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.base import cells_seen
 from robocov.errors import ParameterError, checked, shown
-from robocov.observation import MOST_RAYS
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array, IntArray
-    from robocov.observation import Observations, Scans
-    from robocov.observation.region import Region
-    from robocov.robots import Team
+from robocov.observation import MOST_RAYS, Observations, Scans
+from robocov.observation.region import Region
+from robocov.robots import Team
 
 Rows: TypeAlias = NDArray[np.float32]
 """(n, size): one row for each robot."""

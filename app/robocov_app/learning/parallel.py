@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError, RobocovError, shown
 from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import Episode, drawn_episode
+from robocov_app.learning.layout import Rows
 from robocov_app.learning.pictures import METADATA, Pictures
 from robocov_app.learning.scenarios import Scenarios
 from robocov_app.learning.task import CoverageTask, changed_task
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from robocov.arrays import Array
-    from robocov_app.learning.layout import Rows
-    from robocov_app.runs.recording import Frame
+from robocov_app.runs.recording import Frame
 
 
 class CoverageParallelEnv(ParallelEnv):

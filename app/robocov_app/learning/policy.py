@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robocov.arrays import Array
 from robocov.controllers.gains import gain, validate_gains
 from robocov.errors import ParameterError, shown
-from robocov.observation import Decision, Scanning
+from robocov.observation import Decision, Observations, Scanning
+from robocov.observation.region import Region
+from robocov.robots import Team
 from robocov_app.learning.driving import Action, checked_action, driving_forces
 from robocov_app.learning.layout import ObservationLayout
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.observation import Observations
-    from robocov.observation.region import Region
-    from robocov.robots import Team
 
 Policy: TypeAlias = "Callable[[NDArray[np.float32]], Any]"
 """From an observation, (size,), to an action, (2,)."""

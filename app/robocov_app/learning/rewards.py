@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
+from robocov.arrays import Array
+from robocov.cost import CoverageResult
 from robocov.errors import ParameterError, unknown_name
-
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.cost import CoverageResult
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
 """Who is rewarded for what; see `shares`."""

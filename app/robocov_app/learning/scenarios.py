@@ -6,15 +6,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError, shown
 from robocov.mapfile import load_map
-
-if TYPE_CHECKING:
-    import numpy as np
 
 MapSource: TypeAlias = "str | Path | Environment | Callable[[int], Environment]"
 """A map, its name or path, or what makes one of a seed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.learning.driving import FOLLOWING, Action, checked_action
 from robocov_app.learning.layout import ObservationLayout
 from robocov_app.learning.rewards import Reward, checked_reward
-
-if TYPE_CHECKING:
-    from robocov_app.learning.scenarios import MapSource
+from robocov_app.learning.scenarios import MapSource
 
 MOST_ROBOTS = 10_000
 

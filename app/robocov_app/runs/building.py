@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
 from robocov.cost import CoverageCost
+from robocov.environment import Environment
+from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
 from robocov_app.terminal.progress import progress
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.environment import Environment
-    from robocov.geodesic import Geodesics
 
 PICTURE_LATTICE = 256
 """Coarsest lattice for maps of distances: its cells are to be narrower than walls."""

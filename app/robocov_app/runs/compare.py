@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov.controllers import controller_kind, gains_of
+from robocov.cost import CoverageCost
 from robocov.errors import ParameterError, unknown_name
+from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import (
     Run,
     cost_title,
@@ -17,12 +21,7 @@ from robocov_app.runs.run import (
 from robocov_app.terminal.output import finite, write_csv, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from robocov.cost import CoverageCost
     from robocov_app.figures.coverage import Moment
-    from robocov_app.runs.options import RunOptions
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 

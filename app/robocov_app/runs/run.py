@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,25 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.cost import MomentaryCost
+from robocov.cost import CoverageCost, MomentaryCost
+from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record
 from robocov_app.runs.building import built_cost, cost_for_pictures
+from robocov_app.runs.options import RunOptions
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
 from robocov_app.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
     from matplotlib.figure import Figure
 
-    from robocov.cost import CoverageCost
-    from robocov.files.result_folder import ResultFolder
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
-    from robocov_app.runs.options import RunOptions
 
 STOPPED_SAMPLES = 200
 """Samples of the coverage cost of a run that was stopped."""

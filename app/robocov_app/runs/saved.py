@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from robocov.environment import CircleObstacle
+from robocov.environment import CircleObstacle, Environment
 from robocov.errors import InputError
 from robocov.files.result_folder import settle
 from robocov.files.strictjson import Document, read_document, wanted
+from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
-
-if TYPE_CHECKING:
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
 
 
 class ComparisonDocument(Document):

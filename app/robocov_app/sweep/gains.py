@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
+from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.controllers import gain_values, gains_of
-from robocov.controllers.gains import Option, Value, with_gains
+from robocov.controllers.gains import Gain, Option, Value, with_gains
 from robocov.errors import ParameterError, place, shown, unknown_name
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.arrays import Array
-    from robocov.controllers.gains import Gain
 
 T = TypeVar("T")
 

@@ -16,15 +16,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
 from robocov.files.atomic import locked, on_disk, written
-from robocov_app.sweep.performing import FIGURES, made_with
-
-if TYPE_CHECKING:
-    from robocov_app.sweep.performing import Outcome
-    from robocov_app.sweep.study import Task
+from robocov_app.sweep.performing import FIGURES, Outcome, made_with
+from robocov_app.sweep.study import Task
 
 RUNS = "runs"
 """Name of the folder of the runs' folders."""

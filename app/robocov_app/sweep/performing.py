@@ -7,32 +7,26 @@ import io
 import json
 import threading
 import traceback
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robocov.cost import CoverageCost
+from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
-from robocov.metrics import cost_history, summarise
+from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.record import ARRAYS, versions
+from robocov.record import ARRAYS, Record, versions
 from robocov_app.runs.run import cost_columns, cost_rows
 from robocov_app.runs.spec import RunSpec
-from robocov_app.sweep.study import conditions_of, source_json, team_of
+from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
-    from robocov_app.sweep.study import Task
-    from robocov_app.toolkit.worker import Line
+from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4
 """Maps whose costs a worker keeps; tasks come map by map."""

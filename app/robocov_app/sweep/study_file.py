@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
+from pydantic_core import ErrorDetails
 
+from robocov.environment import Environment
 from robocov.errors import InputError, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep.gains import NO_LIMIT, Method, Range, Sampling, Scale, once
 from robocov_app.sweep.study import ALL, MOST_RUNS, Study, StudyMap
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
-
-    from robocov.environment import Environment
 
 
 class _Model(BaseModel):

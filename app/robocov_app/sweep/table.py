@@ -6,24 +6,21 @@ import csv
 import io
 import math
 import os
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.files.atomic import on_disk, writable
+from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.performing import FIGURES, TIMED
-from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, parameter_column
+from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
-
     import pyarrow as pa
-
-    from robocov_app.sweep.ledger import Entry
-    from robocov_app.sweep.study import Study, Task
 
 CSV, PARQUET = "results.csv", "results.parquet"
 

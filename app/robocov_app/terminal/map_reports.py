@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from robocov.mapfile.check import MapReport
+from robocov.mapfile.check import MapReport
 
 _LISTED = 5
 """Components whose areas are told."""
