@@ -152,6 +152,60 @@ def test_the_boundary_is_drawn_by_dragging_by_corners_and_by_size(hands: Hands) 
     assert hands.sketch.boundary == sheet().boundary
 
 
+def test_the_first_point_can_be_typed(hands: Hands) -> None:
+    hands.key("r")
+    hands.type("2 3")
+    hands.key("return")
+    hands.type("1.5 x 1")
+    hands.key("return")
+    assert set(hands.shapes[0].vertices) == {(2, 3), (3.5, 3), (3.5, 4), (2, 4)}
+    hands.key("w")
+    hands.type("0 0")
+    hands.key("return")
+    hands.type("4 0")
+    hands.key("return")
+    hands.key("return")
+    assert hands.shapes[1].points == ((0, 0), (4, 0))
+    hands.key("c")
+    hands.type("5 5")
+    hands.key("return")
+    hands.type("1")
+    hands.key("return")
+    assert hands.shapes[2] == CircleObstacle((5, 5), 1.0)
+
+
+def test_a_wall_is_one_drag_or_several_clicks(hands: Hands) -> None:
+    hands.key("w")
+    hands.drag_at((1, 1), (2, 1), (4, 1))
+    assert hands.shapes == [WallObstacle(((1, 1), (4, 1)), 0.1)]
+    hands.click_all((1, 3), (4, 3), (4, 5))
+    hands.key("return")
+    assert hands.shapes[1].points == ((1, 3), (4, 3), (4, 5))
+    hands.press(*hands.pixel((6, 6)))
+    hands.move(*(part + 5 for part in hands.pixel((6, 6))), held=1)
+    hands.release()  # a hand that shakes has drawn no wall
+    assert len(hands.shapes) == 2 and len(hands.desk.tool.points) == 1
+
+
+def test_doors_are_opened_by_a_click_and_by_dragging(hands: Hands) -> None:
+    hands.key("w")
+    hands.drag_at((1, 2), (4, 2), (9, 2))
+    hands.key("k")
+    hands.click_at((3, 2))
+    assert [wall.points for wall in hands.shapes] == [((1, 2), (2.55, 2)), ((3.45, 2), (9, 2))]
+    hands.type("1.2")
+    hands.key("return")
+    hands.wait()
+    hands.click_at((6, 2))
+    assert [wall.points[0][0] for wall in hands.shapes] == [1, 3.45, 6.6]
+    hands.wait()
+    hands.drag_at((7, 2), (7.5, 2), (8, 2))
+    assert [wall.points for wall in hands.shapes][2:] == [((6.6, 2), (7, 2)), ((8, 2), (9, 2))]
+    hands.wait()
+    hands.click_at((5, 8))
+    assert hands.desk.trouble and "in walls" in hands.said
+
+
 def test_starts_are_discs_places_and_anywhere(hands: Hands) -> None:
     hands.key("s")
     hands.drag_at((2, 2), (2.5, 2), (3, 2))
@@ -192,6 +246,10 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp
     assert hands.sketch.background.scale == pytest.approx(2 * laid.scale, rel=1e-2)
     corner = hands.sketch.background.corner
     hands.drag_at((3, 3), (3.5, 3.5), (4, 3))
+    hands.click_all((2, 2), (4, 2.4))
+    hands.key("return")
+    assert hands.sketch.background.turn == pytest.approx(-11.3, abs=0.5)
+    hands.key("ctrl+z")
     moved = hands.sketch.background.corner
     assert moved[0] - corner[0] == pytest.approx(1.0, abs=0.05)
     hands.key("ctrl+z", times=3)

@@ -1,6 +1,7 @@
 """Selecting, moving, turning, scaling, copying, and editing vertices with the mouse."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -257,3 +258,18 @@ def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
     assert selector.shape_of_cursor(hands.desk) == "move"
     hands.move(*handle(hands, "scale", (1, 1)))
     assert selector.shape_of_cursor(hands.desk) == "rising"
+
+
+def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path: Path) -> None:
+    pillar = PolygonObstacle(((5, 5), (5.4, 5), (5.4, 5.4), (5, 5.4)))
+    wide = replace(sheet(pillar), boundary=((0, 0), (80, 0), (80, 80), (0, 80)))
+    with opened_editor(tmp_path, wide) as hands:
+        hands.key("f")
+        hands.click_at((5.2, 5.2))
+        assert hands.desk.selection == Selection.of(0)
+        hands.wait()
+        hands.hold("ctrl")
+        hands.drag_at((5.2, 5.2), (15, 15), (25.2, 25.2))
+        (moved,) = hands.shapes
+        assert moved.polygon.area == pytest.approx(0.16, abs=1e-3)
+        assert moved.vertices[0] == pytest.approx((25, 25), abs=0.3)

@@ -36,7 +36,7 @@ from robocov_app.editor.edits.motion_path import goes, moving
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.model.sketch import BOUNDARY
-from robocov_app.editor.tools.handles import KNOB, box_of, handles
+from robocov_app.editor.tools.handles import KNOB, frame_of, handles
 from robocov_app.editor.tools.select import Moving
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
@@ -332,7 +332,7 @@ class Arena:
             self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
         if "handles" not in desk.shown or desk.tool is not selector or not selection:
             return
-        box = box_of(sketch, selection, desk.pixel)
+        box = frame_of(sketch, selection, desk.pixel)
         if box is not None:
             draw_box(canvas, box, mix(theme.background, accent(theme), 0.6))
         found = desk.handles if sketch is desk.sketch else handles(sketch, selection, desk.pixel)

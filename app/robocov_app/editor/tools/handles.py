@@ -1,4 +1,4 @@
-"""What can be taken hold of: vertices, corners and sides of the box around a selection, its knob."""
+"""Handles: vertices, the corners and sides of the box around a selection, and the knob that turns it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from robocov.environment import Point
-from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.edits.transform import bounds_of, box_of
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Selection, Vertex, points_of
-from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
 
@@ -21,6 +21,9 @@ KNOB = 24.0
 
 ROOMY = 34.0
 """Pixels at scale 1 that a side of the box has at least when there is a handle in its middle."""
+
+SMALL = 26.0
+"""Pixels at scale 1 of a thing below which its vertices are no handles: it could not be dragged itself."""
 
 MOST_VERTICES = 4000
 """Vertices that are shown at most: more could not be told apart."""
@@ -56,7 +59,7 @@ def handled(selection: Selection) -> tuple[Owner, ...]:
     return tuple(owners) if len(owners) == 1 else ()
 
 
-def box_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
+def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
     """Return the box that is shown around whole things, m; `pixel` is how many metres one is at scale 1."""
     bounds = None if selection.vertices else bounds_of(sketch, selection)
     if bounds is None:
@@ -68,9 +71,9 @@ def box_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, f
 def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
     """Return all handles, those that are taken first last."""
     found: list[Handle] = []
-    box = box_of(sketch, selection, pixel)
-    if box is not None:
-        low_x, low_y, high_x, high_y = box
+    frame = frame_of(sketch, selection, pixel)
+    if frame is not None:
+        low_x, low_y, high_x, high_y = frame
         xs, ys = (
             {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x},
             {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y},
@@ -83,18 +86,19 @@ def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle,
                     found.append(Handle("scale", (xs[x], ys[y]), side=(x, y)))
         found.append(Handle("turn", (xs[0], high_y + KNOB * pixel)))
     for owner in handled(selection):
-        points = points_of(sketch, owner)
-        found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
+        if selection.vertices or not _is_small(sketch, owner, pixel):
+            points = points_of(sketch, owner)
+            found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
     return tuple(found)
 
 
 def handle_at(found: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
     """Return the handle within `reach` metres of a point: the nearest, a vertex before others."""
-    best: tuple[bool, float, Handle] | None = None
-    for handle in found:
-        far = distance(handle.at, point)
-        if far <= reach:
-            rank = (handle.kind != "vertex", far)
-            if best is None or rank < best[:2]:
-                best = (*rank, handle)
-    return best[2] if best else None
+    near = [handle for handle in found if distance(handle.at, point) <= reach]
+    return min(near, key=lambda each: (each.kind != "vertex", distance(each.at, point)), default=None)
+
+
+def _is_small(sketch: Sketch, owner: Owner, pixel: float) -> bool:
+    """Return whether an obstacle or a disc is too small on the screen to be taken between its vertices."""
+    box = None if owner == BOUNDARY else box_of(sketch, owner)
+    return box is not None and max(box[2] - box[0], box[3] - box[1]) < SMALL * pixel

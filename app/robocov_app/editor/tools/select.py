@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.environment import Point
+from robocov.environment import CircleObstacle, Point
 from robocov.errors import MapError
 from robocov_app.editor.edits import transform, vertices
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
-from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of
-from robocov_app.editor.model.sketch import BOUNDARY, Owner
+from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of, rings_of
+from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.handles import Handle, handle_at
 from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
 from robocov_app.editor.tools.tool import (
@@ -24,6 +24,7 @@ from robocov_app.editor.tools.tool import (
     at_round_angle,
     bearing_words,
     length_words,
+    place_words,
 )
 
 MANY_POINTS = 1000
@@ -35,9 +36,23 @@ SAME = 1e-9
 FEW_POINTS = 60
 """Points of what is moved that may snap; of more, a choice of them."""
 
+NEAR = 0.6
+"""Part of a finger's width within which something is taken hold of."""
+
+ON_EDGE = 1e-5
+"""Metres within which a point lies on an edge."""
+
+_CURSORS = {
+    **dict.fromkeys(((-1, 0), (1, 0)), "sideways"),
+    **dict.fromkeys(((0, -1), (0, 1)), "updown"),
+    **dict.fromkeys(((-1, -1), (1, 1)), "rising"),
+    **dict.fromkeys(((-1, 1), (1, -1)), "falling"),
+}
+"""What the cursor looks like over handles that scale, by their sides."""
+
 
 class Drag:
-    """Something that is dragged.
+    """Something that is dragged: each move gives the change that letting go would make.
 
     Attributes
     ----------
@@ -58,7 +73,7 @@ class Drag:
         """Follow the mouse."""
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Take what was typed instead."""
+        """Take what was typed instead; MapError when it means nothing."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self) -> Preview:
@@ -69,6 +84,23 @@ class Drag:
         """Let go: what was changed is done."""
         if self.change is not None:
             context.change(self.change)
+
+    def snapped_to(
+        self,
+        context: ToolContext,
+        event: PointerEvent,
+        to: Point,
+        dragged: Selection,
+        origin: Point | None = None,
+    ) -> Point:
+        """Return where a place snaps to anything but what is dragged, unless Ctrl is held down."""
+        without = dragged.vertices or dragged.owners
+        targets = None if event.ctrl else context.snapper.targets(context.sketch, without)
+        if targets is None:
+            return to
+        snap = snapped(to, targets, context.snapping(event.reach), origin)
+        self.guides = snap.guides
+        return snap.point
 
 
 class Moving(Drag):
@@ -86,8 +118,7 @@ class Moving(Drag):
         super().__init__()
         self.moving, self._begun, self._at = selection, begun, begun
         points = [at for owner in selection.owners for _, at in points_of(context.sketch, owner)]
-        step = max(1, len(points) // FEW_POINTS)
-        self._points = points[::step]
+        self._points = points[:: max(1, len(points) // FEW_POINTS)]
         self.offset = (0.0, 0.0) if len(points) > MANY_POINTS else None
         self.copies = False
 
@@ -128,7 +159,6 @@ class Moving(Drag):
         return None if still else act(context.sketch, self.moving, dx, dy)
 
     def ended(self, context: ToolContext) -> None:
-        """Let go."""
         if self.offset is not None:
             self.change = self._made(context, *self.offset)
         super().ended(context)
@@ -155,22 +185,17 @@ class MovingVertices(Drag):
     def to(self, context: ToolContext, event: PointerEvent) -> None:
         """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
         self.guides = ()
-        to = event.raw
         if event.shift and self._origin is not None:
-            to = at_round_angle(self._origin, event.raw)
-        elif not event.ctrl:
-            targets = context.snapper.targets(context.sketch, self._selection.vertices)
-            if targets is not None:
-                snap = snapped(event.raw, targets, context.snapping(event.reach), self._origin)
-                to, self.guides = snap.point, snap.guides
-        self._put(context, to)
+            self._put(context, at_round_angle(self._origin, event.raw))
+        else:
+            self._put(context, self.snapped_to(context, event, event.raw, self._selection, self._origin))
 
     def _put(self, context: ToolContext, to: Point) -> None:
         self._at = to
         dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
         still = dx == 0.0 and dy == 0.0
         self.change = None if still else vertices.moved(context.sketch, self._selection, dx, dy)
-        self.words = f"({to[0]:.2f}, {to[1]:.2f}) m"
+        self.words = place_words(to)
         if self._origin is not None:
             self.words += f"   {bearing_words(self._origin, to)}"
 
@@ -181,22 +206,11 @@ class MovingVertices(Drag):
 
 def _neighbour(context: ToolContext, vertex: Vertex) -> Point | None:
     """Return the vertex before one on its ring, or after a wall's first; None of circles and starts."""
-    same = {
-        other.index: at for other, at in points_of(context.sketch, vertex.of) if other.ring == vertex.ring
-    }
-    if isinstance(vertex.of, str) or not _is_line(context, vertex):
-        return None
-    before = vertex.index - 1
-    if before < 0:
-        shape = None if vertex.of == BOUNDARY else context.sketch.item(vertex.of).shape
-        before = 1 if hasattr(shape, "points") else len(same) - 1
-    return same.get(before)
-
-
-def _is_line(context: ToolContext, vertex: Vertex) -> bool:
-    if isinstance(vertex.of, str):
-        return False
-    return vertex.of == BOUNDARY or not hasattr(context.sketch.item(vertex.of).shape, "center")
+    for ring, points, closed in rings_of(context.sketch, vertex.of):
+        if ring == vertex.ring:
+            before = vertex.index - 1
+            return points[before if before >= 0 or closed else min(1, len(points) - 1)]
+    return None
 
 
 class Turning(Drag):
@@ -222,9 +236,8 @@ class Turning(Drag):
 
     def _turn(self, context: ToolContext, degrees: float) -> None:
         self.words = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
-        self.change = (
-            transform.rotated(context.sketch, self._selection, degrees, self.about) if degrees else None
-        )
+        turned = transform.rotated(context.sketch, self._selection, degrees, self.about) if degrees else None
+        self.change = turned
 
     def enter(self, context: ToolContext, text: str) -> None:
         """Turn by so many degrees."""
@@ -238,38 +251,30 @@ class Scaling(Drag):
         super().__init__()
         self._selection, self._side = selection, handle.side
         self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
-        self._offset = self._edge(1)
-        self._offset = handle.at[0] - self._offset[0], handle.at[1] - self._offset[1]
+        taken = self._edge(1)
+        self._offset = handle.at[0] - taken[0], handle.at[1] - taken[1]
         shapes = [context.sketch.item(key).shape for key in selection.items]
         # a circle that is stretched would be a circle no more
-        self._even = bool(selection.starts) or (
-            bool(shapes) and all(hasattr(each, "center") for each in shapes)
-        )
+        round_ones = bool(shapes) and all(isinstance(each, CircleObstacle) for each in shapes)
+        self._even = bool(selection.starts) or round_ones
 
     def _edge(self, which: int) -> Point:
         """Return the corner or the middle of the side that is dragged (1), or of the one that stays (-1)."""
+        x, y = which * self._side[0], which * self._side[1]
         low_x, low_y, high_x, high_y = self._bounds
-        xs, ys = (
-            {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x},
-            {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y},
-        )
-        return xs[which * self._side[0]], ys[which * self._side[1]]
+        return (low_x + high_x + x * (high_x - low_x)) / 2, (low_y + high_y + y * (high_y - low_y)) / 2
 
     def to(self, context: ToolContext, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
-        to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
         self.guides = ()
-        if not event.ctrl:
-            targets = context.snapper.targets(context.sketch, self._selection.owners)
-            if targets is not None:
-                snap = snapped(to, targets, context.snapping(event.reach))
-                to, self.guides = snap.point, snap.guides
+        to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
+        to = self.snapped_to(context, event, to, self._selection)
         low_x, low_y, high_x, high_y = self._bounds
         about = ((low_x + high_x) / 2, (low_y + high_y) / 2) if event.alt else self._edge(-1)
         taken = self._edge(1)
         fx, fy = (
             (to[k] - about[k]) / (taken[k] - about[k])
-            if self._side[k] and abs(taken[k] - about[k]) > 1e-9
+            if self._side[k] and abs(taken[k] - about[k]) > SAME
             else 1.0
             for k in (0, 1)
         )
@@ -297,8 +302,7 @@ class Scaling(Drag):
         if factor <= 0.0:
             raise MapError(f"“{text}”: a size above 0 was wanted")
         both = self._even or (self._side[0] and self._side[1])
-        fx = factor if both or axis == 0 else 1.0
-        fy = factor if both or axis == 1 else 1.0
+        fx, fy = (factor if both or axis == k else 1.0 for k in (0, 1))
         self._scale(context, fx, fy, self._edge(-1))
 
 
@@ -312,16 +316,13 @@ class Box(Drag):
         self._adds = adds
 
     def to(self, context: ToolContext, event: PointerEvent) -> None:
-        """Follow the mouse."""
         self._at = event.raw
 
     def found(self, context: ToolContext) -> Selection:
         """Return what is in the box: whole things, or vertices where it holds some that are shown."""
-        sketch = context.sketch
-        shown = context.handled
-        inside = in_box(sketch, self._begun, self._at, touched=self._leftwards)
-        whole = Selection(inside.items - set(shown), frozenset(), inside.starts - set(shown), False)
-        if shown and not self._adds and not whole:
+        sketch, shown = context.sketch, context.handled
+        inside = in_box(sketch, self._begun, self._at, touched=self._leftwards).with_groups(sketch)
+        if shown and not self._adds and not (inside.items | inside.starts) - set(shown):
             single = vertices_in_box(sketch, self._begun, self._at, shown)
             if single.vertices and len(single.vertices) < sum(len(points_of(sketch, each)) for each in shown):
                 return single
@@ -332,31 +333,14 @@ class Box(Drag):
         return self._at[0] < self._begun[0]
 
     def ended(self, context: ToolContext) -> None:
-        """Select."""
         if distance(self._begun, self._at) > 0.0:
             context.select(self._before.plus(self.found(context)))
 
     def preview(self) -> Preview:
-        """Show the box."""
         return Preview(box=(self._begun, self._at), touched=self._leftwards)
 
 
-NEAR = 0.6
-"""Part of a finger's width within which something is taken hold of."""
-
-ON_EDGE = 1e-5
-"""Metres within which a point lies on an edge."""
-
-_CURSORS = {
-    **dict.fromkeys(((-1, 0), (1, 0)), "sideways"),
-    **dict.fromkeys(((0, -1), (0, 1)), "updown"),
-    **dict.fromkeys(((-1, -1), (1, 1)), "rising"),
-    **dict.fromkeys(((-1, 1), (1, -1)), "falling"),
-}
-"""What the cursor looks like over handles that scale, by their sides."""
-
-
-class Select(Tool):
+class SelectTool(Tool):
     """Selects, and drags what is selected: whole, by its vertices, or by the box around it."""
 
     name = "select"
@@ -368,38 +352,34 @@ class Select(Tool):
         super().__init__()
         self.hovered: Owner | None = None
         self.near: Handle | None = None
-        self._drag: Drag | None = None
+        self.drag: Drag | None = None
         self._pressed: PointerEvent | None = None
-        self._grip: Handle | None = None
+        self._handle: Handle | None = None
         self._narrows = False
         self._gone = False
 
     @property
     def busy(self) -> bool:
-        """Whether something is being dragged."""
-        return self._drag is not None
-
-    @property
-    def drag(self) -> Drag | None:
-        """What is being dragged."""
-        return self._drag
+        return self.drag is not None
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         """Take hold of a handle, or of what is there; else begin a box."""
-        self._pressed, self._drag, self._narrows, self._gone = event, None, False, False
-        self._grip = handle_at(context.handles, event.raw, NEAR * event.reach)
-        if self._grip is not None:
-            self._take(context, self._grip, event)
+        self._pressed, self.drag, self._narrows, self._gone = event, None, False, False
+        self._handle = handle_at(context.handles, event.raw, NEAR * event.reach)
+        if self._handle is not None:
+            self._take(context, self._handle, event)
             return
         found = owners_at(context.sketch, event.raw, 0.5 * event.reach)
         if not found:
             return
         # what is selected already is meant, also where something else lies above it
         there = next((each for each in found if each in context.selection.owners), None)
+        taken = Selection.of(there if there is not None and not event.shift else found[0])
+        taken = taken.with_groups(context.sketch)
         if event.shift:
-            context.select(context.selection.without_vertices().toggled(Selection.of(found[0])))
+            context.select(context.selection.without_vertices().toggled(taken))
         elif there is None or context.selection.vertices:
-            context.select(Selection.of(there if there is not None else found[0]))
+            context.select(taken)
         else:
             self._narrows = True
 
@@ -416,53 +396,47 @@ class Select(Tool):
     def move(self, context: ToolContext, event: PointerEvent) -> None:
         """Drag; or show what a press would take."""
         if self._pressed is None:
-            self._hover(context, event)
+            self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
+            found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
+            self.hovered = found[0] if found else None
             return
         if self._gone:
             return
-        if self._drag is None and distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
-            self._drag = self._begun(context, self._pressed)
-        if self._drag is not None:
-            self._drag.to(context, event)
-            self.guides = self._drag.guides
+        if self.drag is None and distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
+            self.drag = self._begun(context, self._pressed)
+        if self.drag is not None:
+            self.drag.to(context, event)
+            self.guides = self.drag.guides
 
     def _begun(self, context: ToolContext, pressed: PointerEvent) -> Drag:
         """Return the drag that the press has begun."""
-        handle = self._grip
+        handle, whole = self._handle, context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
             return MovingVertices(context, handle.vertex, context.selection)
         if handle is not None and handle.kind == "turn":
-            return Turning(context, context.selection.without_vertices(), pressed.raw)
+            return Turning(context, whole, pressed.raw)
         if handle is not None:
-            return Scaling(context, context.selection.without_vertices(), handle)
+            return Scaling(context, whole, handle)
         found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
-        if any(each in context.selection.owners for each in found):
-            return Moving(context, context.selection.without_vertices(), pressed.raw)
+        if any(each in whole.owners for each in found):
+            return Moving(context, whole, pressed.raw)
         return Box(context, pressed.raw, adds=pressed.shift)
-
-    def _hover(self, context: ToolContext, event: PointerEvent) -> None:
-        self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
-        found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
-        self.hovered = found[0] if found else None
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Do what was dragged; a click selects what it is on, and again what lies below."""
-        pressed, drag, gone = self._pressed, self._drag, self._gone
-        self._pressed = self._drag = None
-        self.guides = ()
+        pressed, drag, gone = self._pressed, self.drag, self._gone
+        self._pressed, self.drag, self.guides = None, None, ()
         if gone or pressed is None:
             return
         if drag is not None:
             drag.to(context, event)
             drag.ended(context)
-            return
-        if self._grip is not None or event.shift:
-            return
-        found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
-        if not found:
-            context.select(Selection())
-        elif self._narrows:
-            self._narrow(context, found)
+        elif self._handle is None and not event.shift:
+            found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
+            if not found:
+                context.select(Selection())
+            elif self._narrows:
+                self._narrow(context, found)
 
     def _narrow(self, context: ToolContext, found: tuple[Owner, ...]) -> None:
         """Select only one of what is selected; of one, what lies below it."""
@@ -480,7 +454,7 @@ class Select(Tool):
         if edge is None or handle_at(context.handles, event.raw, NEAR * event.reach) is not None:
             self.press(context, event)
             return
-        self._pressed, self._drag, self._gone = event, None, True
+        self._pressed, self.drag, self._gone = event, None, True
         if not event.ctrl:
             # on the edge, but at a round place
             to = context.snapped(edge.point, event.reach).point
@@ -489,35 +463,30 @@ class Select(Tool):
 
     def enter(self, context: ToolContext, text: str) -> None:
         """End the drag with what was typed."""
-        drag = self._drag
+        drag = self.drag
         if drag is None:
             super().enter(context, text)
             return
         drag.enter(context, text)
-        self._drag, self._gone, self.guides = None, True, ()
+        self.drag, self._gone, self.guides = None, True, ()
         drag.ended(context)
 
     def cancel(self, context: ToolContext) -> bool:
         """Give up what is dragged; then select nothing."""
-        if self._drag is not None:
-            self._drag, self._gone, self.guides = None, True, ()
-            return True
-        if context.selection.vertices:
+        had = bool(self.drag or context.selection)
+        if self.drag is not None:
+            self.drag, self._gone, self.guides = None, True, ()
+        elif had:
             context.select(Selection.of(*{vertex.of for vertex in context.selection.vertices}))
-            return True
-        if context.selection:
-            context.select(Selection())
-            return True
-        return False
+        return had
 
     def preview(self, context: ToolContext) -> Preview | None:
-        """Show the box, or words."""
-        return self._drag.preview() if self._drag is not None else None
+        return self.drag.preview() if self.drag is not None else None
 
     def shape_of_cursor(self, context: ToolContext) -> str:
         """Tell by the cursor what a press would do."""
-        handle = self._grip if self._drag is not None else self.near
-        if isinstance(self._drag, Moving):
+        handle = self._handle if self.drag is not None else self.near
+        if isinstance(self.drag, Moving):
             return "move"
         if handle is not None:
             return _CURSORS.get(handle.side, "hand")
@@ -526,8 +495,8 @@ class Select(Tool):
         return "arrow"
 
 
-class Pan(Tool):
-    """Moves the sheet; the window does it, since cameras are its own."""
+class PanTool(Tool):
+    """Moves the view; the window does it, since cameras are its own."""
 
     name = "pan"
     title = "Pan"
@@ -536,5 +505,4 @@ class Pan(Tool):
     takes_numbers = False
 
     def shape_of_cursor(self, context: ToolContext) -> str:
-        """Show that the sheet moves."""
         return "move"

@@ -1,25 +1,21 @@
-"""What a tool of the editor is: what the mouse does on the sheet. Coordinates are metres; no pygame."""
+"""The base of the editor's tools: what the mouse does on the map. Coordinates are metres."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Owner, Sketch
 from robocov_app.editor.tools.handles import Handle
 from robocov_app.editor.tools.snap_targets import Snapper
-from robocov_app.editor.tools.snapping import Snap, Snapping
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from robocov.environment import Obstacle, Point, Ring, StartSpec
-    from robocov_app.editor.tools.snapping import Guide
+from robocov_app.editor.tools.snapping import Guide, Snap, Snapping
 
 ANGLE = 15.0
 """Degrees: with Shift, lines are drawn at multiples of this."""
@@ -32,9 +28,8 @@ class PointerEvent:
     Attributes
     ----------
     point : (x, y), m
-        Where it means, after snapping.
+        After snapping.
     raw : (x, y), m
-        Where it is.
     reach : float, m
         So many metres a finger is wide.
     shift, alt, ctrl : bool
@@ -102,37 +97,28 @@ class ToolContext(Protocol):
     wall_width: float
 
     @property
-    def sketch(self) -> Sketch:
-        """The map as it is now."""
+    def sketch(self) -> Sketch: ...
 
     @property
-    def selection(self) -> Selection:
-        """What is selected."""
+    def selection(self) -> Selection: ...
 
     @property
-    def handles(self) -> tuple[Handle, ...]:
-        """What of the selection can be dragged."""
+    def handles(self) -> tuple[Handle, ...]: ...
 
     @property
-    def handled(self) -> tuple[Owner, ...]:
-        """Whose vertices are shown."""
+    def handled(self) -> tuple[Owner, ...]: ...
 
-    def snapping(self, reach: float) -> Snapping:
-        """Return what to snap to within `reach` metres."""
+    def snapping(self, reach: float) -> Snapping: ...
 
     def snapped(
         self, raw: Point, reach: float, origin: Point | None = None, more: tuple[Point, ...] = ()
-    ) -> Snap:
-        """Return the snapped place of a point."""
+    ) -> Snap: ...
 
-    def change(self, change: Change) -> None:
-        """Make a change."""
+    def change(self, change: Change) -> None: ...
 
-    def select(self, selection: Selection) -> None:
-        """Select something else."""
+    def select(self, selection: Selection) -> None: ...
 
-    def say(self, words: str) -> None:
-        """Show a message."""
+    def say(self, words: str) -> None: ...
 
 
 class Tool:
@@ -146,6 +132,8 @@ class Tool:
         Whether the point that it gets has snapped to something.
     takes_numbers : bool
         Whether numbers can be typed while it is `busy`.
+    begins_typed : bool
+        Whether they can be typed before, too.
     """
 
     name = ""
@@ -153,6 +141,7 @@ class Tool:
     hint = ""
     snaps = True
     takes_numbers = True
+    begins_typed = False
 
     def __init__(self) -> None:
         self.guides: tuple[Guide, ...] = ()
@@ -186,19 +175,19 @@ class Tool:
         """Take the button's release; `clicked` if it has not moved since it was pressed."""
 
     def finish(self, context: ToolContext) -> bool:
-        """Take Enter; say whether there was something to finish."""
+        """Take Enter; return whether there was something to finish."""
         return False
 
     def back(self, context: ToolContext) -> bool:
-        """Take Backspace: the last point goes; say whether there was one."""
+        """Take Backspace: the last point goes; return whether there was one."""
         return False
 
     def cancel(self, context: ToolContext) -> bool:
-        """Take Escape; say whether there was something to give up."""
+        """Take Escape; return whether there was something to give up."""
         return False
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Take what was typed."""
+        """Take what was typed; MapError when it means nothing."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self, context: ToolContext) -> Preview | None:
@@ -206,7 +195,7 @@ class Tool:
         return None
 
     def shape_of_cursor(self, context: ToolContext) -> str:
-        """Return what the cursor looks like over the sheet: arrow, cross, hand, move, ..."""
+        """Return what the cursor looks like over the map: arrow, cross, hand, move, ..."""
         return "cross"
 
 
@@ -222,6 +211,23 @@ def at_round_angle(origin: Point, point: Point) -> Point:
     along = dx * np.cos(angle) + dy * np.sin(angle)
     x, y = origin[0] + along * np.cos(angle), origin[1] + along * np.sin(angle)
     return round(float(x), 9) + 0.0, round(float(y), 9) + 0.0
+
+
+def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
+    """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
+    if event.shift and origin is not None:
+        return at_round_angle(origin, event.raw)
+    return event.point
+
+
+def ring_area(points: Sequence[Point]) -> float:
+    """Return the area of a ring, m².
+
+    >>> ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
+    2.0
+    """
+    x, y = np.asarray(points).T
+    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
 
 
 def bearing_words(a: Point, b: Point) -> str:
@@ -254,21 +260,3 @@ def place_words(point: Point) -> str:
     """
     x, y = (round(value, 2) + 0.0 for value in point)
     return f"({x:.2f}, {y:.2f}) m"
-
-
-def ring_area(points: Sequence[Point]) -> float:
-    """Return the area of a ring, m².
-
-    >>> ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
-    2.0
-    """
-    ring = np.asarray(points)
-    x, y = ring.T
-    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
-
-
-def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
-    """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
-    if event.shift and origin is not None:
-        return at_round_angle(origin, event.raw)
-    return event.point

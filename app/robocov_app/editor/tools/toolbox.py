@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from robocov_app.editor.tools.density import DensityTool
-from robocov_app.editor.tools.draw import Boundary, Circle, Disc, Measure, Places, Polygon, Rectangle, Wall
+from robocov_app.editor.tools.draw import (
+    BoundaryTool,
+    CircleTool,
+    DiscTool,
+    DoorTool,
+    MeasureTool,
+    PlacesTool,
+    PolygonTool,
+    RectangleTool,
+    WallTool,
+)
 from robocov_app.editor.tools.motion_path import MotionPathTool
 from robocov_app.editor.tools.reference_image import ReferenceImageTool
-from robocov_app.editor.tools.select import Pan, Select
+from robocov_app.editor.tools.select import PanTool, SelectTool
+from robocov_app.editor.tools.tool import Tool
 
-if TYPE_CHECKING:
-    from robocov_app.editor.tools.tool import Tool
+TOOLS: tuple[type[Tool], ...] = (
+    *(SelectTool, PanTool, PolygonTool, RectangleTool, CircleTool, WallTool, DoorTool, BoundaryTool),
+    *(MeasureTool, DiscTool, PlacesTool, DensityTool, MotionPathTool, ReferenceImageTool),
+)
 
 
 def toolbox() -> dict[str, Tool]:
     """Return one of each tool by name."""
-    tools: list[Tool] = [
-        Select(),
-        Pan(),
-        Polygon(),
-        Rectangle(),
-        Circle(),
-        Wall(),
-        Boundary(),
-        Measure(),
-        Disc(),
-        Places(),
-        DensityTool(),
-        MotionPathTool(),
-        ReferenceImageTool(),
-    ]
-    return {tool.name: tool for tool in tools}
+    return {kind.name: kind() for kind in TOOLS}

@@ -15,6 +15,7 @@ _TOOL_KEYS = {
     "rectangle": "r",
     "circle": "c",
     "wall": "w",
+    "door": "k",
     "boundary": "b",
     "disc": "s",
     "places": "shift+s",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.model.selection import Change
     from robocov_app.editor.model.sketch import Owner, Sketch
     from robocov_app.editor.model.validation import Problem
-    from robocov_app.editor.tools.select import Select
+    from robocov_app.editor.tools.select import SelectTool
     from robocov_app.editor.tools.tool import Tool
     from robocov_app.editor.ui.asking import ListQuestion, Question
     from robocov_app.editor.ui.importing import ImportQuestion
@@ -132,7 +132,7 @@ class Desk:
         return self.document.history.selection
 
     @property
-    def selector(self) -> Select:
+    def selector(self) -> SelectTool:
         """The tool that selects."""
         return self.tools["select"]  # type: ignore[return-value]
 
@@ -311,7 +311,8 @@ class Desk:
     @property
     def takes_numbers(self) -> bool:
         """Whether digits are for the tool."""
-        return self.tool.takes_numbers and (self.tool.busy or bool(self.typed))
+        tool = self.tool
+        return tool.takes_numbers and (tool.busy or tool.begins_typed or bool(self.typed))
 
     def enter(self) -> None:
         """Give the tool what was typed."""

@@ -66,7 +66,7 @@ class Keyboard(DemoKeyboard):
                 desk.typed += " "
                 return True
         sign = event.unicode
-        begins = sign in _OF_NUMBERS and sign not in "x×*/ ;%"
+        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if desk.tool.busy else "x×*/ ;%,-+@<°")
         follows = bool(desk.typed) and (sign in _OF_NUMBERS or sign in _GOES_ON)
         if len(sign) == 1 and (begins or follows):
             desk.typed = (desk.typed + sign)[:40]

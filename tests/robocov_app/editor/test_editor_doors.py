@@ -1,0 +1,57 @@
+"""Doors: openings in walls, which stay walls."""
+
+import pytest
+
+from robocov.environment import CircleObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov_app.editor.edits import doors
+from robocov_app.editor.model.sketch import Item, Sketch
+
+CORNER = WallObstacle(((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), 0.2, "west")
+
+
+@pytest.fixture
+def sketch() -> Sketch:
+    return Sketch(obstacles=(Item(3, CORNER, "oak", "outer"), Item(5, CircleObstacle((8.0, 8.0), 1.0))))
+
+
+def test_the_pieces_keep_name_note_and_group(sketch):
+    change = doors.door_opened(sketch, 3, (1.0, 0.3), 0.8)
+    first, second, _ = change.sketch.obstacles
+    assert first.shape.points == ((0.0, 0.0), (0.6, 0.0))
+    assert second.shape.points == ((1.4, 0.0), (4.0, 0.0), (4.0, 3.0))
+    for item in (first, second):
+        assert (item.shape.name, item.shape.width, item.note, item.group) == ("west", 0.2, "oak", "outer")
+    assert change.words == "door of 0.8 m opened in wall “west”"
+    assert change.selection.items == {3, second.key}
+
+
+def test_a_door_goes_round_a_corner_and_to_an_end(sketch):
+    round_it = doors.wall_opened(sketch, 3, (3.5, 0.1), (4.0, 0.5)).sketch
+    assert [i.shape.points for i in round_it.obstacles[:2]] == [
+        ((0.0, 0.0), (3.5, 0.0)),
+        ((4.0, 0.5), (4.0, 3.0)),
+    ]
+    at_end = doors.door_opened(sketch, 3, (-1.0, 0.0), 1.0).sketch
+    assert [i.shape.points for i in at_end.obstacles[:-1]] == [((1.0, 0.0), (4.0, 0.0), (4.0, 3.0))]
+
+
+def test_which_wall_is_meant(sketch):
+    assert doors.wall_at(sketch, (2.0, 0.05), 0.1) == 3
+    assert doors.wall_at(sketch, (8.0, 8.0), 0.1) is None
+    a, b = doors.door_at(sketch, 3, (0.1, 0.0), 1.0)
+    assert (a, b) == ((0.0, 0.0), (1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("deed", "words"),
+    [
+        (lambda s: doors.door_opened(s, 3, (1.0, 0.0), 0.001), "at least 2 cm"),
+        (lambda s: doors.door_opened(s, 3, (1.0, 0.0), 7.0), "not longer than a door"),
+        (lambda s: doors.wall_opened(s, 3, (0.0, 0.0), (4.0, 3.0)), "nothing would be left"),
+        (lambda s: doors.wall_opened(s, 5, (0.0, 0.0), (4.0, 3.0)), "opened in walls"),
+    ],
+)
+def test_what_cannot_be(sketch, deed, words):
+    with pytest.raises(MapError, match=words):
+        deed(sketch)
