@@ -47,13 +47,11 @@ from typing import TYPE_CHECKING, Any
 from robocov.extras import extra
 
 if TYPE_CHECKING:
-    from robocov_app.learning.expert import ControllerPolicy
     from robocov_app.learning.gym import CoverageEnv, CoverageVectorEnv
     from robocov_app.learning.layout import ObservationLayout
     from robocov_app.learning.parallel import CoverageParallelEnv
-    from robocov_app.learning.policy import PolicyController
-    from robocov_app.learning.scenarios import GeneratedMaps
-    from robocov_app.learning.task import CoverageTask
+    from robocov_app.learning.policy import ControllerPolicy, PolicyController
+    from robocov_app.learning.task import CoverageTask, GeneratedMaps
 
 __all__ = [
     "ControllerPolicy",
@@ -68,12 +66,12 @@ __all__ = [
 
 _HOME: dict[str, tuple[str, tuple[str, ...]]] = {
     # name: its module, and the packages of the extra that it needs
-    "ControllerPolicy": ("expert", ()),
+    "ControllerPolicy": ("policy", ()),
     "CoverageEnv": ("gym", ("gymnasium",)),
     "CoverageParallelEnv": ("parallel", ("gymnasium", "pettingzoo")),
     "CoverageTask": ("task", ()),
     "CoverageVectorEnv": ("gym", ("gymnasium",)),
-    "GeneratedMaps": ("scenarios", ()),
+    "GeneratedMaps": ("task", ()),
     "ObservationLayout": ("layout", ()),
     "PolicyController": ("policy", ()),
 }

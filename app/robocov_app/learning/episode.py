@@ -19,15 +19,17 @@ from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.learning.driving import driving_forces
 from robocov_app.learning.layout import Rows
-from robocov_app.learning.rewards import reference_distance, shares
-from robocov_app.learning.scenarios import Scenarios, map_of
-from robocov_app.learning.task import CoverageTask
+from robocov_app.learning.task import (
+    SEEDS,
+    CoverageTask,
+    Scenarios,
+    driving_forces,
+    map_of,
+    reference_distance,
+    shares,
+)
 from robocov_app.runs.spec import RunSpec
-
-_SEEDS = 2**31
-"""Starts are drawn with seeds below this."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +85,13 @@ def drawn_episode(
     options = options or {}
     environment = scenarios.draw(rng)
     if "map" in options:
-        environment = map_of(options["map"], int(rng.integers(_SEEDS)))
+        environment = map_of(options["map"], int(rng.integers(SEEDS)))
     name = options.get("start", task.start)
     starts = list(environment.starts) or ["uniform"]
-    any_start, seed = starts[int(rng.integers(len(starts)))], int(rng.integers(_SEEDS))
+    any_start, seed = starts[int(rng.integers(len(starts)))], int(rng.integers(SEEDS))
     start = environment.start(any_start if name == "*" else name)
     seed = options.get("start_seed", seed)
-    conditions, chance = task.conditions, int(rng.integers(_SEEDS))
+    conditions, chance = task.conditions, int(rng.integers(SEEDS))
     if conditions is not None:
         conditions = replace(conditions, seed=options.get("conditions_seed", chance))
     cost = scenarios.cost(environment)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array
 from robocov.errors import RobocovError
-from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import (
     Episode,
     Outcome,
@@ -28,8 +27,7 @@ from robocov_app.learning.episode import (
 )
 from robocov_app.learning.layout import Rows
 from robocov_app.learning.pictures import METADATA, Pictures
-from robocov_app.learning.scenarios import Scenarios
-from robocov_app.learning.task import CoverageTask, changed_task
+from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
 from robocov_app.runs.recording import Frame
 
 ID = "robocov/Coverage-v0"

@@ -12,12 +12,10 @@ from pettingzoo import ParallelEnv
 
 from robocov.arrays import Array
 from robocov.errors import ParameterError, RobocovError, shown
-from robocov_app.learning.driving import action_limit
 from robocov_app.learning.episode import Episode, drawn_episode
 from robocov_app.learning.layout import Rows
 from robocov_app.learning.pictures import METADATA, Pictures
-from robocov_app.learning.scenarios import Scenarios
-from robocov_app.learning.task import CoverageTask, changed_task
+from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
 from robocov_app.runs.recording import Frame
 
 

@@ -1,21 +1,236 @@
-"""The task that is to be learned: on which maps, by which team, for how long, for what reward."""
+"""The task that is to be learned: maps, team, time, actions and reward."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.conditions import Conditions
+from robocov.cost import CoverageCost, CoverageResult
+from robocov.environment import Environment
 from robocov.errors import ParameterError, checked, counted, shown, unknown_name
+from robocov.mapfile import load_map
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
-from robocov_app.learning.driving import FOLLOWING, Action, checked_action
 from robocov_app.learning.layout import ObservationLayout
-from robocov_app.learning.rewards import Reward, checked_reward
-from robocov_app.learning.scenarios import MapSource
+
+Action: TypeAlias = Literal["force", "velocity"]
+"""A force in N, or a velocity in m/s."""
+
+ACTIONS: tuple[Action, ...] = ("force", "velocity")
+
+FOLLOWING = 0.1
+"""Time constant in seconds with which a robot follows a velocity that it is told."""
+
+
+def checked_action(action: str) -> Action:
+    """Return the kind of action that is meant; raises ParameterError when there is none of that name."""
+    for known in ACTIONS:
+        if action == known:
+            return known
+    raise ParameterError(f"action: {unknown_name('kind of action', str(action), ACTIONS)}")
+
+
+def action_limit(action: Action, team: Team) -> Array:
+    """Return the largest component of an action that makes sense, (n,) N or m/s.
+
+    A force of m a + nu v is what it takes to go at the largest speed v and be accelerated by the largest
+    acceleration a all the same; what is more has no effect. Larger actions are no mistake: the world limits
+    speed and acceleration, for learners as for all controllers.
+
+    >>> from robocov.robots import Team
+    >>> action_limit("force", Team.homogeneous(2))
+    array([4., 4.])
+    """
+    if action == "velocity":
+        return team.max_speed
+    return np.asarray(team.mass * team.max_acceleration + team.viscosity * team.max_speed)
+
+
+def driving_forces(action: Action, values: Array, velocities: Array, team: Team) -> Array:
+    """Return the forces of actions, (n, 2) N.
+
+    A velocity u of `values`, (n, 2), asks for ``F = nu u + m (u - q') / FOLLOWING``, where q' are the
+    `velocities` now, (n, 2) m/s: against the viscosity of (28), and towards u.
+    """
+    if action == "force":
+        return values
+    nu, stiffness = team.viscosity[:, None], team.mass[:, None] / FOLLOWING
+    return np.asarray(nu * values + stiffness * (values - velocities))
+
+
+def actions_of(action: Action, forces: Array, velocities: Array, team: Team) -> Array:
+    """Return the actions that give forces now: the other way of `driving_forces`, (n, 2) N or m/s."""
+    if action == "force":
+        return forces
+    nu, stiffness = team.viscosity[:, None], team.mass[:, None] / FOLLOWING
+    return np.asarray((forces + stiffness * velocities) / (nu + stiffness))
+
+
+Reward: TypeAlias = Literal["shared", "own", "level"]
+"""Who is rewarded for what; see `shares`."""
+
+REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
+
+
+def checked_reward(reward: str) -> Reward:
+    """Return the kind of reward that is meant; raises ParameterError when there is none of that name."""
+    for known in REWARDS:
+        if reward == known:
+            return known
+    raise ParameterError(f"reward: {unknown_name('kind of reward', str(reward), REWARDS)}")
+
+
+def reference_distance(area: float, robots: int) -> float:
+    """Return a mean distance in metres that no placement of so many robots in so much area goes below.
+
+    The mean distance to the middle of a disc, 2/3 of its radius, is the least among all shapes of its
+    area; with n equal parts of the area A it is ``2/3 sqrt(A / (pi n))``. It makes costs of maps and teams of
+    different sizes comparable.
+
+    >>> round(reference_distance(100.0, 6), 3)
+    1.536
+    """
+    return 2.0 / 3.0 * float(np.sqrt(area / (np.pi * robots)))
+
+
+def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: float) -> Array:
+    """Return what each robot gets for what became of the mean distance, (n,) m.
+
+    ``shared``: its decrease, the same for all; summed over a run it is the whole decrease. ``own``: the part
+    of the decrease that the robot's own move made, by the gradients of the cost before and after (the
+    trapezoidal rule); what these leave over is divided equally, so that all parts sum up to the decrease.
+    ``level``: less the mean distance itself, times the `part` of the run that has gone by in between.
+    """
+    n = len(after.positions)
+    if reward == "level":
+        return np.full(n, -after.mean_distance * part)
+    decrease = before.mean_distance - after.mean_distance
+    if reward == "shared":
+        return np.full(n, decrease)
+    moved = after.positions - before.positions
+    slope = _slope(before) + _slope(after)
+    own = -0.5 * (slope * moved).sum(axis=1)
+    return np.asarray(own + (decrease - own.sum()) / n)
+
+
+def _slope(result: CoverageResult) -> Array:
+    """Return the derivative of the mean distance by every robot's position, (n, 2)."""
+    if not result.value:
+        return np.zeros_like(result.positions)
+    return result.gradient * (result.mean_distance / result.value)
+
+
+MapSource: TypeAlias = "str | Path | Environment | Callable[[int], Environment]"
+"""A map, its name or path, or what makes one of a seed."""
+
+SEEDS = 2**31
+"""A maker of maps is given a seed below this."""
+
+_KEPT = 64
+"""Maps with their costs that are kept at most."""
+
+
+@dataclass(frozen=True)
+class GeneratedMaps:
+    """Makes a map of a seed by `robocov.generated_map`, to learn on many.
+
+    The `seeds` are the maps that there are, as in ``range(1000)``; others can then be kept for the test.
+    None: any. The `parameters` are further ones of `robocov.generated_map`: ``obstacles``, ``area``, ``gap``,
+    ...
+
+    Examples
+    --------
+    >>> GeneratedMaps("rooms", seeds=range(100))(742).name
+    'rooms 42'
+    """
+
+    kind: str = "polygons"
+    seeds: Sequence[int] | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.seeds is not None and not len(self.seeds):
+            raise ParameterError("maps: seeds: none, but at least one was wanted")
+
+    def __call__(self, seed: int) -> Environment:
+        """Return the map of a seed, or where `seeds` are given that of ``seeds[seed % len(seeds)]``.
+
+        Raises ParameterError as `robocov.generated_map`.
+        """
+        from robocov.generator import generated_map
+
+        number = seed if self.seeds is None else self.seeds[seed % len(self.seeds)]
+        return generated_map(number, kind=self.kind, **self.parameters)
+
+
+class Scenarios:
+    """Draws maps, and keeps the coverage costs of some, on lattices of so many cells a side.
+
+    Raises InputError when a map cannot be read, or something is no map at all.
+    """
+
+    def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
+        several = isinstance(maps, Sequence) and not isinstance(maps, str)
+        given: Sequence[Any] = maps if several else (maps,)  # type: ignore[assignment]
+        if not given:
+            raise ParameterError("maps: none, but at least one was wanted")
+        self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
+        self._lattice = lattice
+        self._costs: OrderedDict[Environment, CoverageCost] = OrderedDict()
+
+    @property
+    def only(self) -> Environment | None:
+        """The map, where there is but one."""
+        source = self._sources[0]
+        return source if len(self._sources) == 1 and isinstance(source, Environment) else None
+
+    def draw(self, rng: np.random.Generator) -> Environment:
+        """Return one of the maps, each as likely, or a new one of its maker."""
+        source = self._sources[int(rng.integers(len(self._sources)))]
+        return map_of(source, int(rng.integers(SEEDS)))
+
+    def cost(self, environment: Environment) -> CoverageCost:
+        """Return the coverage cost of a map."""
+        cost = self._costs.get(environment)
+        if cost is None:
+            cost = CoverageCost(environment, self._lattice)
+            self._costs[environment] = cost
+            if len(self._costs) > _KEPT:
+                self._costs.popitem(last=False)
+        self._costs.move_to_end(environment)
+        return cost
+
+
+def map_of(given: object, seed: int) -> Environment:
+    """Return a map: itself, that of a name or path, or what somebody's function makes of the seed.
+
+    Raises InputError when there is none, or a function gives something else.
+    """
+    source = _source(given, "map")
+    if isinstance(source, Environment):
+        return source
+    environment = source(seed)
+    if not isinstance(environment, Environment):
+        raise ParameterError(f"maps: for seed {seed} {shown(environment)}, but an Environment was wanted")
+    return environment
+
+
+def _source(given: object, where: str) -> Environment | Callable[[int], Environment]:
+    if isinstance(given, (str, Path)):
+        return load_map(given)
+    if isinstance(given, Environment) or callable(given):
+        return given
+    raise ParameterError(
+        f"{where}: {shown(given)}, but a map, its name or path, or a function from a seed to one was wanted"
+    )
+
 
 MOST_ROBOTS = 10_000
 
@@ -41,9 +256,9 @@ class CoverageTask:
     repeat : int
         So many control periods long an action is held: 6 of 1/60 s are 10 decisions a second.
     action : {"force", "velocity"}
-        See `robocov_app.learning.driving`.
+        See `robocov_app.learning.task`.
     reward : {"shared", "own", "level"}
-        See `robocov_app.learning.rewards.shares`; in units of `reference_distance`, with all robots and the
+        See `robocov_app.learning.task.shares`; in units of `reference_distance`, with all robots and the
         whole area that they can come to.
     contact_penalty : float
         What a second in contact with a wall or another robot costs a robot.

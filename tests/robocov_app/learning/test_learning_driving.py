@@ -7,7 +7,8 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.learning.driving import (
+from robocov_app.learning.episode import Learner
+from robocov_app.learning.task import (
     ACTIONS,
     FOLLOWING,
     action_limit,
@@ -15,7 +16,6 @@ from robocov_app.learning.driving import (
     checked_action,
     driving_forces,
 )
-from robocov_app.learning.episode import Learner
 
 TEAM = Team.homogeneous(2, mass=2.0, viscosity=3.0, max_speed=0.5, max_acceleration=4.0)
 

@@ -15,8 +15,7 @@ from robocov.metrics import clearances, contacts
 from robocov.simulation import Simulation
 from robocov_app.learning import CoverageTask, ObservationLayout
 from robocov_app.learning.episode import Episode, drawn_episode
-from robocov_app.learning.rewards import reference_distance
-from robocov_app.learning.scenarios import Scenarios
+from robocov_app.learning.task import Scenarios, reference_distance
 from robocov_app.runs.spec import RunSpec
 
 STARTS = np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]])

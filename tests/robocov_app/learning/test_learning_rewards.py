@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.learning.rewards import checked_reward, reference_distance, shares
+from robocov_app.learning.task import checked_reward, reference_distance, shares
 
 STEPS = st.integers(0, 2**32)
 

@@ -9,7 +9,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import load_map, save_map
 from robocov_app.learning import GeneratedMaps
-from robocov_app.learning.scenarios import Scenarios
+from robocov_app.learning.task import Scenarios
 
 
 def drawn(scenarios: Scenarios, seed: int, count: int) -> list[str]:
