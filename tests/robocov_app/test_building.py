@@ -21,7 +21,7 @@ def test_it_is_the_cost(capsys):
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_what_takes_long_is_told(monkeypatch, capsys, quiet):
-    monkeypatch.setattr(building, "PATIENCE", -1.0)
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", -1.0)
     built_cost(ROOMS, 48, quiet=quiet)
     said = capsys.readouterr().err
     assert ("map of ways: 100 of 100 in" in said) == (not quiet)
@@ -29,7 +29,7 @@ def test_what_takes_long_is_told(monkeypatch, capsys, quiet):
 
 
 def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
-    monkeypatch.setattr(building, "PATIENCE", -1.0)
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", -1.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     built_cost(ROOMS, 48)
     assert "100/100" in capsys.readouterr().err

@@ -88,31 +88,27 @@ def command(options: Arguments) -> int:
 
 def print_table(runs: dict[str, Run]) -> None:
     """Print the comparison for people."""
-    from rich.table import Table
-
     from robocov_app.render.density_summary import weighed_lines
     from robocov_app.runs.compare import rows_of
-    from robocov_app.terminal.tables import console
+    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", style="bold", no_wrap=True)
     timed = all(run.history.mean_time is not None for run in runs.values())
     titles = ["mean distance", *(["mean time"] if timed else []), "above best"]
-    for title in (*titles, "cost", "settled", "contacts", "clearance", "path"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in rows_of(runs):
-        settled = row["settled_at_s"]
-        table.add_row(
+    titles += ["cost", "settled", "contacts", "clearance", "path"]
+    rows = (
+        (
             row["label"],
             f"{row['mean_distance_m']:.3f} m",
             *([f"{row['mean_time_s']:.3f} s"] if timed else []),
             f"{row['above_best']:.1%}",
             f"{row['cost_m3']:.2f} m³",
-            "not yet" if settled is None else f"{settled:.1f} s",
+            "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s",
             str(row["contacts"]),
             f"{row['min_clearance_m']:.3f} m",
             f"{row['mean_path_length_m']:.2f} m",
         )
-    console().print(table)
+        for row in rows_of(runs)
+    )
+    print_table([("", BOLD), *((title, RIGHT) for title in titles)], rows)
     for line in weighed_lines(next(iter(runs.values())).record.environment):
         print(line)

@@ -83,19 +83,12 @@ def measure(saved: Saved, options: Arguments) -> Measured:
     from robocov.metrics.run_metrics import run_metrics
     from robocov.record import nearest_moments
     from robocov_app.figures.metrics import Measured
-    from robocov_app.terminal.progress import progress
+    from robocov_app.terminal.progress import counting, progress
 
     record = saved.record
     total = len(nearest_moments(record.time, options.rate))
     with progress(f"measuring {record.label}", total, quiet=options.json) as update:
-        done = 0
-
-        def count() -> None:
-            nonlocal done
-            done += 1
-            update(done)
-
-        return Measured(record.label, record.controller, run_metrics(record, options.rate, count))
+        return Measured(record.label, record.controller, run_metrics(record, options.rate, counting(update)))
 
 
 def answer_of(saved: Saved, run: Measured) -> dict[str, Any]:
@@ -115,21 +108,14 @@ def answer_of(saved: Saved, run: Measured) -> dict[str, Any]:
 
 def print_table(answers: list[dict[str, Any]]) -> None:
     """Print the figures of all runs for people."""
-    from rich.table import Table
+    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
-    from robocov_app.terminal.tables import console
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", style="bold", no_wrap=True)
     titles = ("sensed", "visible", "work", "effort", "way", "within 5 %", "parts", "to walls", "to robots")
-    for title in titles:
-        table.add_column(title, justify="right", no_wrap=True)
-    for answer in answers:
-        free = answer["free_area_m2"]
-        table.add_row(
+    rows = (
+        (
             answer["label"],
-            f"{answer['sensed_area_m2'] / free:.1%}",
-            f"{answer['visible_area_m2'] / free:.1%}",
+            f"{answer['sensed_area_m2'] / answer['free_area_m2']:.1%}",
+            f"{answer['visible_area_m2'] / answer['free_area_m2']:.1%}",
             f"{answer['work_J']:.1f} J",
             f"{answer['effort_N2_s']:.1f} N²s",
             f"{answer['path_length_m']:.2f} m",
@@ -138,7 +124,9 @@ def print_table(answers: list[dict[str, Any]]) -> None:
             _text(answer["wall_clearance_m"], 3, "m"),
             _text(answer["robot_clearance_m"], 3, "m"),
         )
-    console().print(table)
+        for answer in answers
+    )
+    print_table([("", BOLD), *((title, RIGHT) for title in titles)], rows)
     print("written to metrics.csv in", ", ".join(answer["folder"] for answer in answers))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -18,13 +17,11 @@ from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density_summary import density_kind, weighed_lines
-from robocov_app.runs.building import PATIENCE, built_cost
+from robocov_app.runs.building import built_cost
 from robocov_app.terminal.output import finite
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import late_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from robocov.environment import Environment
     from robocov_app.runs.saved import Saved
 
@@ -140,17 +137,7 @@ def _check(options: Arguments) -> None:
 
 def _searched(options: Arguments, environment: Environment, robots: int, radius: float) -> Optimum:
     """Return the best positions; how far the search is gets told when it takes more than a second."""
-    began = time.perf_counter()
-    with ExitStack() as stack:
-        update: Callable[[int], None] | None = None
-
-        def tell(done: float) -> None:
-            nonlocal update
-            if update is None and time.perf_counter() - began > PATIENCE:
-                update = stack.enter_context(progress("searching", 100, quiet=options.json))
-            if update is not None:
-                update(round(100 * done))
-
+    with late_progress("searching", quiet=options.json) as tell:
         return optimum(
             environment,
             robots,

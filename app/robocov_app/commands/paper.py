@@ -157,19 +157,21 @@ def command(options: Arguments) -> int:
 
 def print_claims(claims: Sequence[Claim]) -> None:
     """Print the verdicts for people."""
-    from rich.table import Table
+    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
-    from robocov_app.terminal.tables import console
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("claim", overflow="fold")
-    table.add_column("verdict", style="bold", no_wrap=True)
-    table.add_column("measured", overflow="fold")
-    table.add_column("runs", justify="right", no_wrap=True)
-    for claim in claims:
-        measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
-        table.add_row(claim.claim, claim.verdict, measured, str(claim.runs))
-    console().print(table)
+    fold = {"overflow": "fold"}
+    print_table(
+        [("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)],
+        (
+            (
+                claim.claim,
+                claim.verdict,
+                f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–",
+                str(claim.runs),
+            )
+            for claim in claims
+        ),
+    )
 
 
 def _announce(forecast: Forecast, name: str, means: Means) -> None:

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from contextlib import ExitStack
-
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import late_progress
 
 PICTURE_LATTICE = 256
 """Coarsest lattice for maps of distances: its cells are to be narrower than walls."""
 
 FILM_LATTICE = 128
 """The same for films, of which every frame takes its time."""
-
-PATIENCE = 1.0
-"""Seconds without a word."""
 
 
 def built_cost(
@@ -30,21 +23,8 @@ def built_cost(
     `quiet`: tell nothing. `geodesics`: the shortest paths of this map, where they are known. Raises
     ParameterError as `CoverageCost`.
     """
-    began = time.perf_counter()
-    with ExitStack() as stack:
-        update: Callable[[int], None] | None = None
-
-        def tell(done: float) -> None:
-            nonlocal update
-            if update is None and time.perf_counter() - began > PATIENCE:
-                update = stack.enter_context(progress("map of ways", 100, quiet=quiet))
-            if update is not None:
-                update(round(100 * done))
-
-        cost = CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
-        if update is not None:
-            update(100)
-    return cost
+    with late_progress("map of ways", quiet=quiet) as tell:
+        return CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
 
 
 def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int | None = None) -> CoverageCost:

@@ -20,7 +20,7 @@ from robocov_app.runs.options import RunOptions
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import counting, progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,14 +75,7 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
     total = len(sample_moments(record, rate))
     with progress("coverage cost", total, quiet=quiet) as update:
-        done = 0
-
-        def count() -> None:
-            nonlocal done
-            done += 1
-            update(done)
-
-        history = cost_history(record, cost, rate, count)
+        history = cost_history(record, cost, rate, counting(update))
     return Run(record, history, summarise(record, history))
 
 
@@ -206,10 +199,9 @@ def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, q
     from robocov_app.figures.runs import save_figure
 
     with progress("pictures", 2 * len(figures), quiet=quiet) as update:
-        done = 0
+        done = counting(update)
         for stem, draw in figures.items():
             figure = draw()
             for suffix in (".png", ".svg"):
                 save_figure(figure, folder / (stem + suffix))
-                done += 1
-                update(done)
+                done()

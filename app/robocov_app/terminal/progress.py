@@ -5,7 +5,11 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from itertools import count
+
+PATIENCE = 1.0
+"""Seconds without a word."""
 
 
 @contextmanager
@@ -29,6 +33,31 @@ def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callabl
 
         yield note
         print(f"{label}: {reached} of {total} in {time.perf_counter() - began:.1f} s", file=sys.stderr)
+
+
+@contextmanager
+def late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
+    """Show how far something is, from 0 to 1, once it takes more than `PATIENCE`; the value takes that."""
+    began = time.perf_counter()
+    with ExitStack() as stack:
+        update: Callable[[int], None] | None = None
+
+        def tell(done: float) -> None:
+            nonlocal update
+            if update is None and time.perf_counter() - began > PATIENCE:
+                update = stack.enter_context(progress(label, 100, quiet=quiet))
+            if update is not None:
+                update(round(100 * done))
+
+        yield tell
+        if update is not None:
+            update(100)
+
+
+def counting(update: Callable[[int], None]) -> Callable[[], None]:
+    """Return what counts one more each time, for an `update` of `progress`."""
+    numbers = count(1)
+    return lambda: update(next(numbers))
 
 
 @contextmanager

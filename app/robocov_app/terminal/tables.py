@@ -1,9 +1,10 @@
-"""Tables for people: as wide as the terminal, and wide enough where there is none."""
+"""Tables for people, as wide as the terminal, or wide enough where there is none."""
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,3 +18,19 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False)
+
+
+BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
+RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
+
+
+def print_table(columns: Iterable[tuple[str, Mapping[str, Any]]], rows: Iterable[Iterable[str]]) -> None:
+    """Print rows under the titles of columns, each with what `rich.table.Table.add_column` takes."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for title, look in columns:
+        table.add_column(title, **look)
+    for row in rows:
+        table.add_row(*row)
+    console().print(table)
