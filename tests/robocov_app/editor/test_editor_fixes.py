@@ -1,0 +1,87 @@
+"""Fixes: what mends a problem leaves none of it, and makes no other."""
+
+from dataclasses import replace
+
+import pytest
+from drawn_sketches import HALL
+
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
+from robocov.errors import MapError
+from robocov_app.editor.edits.fixes import TITLES, fixed, unreachable_filled
+from robocov_app.editor.model.measurement import measure
+from robocov_app.editor.model.sketch import Sketch
+
+BOX = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
+BOW_TIE = PolygonObstacle(((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0)))
+
+
+def hall(*shapes, starts=(), **others) -> Sketch:
+    return replace(Sketch("Hall", boundary=HALL, starts=starts).added(shapes)[0], **others)
+
+
+def rooms(width: float) -> Sketch:
+    """Return a hall that two walls part, with a door of a width between them."""
+    middle = 4.0
+    low = WallObstacle(((6.0, 0.0), (6.0, middle - width / 2)), 0.1)
+    high = WallObstacle(((6.0, middle + width / 2), (6.0, 8.0)), 0.1)
+    return hall(low, high)
+
+
+@pytest.mark.parametrize(
+    ("sketch", "kind", "words"),
+    [
+        (hall(CircleObstacle((3.0, 3.0), 1.0), boundary=None), "no boundary", "drawn round everything"),
+        (hall(BOW_TIE), "crossing", "1 outline repaired"),
+        (hall(CircleObstacle((20.0, 3.0), 1.0, "lamp")), "outside", "circle “lamp” deleted"),
+        (hall(*[CircleObstacle((5.0, 5.0), 1.0)] * 2), "twice", "circle deleted"),
+        (hall(PolygonObstacle(((1.0, 1.0), *BOX[:1], *BOX))), "double", "polygon 1: vertices merged"),
+        (hall(PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0)),))), "sealed", "filled"),
+        (hall(PolygonObstacle(BOX, (((3.0, 3.0), (3.2, 3.0), (3.2, 3.2)),))), "sealed", "filled"),
+        (rooms(0.3), "narrow", "wall 1 shortened by 0.1 m"),
+        (hall(CircleObstacle((6.0, 2.0), 3.0), CircleObstacle((6.0, 5.6), 0.3)), "narrow", "circle 2 moved"),
+        (rooms(0.3), "cut off", "filled"),
+        (
+            hall(PolygonObstacle(BOX), starts=(("a", PointsStart(((2.1, 4.0), (1.0, 4.0)))),)),
+            "spot",
+            "start “a”: place 1 moved",
+        ),
+        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.1, 1.0)))),)), "spot", "place 2 moved"),
+        (hall(starts=(("a", PointsStart(((1.0, 1.0), (1.0, 1.0)))),)), "spot", "place 2 moved"),
+        (hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "place 1 moved"),
+        (hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)), "no room", "“a” moved"),
+    ],
+)
+def test_a_problem_that_is_mended_is_gone(sketch, kind, words):
+    radius = 0.2
+    before = measure(sketch, radius).problems
+    problem = next(each for each in before if each.kind == kind)
+    assert TITLES[kind]
+    change = fixed(sketch, problem, radius)
+    assert words in change.words
+    after = measure(change.sketch, radius).problems
+    assert kind not in [each.kind for each in after], [each.words for each in after]
+    assert len(after) < len(before)
+
+
+def test_all_that_cannot_be_reached_is_filled_at_once():
+    frame = PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)),))
+    fork = ((8.0, 0.0), (8.0, 3.0), (8.2, 3.0), (8.2, 0.2), (8.5, 0.2), (8.5, 3.0), (9.0, 0.0))
+    sketch = hall(frame, PolygonObstacle(fork))
+    assert measure(sketch, 0.3).problems
+    after = measure(unreachable_filled(sketch, 0.3).sketch, 0.3)
+    assert not after.problems and len(after.reached) == 1
+    with pytest.raises(MapError, match="nothing to fill"):
+        unreachable_filled(hall(), 0.3)
+    with pytest.raises(MapError, match="fits anywhere"):
+        unreachable_filled(hall(), 5.0)
+
+
+def test_what_cannot_be_mended_is_none():
+    locked = rooms(0.3)
+    locked = replace(locked, obstacles=tuple(replace(item, locked=True) for item in locked.obstacles))
+    narrow = next(each for each in measure(locked, 0.2).problems if each.kind == "narrow")
+    assert fixed(locked, narrow, 0.2) is None
+    nameless = hall(name="")
+    assert fixed(nameless, measure(nameless).problems[0], 0.2) is None
+    full = hall(starts=(("a", PointsStart(((-1.0, 4.0),))),))
+    assert fixed(full, measure(full, 5.0).problems[0], 5.0) is None
