@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
 import pytest
 
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.mapfile import from_json
@@ -164,3 +166,13 @@ def test_the_report_is_json() -> None:
     assert document["starts"]["all"]["kind"] == "uniform"
     assert isinstance(report, MapReport)
     assert json.loads(json.dumps(check_map(room()).to_dict()))["narrowest_gap_m"] is None
+
+
+def test_overlapping_peaks_are_told_by_their_largest_value_not_by_a_bound():
+    near = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0), Gaussian((4.0, 3.0), 2.0, sigma=1.0)), 0.5)
+    x = np.linspace(0.0, 10.0, 1001)
+    points = np.column_stack([x, np.full(1001, 3.0)])
+    for density, largest in ((near, near.value(points).max()), (Gaussians(near.peaks[:1], 0.5), 2.5)):
+        ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+        report = check_map(Environment("heavy", ring, density=density))
+        assert report.density_range == pytest.approx((0.5, largest), abs=1e-5)
