@@ -122,7 +122,7 @@ def plot_result(
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
     from robocov_app.render.field import Field, FieldLattice
     from robocov_app.render.phi import mean_words
-    from robocov_app.runs.building import PICTURE_LATTICE, built_cost
+    from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
 
     _checked(axes)
     environment, sites, n = result.environment, result.sites, len(result.positions)
@@ -194,7 +194,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
     """Return the cost along a run, None where nobody would wait for it or it cannot be had."""
     from robocov.errors import RobocovError
     from robocov.metrics import cost_history
-    from robocov_app.runs.building import built_cost
+    from robocov_app.runs.cost import built_cost
 
     if shapely.get_num_coordinates(record.environment.free) > COST_VERTICES:
         return None

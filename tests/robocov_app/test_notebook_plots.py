@@ -23,14 +23,14 @@ from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.theme_css import hex_code
-from robocov_app.runs import building
+from robocov_app.runs import cost as run_cost
 
 
 @pytest.fixture(autouse=True)
 def _coarse_pictures(request, monkeypatch):
     """Pictures of distances from few sites, which are soon there, but in the thorough run."""
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(building, "PICTURE_LATTICE", 32)
+        monkeypatch.setattr(run_cost, "PICTURE_LATTICE", 32)
 
 
 RUN = run_of(ROOMS, 5)

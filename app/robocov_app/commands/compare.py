@@ -37,7 +37,6 @@ def command(options: Arguments) -> int:
     from robocov.compiled import compile_kernels
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
-    from robocov_app.runs.building import built_cost
     from robocov_app.runs.compare import (
         begin_comparison,
         folder_names,
@@ -45,6 +44,7 @@ def command(options: Arguments) -> int:
         rows_of,
         save_comparison,
     )
+    from robocov_app.runs.cost import built_cost
     from robocov_app.runs.film import check_layers, save_moving
     from robocov_app.runs.run import saved_run
     from robocov_app.terminal.interruption import Interruption

@@ -15,12 +15,11 @@ from robocov.errors import InputError, ParameterError, shown
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov_app.render.density_summary import density_kind, weighed_lines
-from robocov_app.runs.building import built_cost, cost_for_pictures
+from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
 from robocov_app.terminal.output import finite
 
 if TYPE_CHECKING:
-    from robocov.cost import CoverageCost, CoverageResult
-    from robocov.environment import Environment
+    pass
 
 
 @dataclass
@@ -77,7 +76,15 @@ def command(options: Arguments) -> None:
                 arrays["times"] = timed.times
             np.savez(file, **arrays)
     if options.plot is not None:
-        draw(options, environment, cost_for_pictures(environment, cost), shown)
+        from robocov_app.render.phi import mean_words
+
+        mean = f"{mean_words(environment)} {result.mean_distance:.3f} m"
+        if timed is not None:
+            mean = f"mean time {timed.mean_time:.3f} s"
+        fine = cost_for_pictures(environment, cost)
+        draw_distances(
+            options.plot, fine, robots, mean, title="Coverage cost", theme=options.theme, speeds=speeds
+        )
     answer = {
         "mean_distance_m": result.mean_distance,
         **({} if timed is None else {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}),
@@ -115,25 +122,6 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
         if not 0.0 < speed < np.inf:
             raise ParameterError(f"--speeds: {speed!r} m/s, but a number above 0 was wanted")
     return np.array(given if len(given) == robots else given * robots)
-
-
-def draw(options: Arguments, environment: Environment, cost: CoverageCost, result: CoverageResult) -> None:
-    """Draw the map of distances."""
-    from robocov.robots import Team
-    from robocov_app.figures.coverage import Moment, plot_coverage
-    from robocov_app.figures.runs import save_figure
-    from robocov_app.render.field import Field, FieldLattice
-    from robocov_app.render.phi import mean_words
-
-    assert options.plot is not None
-    n = len(result.positions)
-    mean = f"{mean_words(environment)} {result.mean_distance:.3f} m"
-    if result.mean_time is not None:
-        mean = f"mean time {result.mean_time:.3f} s"
-    facts = f"{n} robot{'s' if n > 1 else ''}, {mean}"
-    field = Field(FieldLattice(cost.sites), cost(result.positions, result.speeds))
-    moment = Moment(environment, Team.homogeneous(n), field, environment.name, facts)
-    save_figure(plot_coverage([], [moment], options.theme, title="Coverage cost"), options.plot)
 
 
 def read_positions(path: Path) -> Array:

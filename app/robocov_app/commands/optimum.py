@@ -17,7 +17,7 @@ from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density_summary import density_kind, weighed_lines
-from robocov_app.runs.building import built_cost
+from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.terminal.output import finite
 from robocov_app.terminal.progress import late_progress
 
@@ -102,7 +102,12 @@ def command(options: Arguments) -> None:
         with written(options.positions) as part:
             part.write_text(f"[{rows}]\n", encoding="utf-8")
     if options.plot is not None:
-        _draw(options.plot, options.theme, environment, best, radius)
+        from robocov_app.render.phi import mean_words
+
+        cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
+        mean = f"{mean_words(environment)} {best.mean_distance:.3f} m"
+        title, theme = "Best positions found", options.theme
+        draw_distances(options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius)
     if options.json:
         print(json.dumps(finite(_answer(environment, best, gaps))))
     else:
@@ -201,20 +206,3 @@ def _print(
         print(f"{gap.name}: mean distance {gap.mean_distance:.4f} m, {above}")
     if options.positions is None:
         print("positions       " + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in best.positions.tolist()))
-
-
-def _draw(path: Path, theme: str, environment: Environment, best: Optimum, radius: float) -> None:
-    """Draw the map of distances."""
-    from robocov.robots import Team
-    from robocov_app.figures.coverage import Moment, plot_coverage
-    from robocov_app.figures.runs import save_figure
-    from robocov_app.render.field import Field, FieldLattice
-    from robocov_app.render.phi import mean_words
-    from robocov_app.runs.building import PICTURE_LATTICE
-
-    cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
-    n = len(best.positions)
-    facts = f"{n} robot{'s' if n > 1 else ''}, {mean_words(environment)} {best.mean_distance:.3f} m"
-    field = Field(FieldLattice(cost.sites), cost(best.positions))
-    moment = Moment(environment, Team.homogeneous(n, radius=radius), field, environment.name, facts)
-    save_figure(plot_coverage([], [moment], theme, title="Best positions found"), path)

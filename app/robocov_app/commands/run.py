@@ -35,8 +35,8 @@ def command(options: Arguments) -> int:
     from robocov.compiled import compile_kernels
     from robocov.files.result_folder import results
     from robocov.mapfile import load_map
-    from robocov_app.runs.building import built_cost
     from robocov_app.runs.compare import folder_names
+    from robocov_app.runs.cost import built_cost
     from robocov_app.runs.film import check_layers, save_moving
     from robocov_app.runs.run import save_pictures, saved_run
     from robocov_app.terminal.interruption import Interruption
@@ -51,7 +51,7 @@ def command(options: Arguments) -> int:
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     with results(out, overwrite=options.overwrite) as result, Interruption() as stop:
         run = saved_run(spec, cost, result, "", options, stop)
-        save_pictures(run, cost, result.new, options)
+        save_pictures([run], cost, result.new, options)
         result.keep()
         save_moving([run], cost, result.new, options, stop)
     if options.json:

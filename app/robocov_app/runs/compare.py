@@ -11,17 +11,11 @@ from robocov.controllers import controller_kind, gains_of
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.runs.options import RunOptions
-from robocov_app.runs.run import (
-    Run,
-    cost_title,
-    last_moments,
-    save_figures,
-    time_curves,
-)
+from robocov_app.runs.run import Run, save_pictures
 from robocov_app.terminal.output import finite, write_csv, write_json
 
 if TYPE_CHECKING:
-    from robocov_app.figures.coverage import Moment
+    pass
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 
@@ -93,41 +87,9 @@ def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
 
 def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
     """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
-    from robocov_app.figures.coverage import plot_coverage
-    from robocov_app.figures.runs import plot_comparison
-    from robocov_app.render.theme import theme_named
-
     rows = rows_of(runs)
     content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
     write_json(folder / "comparison.json", finite(content))
     columns = [name for name in rows[0] if name not in ("label", "gains")]
     write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
-
-    theme, size = theme_named(options.theme), options.picture_size()
-    finals = [run.summary["mean_distance_m"] for run in runs.values()]
-    records = [run.record for run in runs.values()]
-    curves = [
-        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance)
-        for run in runs.values()
-    ]
-
-    def moments() -> list[Moment]:
-        return last_moments(list(runs.values()), cost)
-
-    save_figures(
-        folder,
-        {
-            "trajectories": lambda: plot_comparison(
-                records,
-                theme=theme,
-                colours=options.colours,
-                size=size,
-                mean_distances=finals,
-                mean_times=[run.final_time for run in runs.values()],
-            ),
-            "cost": lambda: plot_coverage(
-                curves, moments(), theme, size, cost_title(records[0]), time_curves(list(runs.values()))
-            ),
-        },
-        quiet=options.json,
-    )
+    save_pictures(list(runs.values()), cost, folder, options, comparison=True)

@@ -25,7 +25,7 @@ from robocov_app.render.record_scene import record_scene
 from robocov_app.render.shading import round_limit
 from robocov_app.render.spacing import columns_for
 from robocov_app.render.theme import Colour, theme_named
-from robocov_app.runs.building import FILM_LATTICE, built_cost, cost_for_pictures
+from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.recording import Frame, kept_frames, save_film, save_frames
 from robocov_app.runs.run import Run

@@ -15,7 +15,7 @@ from robocov.cost import CoverageCost, MomentaryCost
 from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record
-from robocov_app.runs.building import built_cost, cost_for_pictures
+from robocov_app.runs.cost import built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
@@ -116,38 +116,32 @@ def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
     return zip(*(column.tolist() for column in columns), strict=True)
 
 
-def save_pictures(run: Run, cost: CoverageCost, folder: Path, options: RunOptions) -> None:
-    """Draw ``trajectories.png|svg`` and ``cost.png|svg``."""
+def save_pictures(
+    runs: Sequence[Run], cost: CoverageCost, folder: Path, options: RunOptions, *, comparison: bool = False
+) -> None:
+    """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison."""
     from robocov_app.figures.coverage import plot_coverage
-    from robocov_app.figures.runs import plot_trajectories
+    from robocov_app.figures.runs import plot_comparison, plot_trajectories
     from robocov_app.render.theme import theme_named
 
-    record, history = run.record, run.history
+    records, times = [run.record for run in runs], [run.final_time for run in runs]
+    finals = [float(run.history.mean_distance[-1]) for run in runs]
     theme, size = theme_named(options.theme), options.picture_size()
-    final, final_time = float(history.mean_distance[-1]), run.final_time
-    curve = (record.label, record.controller, history.time, history.mean_distance)
-    save_figures(
-        folder,
-        {
-            "trajectories": lambda: plot_trajectories(
-                record,
-                theme=theme,
-                colours=options.colours,
-                size=size,
-                mean_distance=final,
-                mean_time=final_time,
-            ),
-            "cost": lambda: plot_coverage(
-                [curve],
-                last_moments([run], cost),
-                theme=theme,
-                size=size,
-                title=cost_title(record),
-                times=time_curves([run]),
-            ),
-        },
-        quiet=options.json,
-    )
+    curves = [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
+    ]
+
+    def trajectories() -> Figure:
+        if comparison:
+            return plot_comparison(records, theme, options.colours, size, finals, times)
+        return plot_trajectories(records[0], None, theme, options.colours, size, finals[0], times[0])
+
+    def costs() -> Figure:
+        n = len(records[0].team)
+        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
+        return plot_coverage(curves, last_moments(runs, cost), theme, size, title, time_curves(runs))
+
+    save_figures(folder, {"trajectories": trajectories, "cost": costs}, quiet=options.json)
 
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
@@ -186,12 +180,6 @@ def time_curves(runs: Sequence[Run]) -> list[Curve]:
         for run in runs
         if run.history.mean_time is not None and np.isfinite(run.history.mean_time).any()
     ]
-
-
-def cost_title(record: Record) -> str:
-    """Return the title of a picture of cost curves: of what map and how many robots."""
-    n = len(record.team)
-    return f"Coverage cost  ·  {record.environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
 
 
 def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:

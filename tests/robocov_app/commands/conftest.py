@@ -1,7 +1,7 @@
 import pytest
 from swept import InProcess
 
-from robocov_app.runs import building
+from robocov_app.runs import cost as run_cost
 from robocov_app.sweep import sweeping
 
 
@@ -9,5 +9,5 @@ from robocov_app.sweep import sweeping
 def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(building, "PICTURE_LATTICE", 32)
+        monkeypatch.setattr(run_cost, "PICTURE_LATTICE", 32)
         monkeypatch.setattr(sweeping, "LocalPool", InProcess)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from robocov.errors import RobocovError
 from robocov.files.result_folder import ResultFolder, results
-from robocov_app.runs.building import built_cost
 from robocov_app.runs.compare import begin_comparison, folder_names, save_comparison
+from robocov_app.runs.cost import built_cost
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import evaluated, save_numbers, save_pictures
 from robocov_app.terminal.interruption import Interruption
@@ -78,7 +78,7 @@ def _save_run(records: list[Record], result: ResultFolder, lattice: int) -> None
     """Write what ``robocov run`` writes."""
     (record,) = records
     run, cost = _numbers(record, result, "", lattice)
-    save_pictures(run, cost, result.new, RunOptions(lattice=lattice, json=True))
+    save_pictures([run], cost, result.new, RunOptions(lattice=lattice, json=True))
 
 
 def _save_comparison(records: list[Record], result: ResultFolder, lattice: int) -> None:

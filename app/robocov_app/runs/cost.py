@@ -1,11 +1,16 @@
-"""Building the coverage cost of a map, with progress."""
+"""The coverage cost of a map, with progress; and its picture."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
+from robocov.errors import counted
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
+from robocov.robots import DEFAULT_RADIUS, Team
 from robocov_app.terminal.progress import late_progress
 
 PICTURE_LATTICE = 256
@@ -36,3 +41,28 @@ def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int |
     if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
         return cost
     return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)
+
+
+def draw_distances(
+    path: Path,
+    cost: CoverageCost,
+    positions: Array,
+    mean: str,
+    *,
+    title: str,
+    theme: str,
+    speeds: Array | None = None,
+    radius: float = DEFAULT_RADIUS,
+) -> None:
+    """Draw a map of the distances to the nearest robot, under words on their mean."""
+    from robocov_app.figures.coverage import Moment, plot_coverage
+    from robocov_app.figures.runs import save_figure
+    from robocov_app.render.field import Field, FieldLattice
+
+    team, field = (
+        Team.homogeneous(len(positions), radius=radius),
+        Field(FieldLattice(cost.sites), cost(positions, speeds)),
+    )
+    facts = f"{counted(len(team), 'robot')}, {mean}"
+    moment = Moment(cost.environment, team, field, cost.environment.name, facts)
+    save_figure(plot_coverage([], [moment], theme, title=title), path)

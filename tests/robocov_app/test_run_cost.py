@@ -6,8 +6,8 @@ from drawn_run import ROOMS
 
 from robocov.cost import CoverageCost
 from robocov.mapfile.check import vertex_count
-from robocov_app.runs import building
-from robocov_app.runs.building import built_cost, cost_for_pictures
+from robocov_app.runs import cost as run_cost
+from robocov_app.runs.cost import built_cost, cost_for_pictures
 
 PLACE = np.array([[2.0, 2.0]])
 
@@ -37,13 +37,13 @@ def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
 
 def test_large_maps_are_drawn_as_they_were_measured(monkeypatch):
     coarse = built_cost(ROOMS, 16)
-    monkeypatch.setattr(building, "MANY_VERTICES", vertex_count(ROOMS) - 1)
+    monkeypatch.setattr(run_cost, "MANY_VERTICES", vertex_count(ROOMS) - 1)
     assert cost_for_pictures(ROOMS, coarse) is coarse
 
 
 def test_pictures_want_a_fine_lattice():
     coarse, fine = built_cost(ROOMS, 16), built_cost(ROOMS, 300)
-    assert cost_for_pictures(ROOMS, coarse).lattice == building.PICTURE_LATTICE
+    assert cost_for_pictures(ROOMS, coarse).lattice == run_cost.PICTURE_LATTICE
     assert cost_for_pictures(ROOMS, coarse, 20).lattice == 20
     assert cost_for_pictures(ROOMS, fine) is fine
     # the shortest paths do not depend on the lattice, and on large maps they take long
