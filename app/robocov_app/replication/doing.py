@@ -13,7 +13,7 @@ from robocov_app.replication.studying import Stopped, swept
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import opened
 from robocov_app.sweep.study import tasks_of
-from robocov_app.sweep.sweeping import Count, told, worked_off
+from robocov_app.sweep.sweeping import Count, sweep_progress, worked_off
 
 if TYPE_CHECKING:
     from robocov_app.replication.studying import Means
@@ -73,7 +73,7 @@ def _filled(
         return
     tasks = {task.digest: task for _, task in waiting}.values()
     count = Count(len(tasks))
-    tell = stack.enter_context(told(title, count, quiet=means.quiet))
+    tell = stack.enter_context(sweep_progress(title, count, quiet=means.quiet))
     for note in notes:
         tell.say(note)
     # two studies may have a task in common

@@ -74,20 +74,19 @@ class Count:
 
 
 class Teller:
-    """Is called whenever the count has changed, or some time has passed; this one says nothing."""
+    """Tells how far a sweep is: by a bar of rich, in lines now and then, or if `quiet` not at all."""
 
-    def __call__(self, count: Count) -> None:
-        """Say how far it is."""
-
-    def say(self, line: str) -> None:
-        """Say something else."""
-
-
-class _Lines(Teller):
-    def __init__(self, title: str) -> None:
-        self._title, self._said, self._waiting = title, time.perf_counter(), ""
+    def __init__(self, title: str, count: Count, *, quiet: bool = False, bar: Progress | None = None) -> None:
+        self._title, self._quiet, self._bar = title, quiet, bar
+        self._said, self._waiting = time.perf_counter(), ""
+        self._task = None if bar is None else bar.add_task(title, total=count.total, said="", left="")
 
     def __call__(self, count: Count, *, at_once: bool = False) -> None:
+        """Take the count, whenever it has changed or some time has passed."""
+        if self._bar is not None and self._task is not None:
+            done = count.done + count.failed + count.reused
+            self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
+            return
         now = time.perf_counter()
         due = now - self._said >= PERIOD and not count.waiting  # that is told once
         if at_once or due or count.waiting != self._waiting:
@@ -95,46 +94,29 @@ class _Lines(Teller):
             self.say(", ".join(filter(None, (str(count), count.ahead))))
 
     def say(self, line: str) -> None:
-        sys.stderr.write(f"{self._title}: {line}\n")
-        sys.stderr.flush()
-
-
-class _Bar(Teller):
-    def __init__(self, bar: Progress, title: str, total: int) -> None:
-        self._bar, self._task = bar, bar.add_task(title, total=total, said="", left="")
-
-    def __call__(self, count: Count) -> None:
-        done = count.done + count.failed + count.reused
-        self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
-
-    def say(self, line: str) -> None:
-        self._bar.console.print(line, markup=False, highlight=False)
+        """Say something else."""
+        if self._bar is not None:
+            self._bar.console.print(line, markup=False, highlight=False)
+        elif not self._quiet:
+            sys.stderr.write(f"{self._title}: {line}\n")
+            sys.stderr.flush()
 
 
 @contextmanager
-def told(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
-    """Give a function to be called with the count when it has changed, and now and then.
+def sweep_progress(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
+    """Give what tells of the count: a bar in a terminal, a line now and then elsewhere."""
+    if quiet or not sys.stderr.isatty():
+        teller = Teller(title, count, quiet=quiet)
+        yield teller
+        teller(count, at_once=True)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    `quiet`: say nothing.
-    """
-    if quiet:
-        yield Teller()
-    elif sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-
-        columns = (
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.fields[said]}", markup=False),
-            TextColumn("{task.fields[left]}", markup=False),
-        )
-        with Progress(*columns, console=Console(stderr=True)) as bar:
-            yield _Bar(bar, title, count.total)
-    else:
-        lines = _Lines(title)
-        yield lines
-        lines(count, at_once=True)
+    words = ("{task.description}", "{task.fields[said]}", "{task.fields[left]}")
+    name, said, left = (TextColumn(each, markup=False) for each in words)
+    with Progress(name, BarColumn(), said, left, console=Console(stderr=True)) as bar:
+        yield Teller(title, count, bar=bar)
 
 
 def duration(seconds: float) -> str:
@@ -242,7 +224,7 @@ def sweep(
         ledger = stack.enter_context(opened(folder, content))
         table = stack.enter_context(Table(folder, columns_of(study), study_bytes(content)))
         count = Count(len(study))
-        tell = stack.enter_context(told(title, count, quiet=quiet))
+        tell = stack.enter_context(sweep_progress(title, count, quiet=quiet))
         looked = takewhile(lambda _: not stopped.requested, tasks_of(study))
         survey = ledger.survey(looked, retry_failed=retry_failed, keep_versions=keep_versions)
         count.reused = len(survey.todo) - sum(survey.todo)
@@ -250,7 +232,7 @@ def sweep(
             tell.say(line)
         rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
-        def hired() -> Executor:
+        def open_executor() -> Executor:
             if scheduler is None:
                 compile_kernels()
                 return LocalPool(min(workers or processors(), sum(survey.todo)))
@@ -270,7 +252,7 @@ def sweep(
         failure: RobocovError | None = None
         try:
             rows.write()
-            for _ in worked_off(compress(tasks_of(study), survey.todo), hired, count, stopped, keep):
+            for _ in worked_off(compress(tasks_of(study), survey.todo), open_executor, count, stopped, keep):
                 tell(count)
         except RobocovError as error:  # what is done belongs into the table all the same
             failure = error
@@ -293,15 +275,14 @@ def sweep(
 
 def worked_off(
     tasks: Iterable[Task],
-    hired: Callable[[], Executor],
+    open_executor: Callable[[], Executor],
     count: Count,
     stop: Interruption,
     keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
     """Have tasks done, and keep what comes back; yield whenever the count may have changed.
 
-    `tasks`: asked for the next one when somebody can do it. `hired`: gives those who do tasks; called if
-    there is one.
+    The next task is asked for when somebody can do it, and an executor when there is a task.
     """
     with ExitStack() as stack:
         executor: Executor | None = None
@@ -309,7 +290,7 @@ def worked_off(
         task = next(left, None)
         while (task is not None or (executor is not None and executor.busy)) and not stop.requested:
             if executor is None:
-                executor = stack.enter_context(hired())
+                executor = stack.enter_context(open_executor())
             while task is not None and not executor.full:
                 executor.submit(task)
                 task = next(left, None)

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from robocov_app.sweep import sweeping as telling
-from robocov_app.sweep.sweeping import Count, told
+from robocov_app.sweep.sweeping import Count, sweep_progress
 
 
 class Clock:
@@ -36,7 +36,7 @@ def test_where_there_is_no_terminal_a_line_comes_now_and_then(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
     count = Count(1000, began=clock.now)
-    with told("sweep", count, quiet=False) as tell:
+    with sweep_progress("sweep", count, quiet=False) as tell:
         for _ in range(100):
             clock.now += 0.5
             count.done += 1
@@ -51,7 +51,7 @@ def test_a_wait_is_told_once_in_place_of_an_estimate(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
     count = Count(10, began=clock.now, done=2, waiting="nobody is there; waiting")
-    with told("sweep", count, quiet=False) as tell:
+    with sweep_progress("sweep", count, quiet=False) as tell:
         for _ in range(100):
             clock.now += 1.0
             tell(count)
@@ -63,7 +63,7 @@ def test_a_wait_is_told_once_in_place_of_an_estimate(
 
 
 def test_nobody_is_told_when_nobody_wants_to_know(capsys: pytest.CaptureFixture[str]) -> None:
-    with told("sweep", Count(1), quiet=True) as tell:
+    with sweep_progress("sweep", Count(1), quiet=True) as tell:
         tell(Count(1))
     assert capsys.readouterr() == ("", "")
 
@@ -79,7 +79,7 @@ def test_a_terminal_gets_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "120")
     count = Count(4)
-    with told("[bold]mine[/] [/x]", count, quiet=False) as tell:
+    with sweep_progress("[bold]mine[/] [/x]", count, quiet=False) as tell:
         count.done, count.failed = 1, 1
         tell(count)
     said = terminal.getvalue()
