@@ -14,10 +14,13 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
 from robocov_app.editor.model.geometry import nearest_on
-from robocov_app.editor.model.selection import Vertex, ring_points
+from robocov_app.editor.model.selection import Vertex, ring_points, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
+
+MANY = 1500
+"""Vertices of a map from which on the window does not wait for its targets."""
 
 _MOST_EDGES = 8
 """Edges near a point that are looked at: more can only be where nothing can be told apart."""
@@ -41,15 +44,23 @@ class Targets:
         self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
     ) -> None:
         dragged = list(without)
-        owners = {each for each in dragged if not isinstance(each, Vertex)}
         vertices = {each for each in dragged if isinstance(each, Vertex)}
-        lines = _Lines(vertices)
-        centres: list[Point] = []
-        rims: list[Point] = list(more)
-        walls: list[BaseGeometry] = []
-        circles: list[BaseGeometry] = []
-        if BOUNDARY not in owners:
-            lines.take(sketch, BOUNDARY, closed=True)
+        owners = {each for each in dragged if not isinstance(each, Vertex)}
+        touched = {(vertex.of, vertex.ring) for vertex in vertices}
+        rims, centres = list(more), list[Point]()
+        walls, circles = list[BaseGeometry](), list[BaseGeometry]()
+        points, starts, ends = list[Point](), list[Point](), list[Point]()
+        for owner in (BOUNDARY, *sketch.places):
+            for ring, line, closed in rings_of(sketch, owner) if owner not in owners else ():
+                begin, end = line if closed else line[:-1], (*line[1:], *(line[:1] if closed else ()))
+                if (owner, ring) in touched:
+                    gone = [Vertex(owner, ring, k) in vertices for k in range(len(line))]
+                    line = tuple(point for point, is_gone in zip(line, gone, strict=True) if not is_gone)
+                    kept = [k for k in range(len(begin)) if not (gone[k] or gone[(k + 1) % len(gone)])]
+                    begin, end = tuple(begin[k] for k in kept), tuple(end[k] for k in kept)
+                points += line
+                starts += begin
+                ends += end
         for item in sketch.obstacles:
             if item.key in owners:
                 continue
@@ -57,10 +68,7 @@ class Targets:
                 centres.append(item.shape.center)
                 rims += ring_points(sketch, item.key)[0][1:]
                 circles.append(item.geometry)
-                continue
-            is_wall = isinstance(item.shape, WallObstacle)
-            lines.take(sketch, item.key, closed=not is_wall)
-            if is_wall:
+            elif isinstance(item.shape, WallObstacle):
                 walls.append(item.geometry)
         for name, spec in sketch.starts:
             if name not in owners and isinstance(spec, DiscStart):
@@ -69,31 +77,20 @@ class Targets:
             elif name not in owners and isinstance(spec, PointsStart):
                 places = enumerate(spec.positions)
                 centres += [at for k, at in places if Vertex(name, 0, k) not in vertices]
-        self._take(lines, centres, rims, walls, circles)
-
-    def _take(
-        self,
-        lines: _Lines,
-        centres: list[Point],
-        rims: list[Point],
-        walls: list[BaseGeometry],
-        circles: list[BaseGeometry],
-    ) -> None:
-        """Make the indices."""
-        starts, ends = lines.edges()
-        places = {
-            "vertex": np.concatenate([lines.points(), _array(rims), _outline(walls)[0]]),
+        lows, highs = _array(starts), _array(ends)
+        kinds = {
+            "vertex": np.concatenate([_array(points), _array(rims), _outline(walls)[0]]),
             "centre": _array(centres),
-            "middle": (starts + ends) / 2,
+            "middle": (lows + highs) / 2,
         }
+        self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
         # walls and circles are found by what they look like, too
         around = _outline([*walls, *circles])
-        self.starts, self.ends = np.concatenate([starts, around[0]]), np.concatenate([ends, around[1]])
-        self._places = {kind: (cKDTree(at), at) for kind, at in places.items() if len(at)}
+        self.starts, self.ends = np.concatenate([lows, around[0]]), np.concatenate([highs, around[1]])
         low, high = np.minimum(self.starts, self.ends), np.maximum(self.starts, self.ends)
-        self._edges = shapely.STRtree(shapely.box(*low.T, *high.T)) if len(low) else None
+        self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
         # what is in line counts of vertices and centres, sorted along each axis
-        marks = np.concatenate([places["vertex"], places["centre"]])
+        marks = np.concatenate([kinds["vertex"], kinds["centre"]])
         self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
@@ -109,9 +106,6 @@ class Targets:
 
     def edges_near(self, point: Point, reach: float) -> tuple[Array, Array]:
         """Return the starts and the ends, (k, 2) m each, of the edges within `reach`, the nearest first."""
-        empty = np.empty((0, 2))
-        if self._edges is None:
-            return empty, empty
         x, y = point
         found = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts, ends = self.starts[found], self.ends[found]
@@ -136,72 +130,8 @@ class Targets:
         return x, y
 
 
-class _Lines:
-    """Rings that are collected: vertices and the edges between them, but for some vertices."""
-
-    def __init__(self, without: set[Vertex]) -> None:
-        self._without = without
-        self._points: list[Point] = []
-        self._counts: list[int] = []
-        self._closed: list[bool] = []
-        self._gone: list[int] = []
-
-    def take(self, sketch: Sketch, owner: Owner, *, closed: bool) -> None:
-        """Take the rings of something."""
-        for ring, points in enumerate(ring_points(sketch, owner)):
-            if points:
-                first = len(self._points)
-                self._gone += [
-                    first + vertex.index
-                    for vertex in self._without
-                    if vertex.of == owner and vertex.ring == ring and vertex.index < len(points)
-                ]
-                self._points += points
-                self._counts.append(len(points))
-                self._closed.append(closed)
-
-    def points(self) -> Array:
-        """Return the (n, 2) vertices that are left."""
-        return np.delete(_array(self._points), self._gone, axis=0)
-
-    def edges(self) -> tuple[Array, Array]:
-        """Return the (m, 2) starts and ends of the edges that are left."""
-        points = _array(self._points)
-        counts = np.array(self._counts, dtype=np.intp)
-        last = np.cumsum(counts) - 1
-        after = np.arange(1, len(points) + 1)
-        after[last] -= counts
-        kept = np.ones(len(points), dtype=bool)
-        kept[last[~np.array(self._closed, dtype=bool)]] = False
-        if self._gone:
-            kept &= ~np.isin(np.arange(len(points)), self._gone) & ~np.isin(after, self._gone)
-        return points[kept], points[after[kept]]
-
-
-def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
-    """Return the (k, 2) starts and ends of the edges of polygons."""
-    rings = shapely.get_rings(np.array(geometries, dtype=object))
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    is_edge = ring[1:] == ring[:-1]
-    return points[:-1][is_edge], points[1:][is_edge]
-
-
-def _array(points: Sequence[Point]) -> Array:
-    return np.array(points, dtype=float).reshape(-1, 2)
-
-
-MANY = 1500
-"""Vertices of a map from which on the window does not wait for its targets."""
-
-
-def vertex_count(sketch: Sketch) -> int:
-    """Return about how many vertices a sketch has."""
-    shapes = (item.shape for item in sketch.obstacles)
-    return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
-
-
 class Snapper:
-    """Keeps the targets that were asked for last.
+    """The targets that were asked for last; of large maps worked out beside the window.
 
     Attributes
     ----------
@@ -221,15 +151,14 @@ class Snapper:
         self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
     ) -> Targets | None:
         """Return what to snap to; None as long as that is being worked out."""
-        without, more = frozenset(without), tuple(more)
-        if self._sketch is not sketch or self._key != (without, more):
-            self._sketch, self._key = sketch, (without, more)
-            self._known, self._coming = None, None
+        key = frozenset(without), tuple(more)
+        if self._sketch is not sketch or self._key != key:
+            self._sketch, self._key, self._known, self._coming = sketch, key, None, None
             if self.patient or vertex_count(sketch) < MANY:
-                self._known = Targets(sketch, without, more)
+                self._known = Targets(sketch, *key)
             else:
                 self._pool = self._pool or ThreadPoolExecutor(1, "targets")
-                self._coming = self._pool.submit(Targets, sketch, without, more)
+                self._coming = self._pool.submit(Targets, sketch, *key)
         if self._known is None and self._coming is not None and self._coming.done():
             self._known = self._coming.result()
         return self._known
@@ -238,3 +167,21 @@ class Snapper:
         """End."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
+
+
+def vertex_count(sketch: Sketch) -> int:
+    """Return about how many vertices a sketch has."""
+    shapes = (item.shape for item in sketch.obstacles)
+    return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
+
+
+def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
+    """Return the (k, 2) starts and ends of the edges of polygons."""
+    rings = shapely.get_rings(np.array(geometries, dtype=object))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    is_edge = ring[1:] == ring[:-1]
+    return points[:-1][is_edge], points[1:][is_edge]
+
+
+def _array(points: Sequence[Point]) -> Array:
+    return np.array(points, dtype=float).reshape(-1, 2)

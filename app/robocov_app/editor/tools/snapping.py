@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -120,6 +121,21 @@ class _Line:
                 return None
         return self.at(along)
 
+    def grid_place(self, foot: Point, grid: float) -> Point | None:
+        """Return the place on it, near a foot, where the grid is; a ray has it in steps from its origin."""
+        if grid <= 0.0:
+            return None
+        if self.kind == "angle":
+            dx, dy = foot[0] - self.through[0], foot[1] - self.through[1]
+            return self.at(_multiple(dx * self.direction[0] + dy * self.direction[1], grid))
+        if min(map(abs, self.direction)) >= _PARALLEL:
+            return None
+        axis = 0 if abs(self.direction[1]) < _PARALLEL else 1
+        there = _multiple(foot[axis], grid)
+        place = (there, foot[1]) if axis == 0 else (foot[0], there)
+        beyond = self.kind == "edge" and math.dist(self.foot(place), place) > _PARALLEL
+        return None if beyond else place
+
     def shown(self, at: Point) -> Guide:
         """Return the guide for a point that came to lie on it."""
         line = self.guide if self.kind == "edge" else (*self.guide, at)
@@ -127,18 +143,10 @@ class _Line:
 
 
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
-    """Return where a point means.
+    """Return where a point snaps to; angles count from the `origin`, where the line that is drawn comes from.
 
     Vertices, centres, crossings and middles come before lines, two lines (where they cross) before one, and
     lines before the grid; along a line, the grid counts too.
-
-    Parameters
-    ----------
-    point : (x, y), m
-    targets : Targets
-    snapping : Snapping
-    origin : (x, y) or None, m
-        Where the line that is drawn comes from: angles count from there.
     """
     return _ranked(point, targets, snapping, origin)[1]
 
@@ -176,16 +184,10 @@ def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> flo
 
 def _ranked(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> tuple[int, Snap]:
     """Return how well a point snapped, the lower the better, and where to."""
-    for rank, candidates in enumerate(
-        (
-            _at_vertices(point, targets, snapping),
-            _at_other_points(point, targets, snapping),
-            _on_lines(point, targets, snapping, origin),
-            _on_grid(point, snapping),
-        )
-    ):
-        near = [(math.dist(point, snap.point), snap) for snap in candidates]
-        near = [each for each in near if each[0] <= snapping.reach]
+    ways = (_at_vertices, _at_other_points, _on_lines, _on_grid)
+    for rank, way in enumerate(ways):
+        found = [(math.dist(point, snap.point), snap) for snap in way(point, targets, snapping, origin)]
+        near = [each for each in found if each[0] <= snapping.reach]
         if near:
             return rank, min(near, key=lambda each: (*_telling(each[1]), each[0]))[1]
     return 4, Snap(point)
@@ -197,29 +199,30 @@ def _telling(snap: Snap) -> tuple[int, int]:
     return -lines, -len(snap.guides)
 
 
-def _at_vertices(point: Point, targets: Targets, snapping: Snapping) -> Iterator[Snap]:
-    if "vertex" in snapping.to:
-        place = targets.nearest(point, "vertex", snapping.reach)
-        if place is not None:
-            yield Snap(place, (Guide("vertex", (place,), "vertex"),))
+def _mark(kind: Kind, place: Point, words: str = "") -> Snap:
+    return Snap(place, (Guide(kind, (place,), words or kind),))
 
 
-def _at_other_points(point: Point, targets: Targets, snapping: Snapping) -> Iterator[Snap]:
-    if "centre" in snapping.to:
-        place = targets.nearest(point, "centre", snapping.reach)
-        if place is not None:
-            yield Snap(place, (Guide("centre", (place,), "centre"),))
-    if "middle" in snapping.to:
-        place = targets.nearest(point, "middle", snapping.reach)
-        if place is not None:
-            yield Snap(place, (Guide("middle", (place,), "middle of an edge"),))
+def _at_vertices(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
+    place = targets.nearest(point, "vertex", snapping.reach) if "vertex" in snapping.to else None
+    if place is not None:
+        yield _mark("vertex", place)
+
+
+def _at_other_points(
+    point: Point, targets: Targets, snapping: Snapping, origin: Point | None
+) -> Iterator[Snap]:
+    place = targets.nearest(point, "centre", snapping.reach) if "centre" in snapping.to else None
+    if place is not None:
+        yield _mark("centre", place)
+    place = targets.nearest(point, "middle", snapping.reach) if "middle" in snapping.to else None
+    if place is not None:
+        yield _mark("middle", place, "middle of an edge")
     if "crossing" in snapping.to:
-        edges = list(_edges(point, targets, snapping))
-        for k, edge in enumerate(edges):
-            for other in edges[:k]:
-                place = edge.crossing(other)
-                if place is not None:
-                    yield Snap(place, (Guide("crossing", (place,), "crossing"),))
+        for edge, other in combinations(_edges(point, targets, snapping), 2):
+            place = other.crossing(edge)
+            if place is not None:
+                yield _mark("crossing", place)
 
 
 def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
@@ -236,22 +239,22 @@ def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point 
     for k, line in enumerate(lines):
         for other in lines[:k]:
             # where two edges cross is a matter of its own
-            if line.kind != "edge" or other.kind != "edge":
-                place = line.crossing(other)
-                if place is not None:
-                    yield Snap(place, (other.shown(place), line.shown(place)))
+            both_edges = line.kind == other.kind == "edge"
+            place = None if both_edges else line.crossing(other)
+            if place is not None:
+                yield Snap(place, (other.shown(place), line.shown(place)))
         foot = line.foot(point)
-        if "grid" in snapping.to:
-            for place in _grid_along(line, foot, snapping.grid):
-                yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
+        place = line.grid_place(foot, snapping.grid) if "grid" in snapping.to else None
+        if place is not None:
+            yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
         yield Snap(foot, (line.shown(foot),))
 
 
-def _on_grid(point: Point, snapping: Snapping) -> Iterator[Snap]:
+def _on_grid(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
     if "grid" in snapping.to and snapping.grid > 0.0:
         x, y = (_multiple(value, snapping.grid) for value in point)
         for place in ((x, y), (x, point[1]), (point[0], y)):
-            yield Snap(place, (Guide("grid", (place,), "grid"),))
+            yield _mark("grid", place)
             if math.dist(place, point) <= snapping.reach:
                 return
 
@@ -272,21 +275,6 @@ def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line
         if length > 0.0:
             direction = (bx - ax) / length, (by - ay) / length
             yield _Line("edge", (ax, ay), direction, ((ax, ay), (bx, by)), "edge", length)
-
-
-def _grid_along(line: _Line, foot: Point, grid: float) -> Iterator[Point]:
-    """Yield the place on a line, near a foot, where the grid is; a ray has it in steps from its origin."""
-    if grid <= 0.0:
-        return
-    along = (foot[0] - line.through[0]) * line.direction[0] + (foot[1] - line.through[1]) * line.direction[1]
-    if line.kind == "angle":
-        yield line.at(_multiple(along, grid))
-    elif abs(line.direction[0]) < _PARALLEL or abs(line.direction[1]) < _PARALLEL:
-        axis = 0 if abs(line.direction[1]) < _PARALLEL else 1
-        there = _multiple(foot[axis], grid)
-        place = (there, foot[1]) if axis == 0 else (foot[0], there)
-        if line.kind != "edge" or math.dist(line.foot(place), place) <= _PARALLEL:
-            yield place
 
 
 def _multiple(value: float, step: float) -> float:
