@@ -63,7 +63,6 @@ class DensityTool(Tool):
             self.chosen = self._taken
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
-        """Drag."""
         self._at = event.point
         if self._from is not None and distance(self._from, event.raw) >= 0.25 * event.reach:
             self.change = self._wanted(context, event.point)
@@ -82,7 +81,6 @@ class DensityTool(Tool):
         self.chosen = self._taken if self._taken is not None else len(features_of(context.sketch)) - 1
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
-        """Take it for a press."""
         self.press(context, event)
 
     def finish(self, context: ToolContext) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robocov.environment import Point
+from robocov.environment import ObstaclePath, Point
 from robocov_app.editor.edits.motion_path import (
     FIRST_SPEED,
     leg_at,
@@ -62,8 +62,7 @@ class MotionPathTool(Tool):
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         """Take hold of a way point, choose another obstacle, or add a way point."""
-        subject = self._subject(context)
-        path = None if subject is None else path_of(context.sketch, subject)
+        subject, path = _led(context)
         self._held = self.change = None
         if path is not None:
             self._held = way_point_at(path, event.raw, NEAR * event.reach)
@@ -73,20 +72,18 @@ class MotionPathTool(Tool):
         over = [each for each in owners_at(context.sketch, event.raw, 0.0) if _is_obstacle(each)]
         if subject is None or (over and subject not in over):
             self.chosen = None
-            if not over:
+            if over:
+                context.select(Selection.of(over[0]))
+            else:
                 context.say("click the obstacle that is to move first")
-                return
-            context.select(Selection.of(over[0]))
-            self._note(context)
-            return
-        if path is None and subject in over:
+        elif path is None and subject in over:
             context.say("now click where it goes")
-            return
-        at = None if path is None else leg_at(path, event.raw, 0.5 * event.reach)
-        point = event.point if at is not None else constrained_point(event, self._last)
-        context.change(way_point_added(context.sketch, subject, point, at, self.speed))
-        count = len(path.points) if path is not None else 1
-        self.chosen = self._held = count if at is None else at
+        else:
+            at = None if path is None else leg_at(path, event.raw, 0.5 * event.reach)
+            point = event.point if at is not None else constrained_point(event, self._last)
+            context.change(way_point_added(context.sketch, subject, point, at, self.speed))
+            count = len(path.points) if path is not None else 1
+            self.chosen = self._held = count if at is None else at
         self._note(context)
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
@@ -97,17 +94,15 @@ class MotionPathTool(Tool):
         """Drag a way point."""
         self._at = event.point
         self._note(context)
-        subject = self._subject(context)
+        subject, path = _led(context)
         if subject is None or self._held is None:
             return
-        path = path_of(context.sketch, subject)
         if path is None or self._held >= len(path.points):
             self._held = None
-            return
-        if self.change is None and distance(path.points[self._held], event.raw) < 0.25 * event.reach:
-            return
-        before = path.points[self._held - 1] if self._held else None
-        self.change = way_point_moved(context.sketch, subject, self._held, constrained_point(event, before))
+        elif self.change is not None or distance(path.points[self._held], event.raw) >= 0.25 * event.reach:
+            before = path.points[self._held - 1] if self._held else None
+            to = constrained_point(event, before)
+            self.change = way_point_moved(context.sketch, subject, self._held, to)
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
         """Leave a way point where it was dragged to."""
@@ -118,7 +113,7 @@ class MotionPathTool(Tool):
 
     def finish(self, context: ToolContext) -> bool:
         """Let the obstacle go: another one can be chosen."""
-        had = self._subject(context) is not None
+        had = _led(context)[0] is not None
         if had:
             context.select(Selection())
         self.cancel(context)
@@ -126,8 +121,7 @@ class MotionPathTool(Tool):
 
     def back(self, context: ToolContext) -> bool:
         """Take the chosen way point away, or the last one."""
-        subject = self._subject(context)
-        path = None if subject is None else path_of(context.sketch, subject)
+        subject, path = _led(context)
         if subject is None or path is None:
             return False
         last = len(path.points) - 1
@@ -138,7 +132,6 @@ class MotionPathTool(Tool):
         return True
 
     def cancel(self, context: ToolContext) -> bool:
-        """Give up what is dragged."""
         had = self._held is not None
         self._held = self.change = self.chosen = self._last = None
         self._leads = False
@@ -147,17 +140,18 @@ class MotionPathTool(Tool):
     def enter(self, context: ToolContext, text: str) -> None:
         """Give the obstacle, or the next path, another speed."""
         speed = speed_of(text)
-        subject = self._subject(context)
-        if subject is not None and path_of(context.sketch, subject) is not None:
+        subject, path = _led(context)
+        if subject is not None and path is not None:
             context.change(path_paced(context.sketch, Selection.of(subject), speed))
         self.speed = speed
 
     def preview(self, context: ToolContext) -> Preview | None:
         """Show the way points, and what the dragged or the next leg is like."""
-        subject = self._subject(context)
+        subject, path = _led(context)
         if subject is None:
             return None
-        path = path_of(self.change.sketch if self.change is not None else context.sketch, subject)
+        if self.change is not None:
+            path = path_of(self.change.sketch, subject)
         if path is None:
             return Preview(words=f"where it goes, {self.speed:g} m/s")
         words = path_words(path)
@@ -167,25 +161,24 @@ class MotionPathTool(Tool):
 
     def shape_of_cursor(self, context: ToolContext) -> str:
         """A move where a way point can be taken hold of."""
-        subject = self._subject(context)
-        path = None if subject is None else path_of(context.sketch, subject)
+        path = _led(context)[1]
         over = path is not None and way_point_at(path, self._at, 8.0 * context.pixel) is not None
         return "move" if over or self._held is not None else "cross"
 
-    def _subject(self, context: ToolContext) -> int | None:
-        """Return the obstacle that is led: the one that is selected."""
-        chosen = context.selection.within(context.sketch).without_vertices()
-        if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
-            return None
-        (key,) = chosen.items
-        return key
-
     def _note(self, context: ToolContext) -> None:
         """Note what the next way point comes after."""
-        subject = self._subject(context)
-        path = None if subject is None else path_of(context.sketch, subject)
+        subject, path = _led(context)
         self._leads = subject is not None
         self._last = None if path is None else path.points[-1]
+
+
+def _led(context: ToolContext) -> tuple[int | None, ObstaclePath | None]:
+    """Return the obstacle that is led, the one that is selected, and its path."""
+    chosen = context.selection.within(context.sketch)
+    if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
+        return None, None
+    (key,) = chosen.items
+    return key, path_of(context.sketch, key)
 
 
 def _is_obstacle(owner: int | str) -> bool:

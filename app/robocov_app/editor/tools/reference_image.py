@@ -35,13 +35,11 @@ class ReferenceImageTool(Tool):
         return bool(self._points)
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        """Begin to drag, or to click."""
         if context.sketch.background is None:
             raise MapError("there is no picture under the map: Ctrl B takes one")
         self._from = event.raw
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
-        """Drag."""
         self._at = event.raw
         background = context.sketch.background
         if self._from is None or background is None or distance(self._from, event.raw) < 0.25 * event.reach:
@@ -77,7 +75,6 @@ class ReferenceImageTool(Tool):
         return True
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Scale the picture."""
         if len(self._points) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
         a, b = self._points
@@ -86,17 +83,14 @@ class ReferenceImageTool(Tool):
         context.change(underlaid(context.sketch, laid))
 
     def back(self, context: ToolContext) -> bool:
-        """Take the last point back."""
         return bool(self._points and self._points.pop())
 
     def cancel(self, context: ToolContext) -> bool:
-        """Forget the points."""
         had = bool(self._points or self._from)
         self._points, self._from, self.moved = [], None, None
         return had
 
     def preview(self, context: ToolContext) -> Preview | None:
-        """Show the two points."""
         if not self._points:
             return None
         line = (*self._points, self._at)[:2]
