@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
@@ -138,13 +139,8 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
         at = (*path, name)
         if isinstance(given, Range):
             ranges[name] = _checked_range(known, name, given, at)
-        elif isinstance(given, Sequence) and not isinstance(given, str):
-            if not given:
-                raise ParameterError(f"{place(at)}: none, but at least one value was wanted")
-            lists[name] = [_value(known, name, value, (*at, k)) for k, value in enumerate(given)]
-            once(lists[name], at)
         else:
-            lists[name] = [_value(known, name, given, at)]
+            lists[name] = axis(given, at, partial(_value, known, name))
     samples: list[dict[str, float]] = [{}]
     if ranges:
         if sampling is None:
@@ -209,6 +205,17 @@ def _at(path: Place, check: Callable[[], T]) -> T:
         return check()
     except ParameterError as error:
         raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+
+
+def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
+    """Return what `check` makes of a value, or of each of a list of values, which differ."""
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return [check(given, path)]
+    values = [check(value, (*path, k)) for k, value in enumerate(given)]
+    if not values:
+        raise ParameterError(f"{place(path)}: none, but at least one value was wanted")
+    once(values, path)
+    return values
 
 
 def once(values: Sequence[object], path: Place) -> None:

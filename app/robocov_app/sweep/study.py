@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -24,7 +25,7 @@ from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.options import MOST_ROWS
-from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, once, whole
+from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, whole
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
@@ -89,15 +90,7 @@ def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str,
     for name, values in given.items():
         if name not in CONDITIONS:
             raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
-        several = isinstance(values, Sequence) and not isinstance(values, str)
-        path = ("conditions", name)
-        axes[name] = [
-            _value(name, value, (*path, k) if several else path)
-            for k, value in enumerate(values if several else (values,))
-        ]
-        if not axes[name]:
-            raise ParameterError(f"conditions.{name}: none, but at least one value was wanted")
-        once(axes[name], path)
+        axes[name] = axis(values, ("conditions", name), partial(_value, name))
     return axes
 
 
@@ -371,19 +364,9 @@ class Study:
                     raise type(error)(f"starts[{k}]: {error}") from None
 
     def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
-        axes: list[Sequence[TeamValue]] = []
-        for name in TEAM:
-            given = getattr(self, name)
-            several = isinstance(given, Sequence) and not isinstance(given, str)
-            path = ("team", name)
-            values = [
-                _team_value(name, value, (*path, k) if several else path)
-                for k, value in enumerate(given if several else (given,))
-            ]
-            if not values:
-                raise ParameterError(f"team.{name}: none, but at least one value was wanted")
-            once(values, path)
-            axes.append(values)
+        axes: list[Sequence[TeamValue]] = [
+            axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in TEAM
+        ]
         conditions = condition_axes(self.conditions, self.robots)
         if self.group:
             conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
