@@ -141,11 +141,7 @@ def _cost_text(what: str, time: float, cost: Costs | None) -> str:
 
 @dataclass(frozen=True)
 class PaneLayout:
-    """How the panes share a film.
-
-    `pane`, `size`: (width, height) in px, of each and of the film. `scale`: of text and lines. `header`:
-    (height, width, 3) RGB, the legend, as wide as the film.
-    """
+    """How panes share a film: sizes in px of each and of all, and the legend, as wide as the film."""
 
     columns: int
     pane: tuple[int, int]
@@ -159,8 +155,7 @@ def pane_layout(
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
-    The first moments of the records tell what the legend has to explain. `size`, (width, height) or None: of
-    the whole film; None for what suits the map, within `USUAL_SIZE`.
+    `size`, (width, height) or None: of the whole film; None for what suits the map, within `USUAL_SIZE`.
     """
     count = len(records)
     aspect = max(_aspect(record.environment) for record in records)
@@ -216,10 +211,8 @@ def side_by_side(
 ) -> Iterator[Frame]:
     """Join the frames of several films of one size into frames that show them in rows.
 
-    `films`: ends when all have ended; those that end before the others stay on their last frame. `columns`:
-    films in a row; None puts all in one, where their widths may differ. `gap`, px: width of the line between
-    two. `line`, `blank`: of that line, and of what the last row leaves free. Raises ParameterError when a
-    film has no frame.
+    Films that end before the others stay on their last frame. With `columns` None all are in one row, where
+    their widths may differ. `gap`, px, and `line` are between two; `blank` is what the last row leaves free.
     """
     columns = columns or len(films)
     current: list[Frame | None] = [None] * len(films)

@@ -51,10 +51,7 @@ class ConditionOptions:
     """Robots that join late, and when and where: --join 6@30:2.5,1; else at their start."""
 
     def conditions(self, seed: int, robots: int) -> Conditions | None:
-        """Return the conditions for a team; None where they are ideal.
-
-        Raises ParameterError when they cannot be.
-        """
+        """Return the conditions for a team, None where they are ideal; raises ParameterError."""
         if self == ConditionOptions():
             return None
         from robocov.conditions import Conditions, Failure, Join, parsed_entry
@@ -181,10 +178,7 @@ class RunOptions:
         return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 
     def made_team(self) -> Team:
-        """Return the team that the options describe.
-
-        Raises InputError when a value is out of range, or the team file cannot be read.
-        """
+        """Return the team that the options describe, or raise InputError."""
         from robocov.robots import Team
 
         said = {
@@ -231,10 +225,7 @@ class RunOptions:
 
 
 def robots_of(team: Team, robots: int, default: int, path: Path) -> int:
-    """Return how many robots a team file has; the option --robots may say the same.
-
-    Raises ParameterError when it says something else.
-    """
+    """Return how many robots a team file has; the option --robots may say the same, and nothing else."""
     if robots not in (default, len(team)):
         raise ParameterError(f"--robots: {robots}, but the team of {path} has {len(team)}")
     return len(team)

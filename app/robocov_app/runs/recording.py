@@ -33,11 +33,7 @@ def png_bytes(frame: Frame) -> bytes:
 
 
 def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
-    """Write frames as ``000000.png``, ``000001.png``, ... and hand each on once it is written.
-
-    `folder`: created when it is not there. Raises OutputError when the folder cannot be written. Frames
-    already written stay; each one is whole.
-    """
+    """Write frames as ``000000.png``, ``000001.png``, ..., and hand each on once it is written whole."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -55,13 +51,11 @@ def save_frames(folder: Path | str, frames: Iterable[Frame]) -> int:
 
 
 def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -> int:
-    """Write frames as an MP4 film (H.264, yuv420p: what browsers and slides play); return how many.
+    """Write frames of one size as an MP4 film, which browsers and slides play; return how many.
 
-    The film is made under another name in the same folder, made where it is missing, and gets its own at the
-    end: after an error or Ctrl-C there is no half film, and an older one of that name is still there.
-    Frames are of one size; H.264 wants even ones, so an odd one gets its last row or column twice. Raises
-    OutputError when the encoder is missing or fails, or the film cannot be written; ParameterError when there
-    are no frames, or frames of different sizes.
+    The film gets its name at the end: after an error or Ctrl-C there is no half film, and an older one is
+    still there. H.264 wants even sizes: an odd one gets its last row or column twice. Raises OutputError when
+    the encoder is missing or fails, or the film cannot be written; ParameterError when there are no frames.
     """
     path = Path(path)
     source = iter(frames)
@@ -126,8 +120,7 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
     """Return the encoder's command: raw RGB frames of an even size come in, an MP4 film goes to `path`.
 
-    A `streamed` film can be played up to where it has come, whatever happens to the encoder. Raises
-    OutputError when there is no encoder.
+    A `streamed` film can be played up to where it has come, whatever happens to the encoder.
     """
     flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
     return [

@@ -65,11 +65,7 @@ def simulated(spec: RunSpec, every: int, stop: Interruption, *, quiet: bool) -> 
 
 
 def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
-    """Evaluate the coverage cost along a record and sum the run up.
-
-    Whoever has stopped a long run does not want to wait for all of its cost: after Ctrl-C it is
-    evaluated at `STOPPED_SAMPLES` moments at the most.
-    """
+    """Evaluate the coverage cost along a record, after Ctrl-C at fewer moments, and sum the run up."""
     rate = COST_RATE
     if stop.requested and record.time[-1] > 0:
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
@@ -147,8 +143,7 @@ def save_pictures(
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
 
-    The others are on the same map, but for robots that failed at other places. Where all robots have
-    failed there is nothing to draw.
+    The others are on the same map, but for robots that failed at other places.
     """
     from robocov_app.figures.coverage import Moment
     from robocov_app.render.field import Field, FieldLattice

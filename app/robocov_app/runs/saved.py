@@ -18,11 +18,7 @@ from robocov.record import Record
 
 
 class ComparisonDocument(Document):
-    """The content of ``comparison.json``.
-
-    `folders`: of the runs, in that of the comparison. `runs`: their figures; none as long as the comparison
-    goes on.
-    """
+    """The content of ``comparison.json``; without `runs` as long as the comparison goes on."""
 
     folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), wanted("the name of a folder")]]
     runs: list[dict[str, Any]] = Field([])
@@ -37,11 +33,7 @@ class Saved(NamedTuple):
 
 
 class Roster(NamedTuple):
-    """Who is who in a record.
-
-    `environment`: the map without robots that failed. `numbers`, (n,) int: what people called the robots, row
-    by row. `failed`: where, by number, m.
-    """
+    """Who is who in a record: the map without robots that failed, and where these stand, m."""
 
     environment: Environment
     numbers: tuple[int, ...]

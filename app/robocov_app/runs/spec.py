@@ -112,7 +112,7 @@ class RunSpec:
     ) -> Record:
         """Simulate, and return the record of one step in `every`, and of the last.
 
-        `watch` is told each step, and ends the run by saying True.
+        Each step is told to `watch`, which ends the run by saying True.
         """
         with provided(self.source.modules if self.source else {}):
             simulation = simulation or self.simulation()

@@ -33,11 +33,7 @@ _IN_A_ROW = 20
 
 
 class Lost(NamedTuple):
-    """A worker has ended in the midst of a task.
-
-    `cause`: one line. `blamed`: whether it is certain that it was this task, and nothing else, that made the
-    worker end.
-    """
+    """A worker has ended in the midst of a task; `blamed`: certainly because of the task itself."""
 
     cause: str
     details: str
@@ -51,9 +47,8 @@ class Executor(ABC):
     """Does tasks; a context, whose end stops what is going on.
 
     A task whose worker has ended is done again. Where it is not certain that the task is to blame (another
-    one may have taken all the memory), it is done alone, with nothing else going on. When workers have ended
-    twice through it, it has failed. When workers end again and again, whatever they do, all ends. `lost`: how
-    many workers have ended in the midst of a task.
+    one may have taken all the memory), it is done alone. When workers have ended twice through it, it has
+    failed; when they end again and again, whatever they do, all ends. `lost` counts them.
     """
 
     def __init__(self) -> None:
@@ -165,11 +160,7 @@ _Event: TypeAlias = "tuple[Task, Outcome | Lost | OutputError]"
 
 
 class LocalPool(Executor):
-    """Processes on this machine, each of which does one task at a time.
-
-    A process that ends is replaced. If it was ended from outside, there may have been too little memory for
-    all of them.
-    """
+    """Processes on this machine, each of which does one task at a time; one that ends is replaced."""
 
     def __init__(self, workers: int) -> None:
         super().__init__()
@@ -304,8 +295,7 @@ _LOOK = 2.0
 class Cluster(Executor):
     """The workers of a Dask cluster; they need robocov, and no disk that is shared.
 
-    `address`: of the scheduler: ``tcp://host:8786``. Raises InputError when Dask is not installed, or nobody
-    answers at the address.
+    Raises InputError when Dask is not installed, or nobody answers at the address of the scheduler.
     """
 
     def __init__(self, address: str) -> None:
@@ -388,10 +378,7 @@ class Cluster(Executor):
 
 
 def _require_answer(address: str) -> None:
-    """Greet a scheduler as Dask's own client does, which would wait for an answer for ever.
-
-    Raises OSError, ValueError, TimeoutError when nobody answers there in time.
-    """
+    """Greet a scheduler as Dask's own client does, which would wait for an answer for ever."""
     import distributed
     from distributed import comm
 

@@ -34,10 +34,7 @@ Place: TypeAlias = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Range:
-    """A range of a gain that is to be sampled, both ends included.
-
-    `low`, `high`: in the gain's unit. `scale`: what is sampled evenly: the value, or its logarithm.
-    """
+    """Range of a gain, both ends included, sampled evenly by value or by its logarithm."""
 
     low: float
     high: float
@@ -55,11 +52,10 @@ class Range:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How ranges are sampled: all ranges of a controller together.
+    """How ranges are sampled by `scipy.stats.qmc`, scrambled: all ranges of a controller together.
 
     Controllers with the same ranges get the same samples. The first samples of a Sobol or a Halton sequence
-    stay the same when there are more of them. `method`: of `scipy.stats.qmc`, scrambled. Raises
-    ParameterError on another method, or a number out of range.
+    stay the same when there are more of them.
     """
 
     method: Method = "sobol"
@@ -95,25 +91,19 @@ Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of one controller in a study.
-
-    `choices`: one for each set of gains that is tried, with a value for every gain of the controller.
-    `ranges`: those that were sampled.
-    """
+    """The gains of one controller in a study: choices of all gains, and what was sampled."""
 
     choices: tuple[Choice, ...]
     ranges: Mapping[str, Range] = field(default_factory=dict)
 
     @classmethod
     def of(cls, kind: type[Any], wanted: Wanted, sampling: Sampling | None, path: Place = ()) -> Gains:
-        """Return what is tried of a controller.
+        """Return what is tried of a controller of a class; other gains have their defaults.
 
-        `kind`: of the controller. `wanted`: either each set of gains by itself, as dicts of name to value; or
-        one dict of name to a value, a list of values (every combination of them is tried), or a `Range`. What
-        is not given has its default. `sampling`: how ranges are sampled; for each combination of the lists,
-        the same samples. `path`: what messages call the place. Raises ParameterError on an unknown gain (with
-        the nearest name), a value out of range, a value given twice, or a range without a way to sample it;
-        the message begins with the place.
+        `wanted`: each set of gains by itself, as dicts of name to value; or one dict of name to a value, a
+        list of values (every combination of them is tried), or a `Range`. Raises ParameterError, which begins
+        with the place, on an unknown gain (with the nearest name), a value out of range, a value given twice,
+        or a range without a way to sample it.
         """
         if isinstance(wanted, Gains):
             return cls(cls.of(kind, wanted.choices, None, path).choices, wanted.ranges)
@@ -219,10 +209,7 @@ def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
 
 
 def once(values: Sequence[object], path: Place) -> None:
-    """Check that nothing is given twice.
-
-    Raises ParameterError; the message names the second place, and the first.
-    """
+    """Raise ParameterError, with both places, when something is given twice."""
     seen: dict[object, int] = {}
     for k, value in enumerate(values):
         first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)

@@ -45,11 +45,7 @@ _NAMED = 5
 
 
 class Entry(NamedTuple):
-    """What the table holds of a run that is there.
-
-    `figures`: empty where it failed. `versions`: of what it was made with; empty where that is not known.
-    `checked`: whether it has check sums: those of version 1 have none.
-    """
+    """What the table holds of a run; no figures where it failed, not `checked` in version 1."""
 
     figures: Mapping[str, float | int | None]
     error: str | None
@@ -63,12 +59,11 @@ class Damaged(Exception):  # noqa: N818 - it is handled
 
 @dataclass
 class Survey:
-    """Inventory of a study's runs: finished, failed, and still to do.
+    """Inventory of a study's runs.
 
-    `todo`: 1 for each task that is to be done, in their order. `damaged`: names of runs that are done again
-    because their files are not as they were written. `outdated`: how many runs were made with other versions
-    than those here, by how these differ. `unchecked`: runs without check sums, kept by an earlier version.
-    `failed`: runs that have failed and are not to be done again.
+    `todo` has 1 for each task that is to be done, in their order; `outdated` counts runs by how their
+    versions differ from those here; `unchecked` ones were kept by a version without check sums; `failed` ones
+    are not done again.
     """
 
     todo: bytearray = field(default_factory=bytearray)
@@ -113,11 +108,7 @@ class Ledger:
     def survey(
         self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
     ) -> Survey:
-        """Check all files of all runs; return which are to be done, and why again.
-
-        `retry_failed`: do runs again that have failed. `keep_versions`: use runs that were made with other
-        versions of robocov or what it computes with.
-        """
+        """Check all files of all runs; return which are to be done, and why again."""
         found = Survey()
         for task in tasks:
             try:
@@ -137,10 +128,7 @@ class Ledger:
         return found
 
     def _entry(self, task: Task, *, files: bool = False) -> Entry | None:
-        """Return what came of a task, None where nothing is there; with `files`, all its files are checked.
-
-        Raises Damaged.
-        """
+        """Return what came of a task, None for nothing; with `files`, check all of them."""
         folder = self._runs / task.name
         if not os.path.lexists(folder):
             return None
@@ -168,10 +156,7 @@ class Ledger:
             raise Damaged from fault
 
     def keep(self, task: Task, outcome: Outcome) -> Entry:
-        """Write the folder of a run, in the place of an earlier one, and return its entry.
-
-        Raises OutputError when it cannot be written; nothing is left of it then.
-        """
+        """Write the folder of a run, in the place of an earlier one: all of it, or nothing."""
         target = self._runs / task.name
         part = self._runs / f".{task.name}.part"
         row: dict[str, Any] = {**_HEAD, "digest": task.digest, "versions": dict(outcome.versions)}
@@ -202,10 +187,7 @@ class Ledger:
 
 
 def difference_of(versions: Mapping[str, str]) -> str:
-    """Return how versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``.
-
-    Those that are not known do not differ.
-    """
+    """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
     return ", ".join(
         f"{name} {versions[name]} instead of {version}"
         for name, version in made_with().items()
@@ -217,9 +199,9 @@ def difference_of(versions: Mapping[str, str]) -> str:
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     """Give the ledger of a sweep, for one process at a time; the folder is made where it is missing.
 
-    `study`: the content of ``study.json``; that of an earlier study is replaced, unless its tables are whole:
-    then it is replaced with them, by `Table`. Raises InputError when the folder holds something else than a
-    sweep; OutputError when it cannot be made or written to, or another process is at work in it.
+    `study` is the content of ``study.json``. That of an earlier study is replaced, but where its tables are
+    whole only with them, by `Table`. Raises InputError when the folder holds something else than a sweep;
+    OutputError when it cannot be written to, or another process is at work in it.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

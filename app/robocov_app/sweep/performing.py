@@ -58,11 +58,7 @@ def made_with() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a task.
-
-    `files`: what belongs into the run's folder. `figures`: what the table holds of the run, empty where it
-    failed. `error`: why it failed, one line. `versions`: of what it was made with.
-    """
+    """What came of a task: files of the run's folder, figures of the table, or why it failed."""
 
     files: Mapping[str, bytes]
     figures: Mapping[str, float | int | None]
@@ -150,9 +146,8 @@ _ONE_AT_A_TIME = threading.Lock()
 def _undisturbed() -> Iterator[None]:
     """Let no other thread of this process near the physics: pymunk is not made for that.
 
-    Runs come one after the other; they are Python for the most part, and threads would not make them faster.
-    What they leave behind is collected here as well: when another thread came upon it, as those of
-    a Dask worker do, it would free bodies in the midst of the next run's steps.
+    What runs leave behind is collected here as well: another thread that came upon it, as those of a Dask
+    worker do, would free bodies in the midst of the next run's steps.
     """
     with _ONE_AT_A_TIME:
         enabled = gc.isenabled()

@@ -81,11 +81,7 @@ def _group_text(group: Mapping[str, Any]) -> str:
 
 
 def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str, list[TeamValue]]:
-    """Return the values of each condition that is given.
-
-    `robots`: the sizes of teams. Raises ParameterError on an unknown name, or a value that cannot be used;
-    the message begins with its place.
-    """
+    """Return the values of each condition that is given, or raise ParameterError with the place."""
     axes: dict[str, list[TeamValue]] = {}
     for name, values in given.items():
         if name not in CONDITIONS:
@@ -95,10 +91,7 @@ def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str,
 
 
 def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
-    """Return the conditions among what a study varies; None where they are ideal.
-
-    Raises ParameterError when they cannot be for so many robots.
-    """
+    """Return the conditions among what a study varies; None where they are ideal."""
     values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
     conditions = Conditions(
         **values,
@@ -461,11 +454,8 @@ _DIGITS = 10
 class Task:
     """One run; nothing but this is needed to do it, on whatever machine.
 
-    `map`: what the study calls the map. `document`: the whole map as JSON. `source`: of a controller of one's
-    own: its file, and its author's modules that it imports. `gains`: all of them. `team`: as
-    `Team.homogeneous` takes them, None for a range without limit; and the conditions that the study gives.
-    `duration`, `dt` in s. `cost_hz`, `record_hz` in Hz. `metrics`: whether the table is to hold the metrics
-    of the end. `digest`: of all of this but where files are: tasks of one digest have one result.
+    `document` is the whole map as JSON, and `team` holds the conditions too, with None for a range without
+    limit. `digest` is of all of this but where files are: tasks of one digest have one result.
     """
 
     map: str
@@ -495,8 +485,8 @@ class Task:
 def tasks_of(study: Study) -> Iterator[Task]:
     """Yield the runs of a study in their fixed order, that of the rows of its table.
 
-    Maps are outermost; then robots, the rest of the team, starts and seeds; controllers and their gains
-    are innermost.
+    Maps are outermost; then robots, the rest of the team, starts and seeds; controllers and their gains are
+    innermost.
     """
     once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
     once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}

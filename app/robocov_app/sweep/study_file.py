@@ -163,11 +163,7 @@ def read_study(path: Path | str) -> Study:
 
 
 def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
-    """Return the study that a parsed file describes.
-
-    `folder`: where relative paths of maps and controllers begin. `where`: what messages call the file. Raises
-    InputError as `read_study`.
-    """
+    """Return the study that a parsed file describes; relative paths begin at `folder`."""
     try:
         model = StudyModel.model_validate(document)
     except ValidationError as error:

@@ -31,12 +31,7 @@ PERIOD = 10.0
 
 @dataclass
 class Count:
-    """How many runs there are, and what became of them so far.
-
-    `done`, `failed`: those of this sweep. `reused`: those that were there already. `lost`: workers that have
-    ended in the midst of a run. `waiting`: what everything waits for; empty where somebody is at work.
-    `began`, s: when it began, by the clock of `time.perf_counter`.
-    """
+    """How many runs there are, and what became of them so far."""
 
     total: int
     done: int = 0
@@ -148,12 +143,10 @@ _ERRORS = 3
 class Totals:
     """What became of the runs of a study.
 
-    `done`: runs that were done now, and well. `failed`: runs that failed, now or earlier. `reused`: runs that
-    were there already, done well. `interrupted`: whether some are left, as somebody has stopped the sweep.
-    `errors`: why the first runs failed that did so for different reasons. `damaged`: runs that were there,
-    but not as they were written, and were to be done again. `versions`: how many runs of the table were made
-    with which versions; of several the table is mixed. `table_replaced`: whether the table holds these runs;
-    the one that was there stays where this one would be shorter.
+    `failed` counts earlier ones too, `reused` those that were there already. `errors`: why the first runs
+    failed that did so for different reasons, by run. `versions`: how many runs of the table were made with
+    which. `table_replaced`: whether the table holds these runs; one that was there stays where this one would
+    be shorter.
     """
 
     done: int
@@ -308,10 +301,7 @@ def worked_off(
 
 
 class _Rows:
-    """Writes the rows of a table in the order of the tasks, whatever the order in which they are finished.
-
-    Of runs that are finished before others that come first in the table, only the names are kept.
-    """
+    """Writes the rows of a table in the order of the tasks, whatever the order in which they are finished."""
 
     def __init__(self, ledger: Ledger, table: Table, tasks: Iterable[tuple[int, Task]]) -> None:
         self._ledger, self._table, self._tasks = ledger, table, iter(tasks)
@@ -326,10 +316,7 @@ class _Rows:
         self.write()
 
     def write(self, *, whatever: bool = False) -> None:
-        """Write the next rows, up to the first run that is still to be done; or `whatever` is there.
-
-        Raises OutputError when a run that was there is not any more, or a row cannot be written.
-        """
+        """Write the next rows, up to the first run that is still to be done; or `whatever` is there."""
         while self._head is not None:
             todo, task = self._head
             if todo and task.name not in self._finished and not whatever:
@@ -352,13 +339,10 @@ class _Rows:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What a sweep would take.
+    """What a sweep would take, by one `run` of it: seconds for all that are left, bytes for all.
 
-    `left`: those that are not done yet. `axes`: how many values there are of each thing that the study
-    varies; their product is `runs` where all maps have as many starts, and all controllers as many gains.
-    `run`: name of the run that was done. `error`: why that failed. `seconds_a_run` in s. `seconds`, s: for
-    all that are left, on so many workers. `bytes`: for all runs together. `notes`: what of that which is
-    there is done again, and why.
+    `axes` says how many values there are of each thing that the study varies; `notes`, what is done again and
+    why.
     """
 
     runs: int
@@ -381,11 +365,7 @@ def rehearsed(
     retry_failed: bool = False,
     keep_versions: bool = False,
 ) -> Rehearsal:
-    """Do the first run that is left, or else the first, and write nothing.
-
-    `folder`: where runs may be that are done already. `workers`: on which the time is estimated.
-    `retry_failed`, `keep_versions`: as of a sweep.
-    """
+    """Do the first run that is left, or else the first, and write nothing."""
     survey = Survey(bytearray(b"\x01") * len(study))
     if folder is not None:
         ledger = Ledger(folder)

@@ -134,10 +134,8 @@ class Table:
     Both files are written aside. When the context ends well they replace those of an earlier sweep, and
     ``study.json`` with them; but those of a sweep that is not `complete` replace none with more rows. Where
     there is no ``results.parquet`` yet, ``results.csv`` appears as soon as it is no shorter than the one that
-    is there, and grows row by row. `study`: the content of ``study.json`` to which the rows belong; None: the
-    file stays as it is. `complete`: whether all rows are there that there will be. `replaced`: whether the
-    files are those of these rows; known when the context has ended. Raises OutputError when something cannot
-    be written; no half of a row is left then, and no other row is taken.
+    is there, and grows row by row. `replaced` says whether the files are those of these rows. When something
+    cannot be written no half of a row is left, and no other row is taken.
     """
 
     def __init__(self, folder: Path, columns: Sequence[Column], study: bytes | None = None) -> None:
@@ -255,10 +253,7 @@ def _told(path: Path) -> Iterator[None]:
 
 
 def _former_rows(folder: Path) -> tuple[int, bool]:
-    """Return how many rows an earlier table has, and whether it may be replaced by one that grows.
-
-    Raises OutputError when something else than a file has its name.
-    """
+    """Return how many rows an earlier table has, and whether it may be replaced by one that grows."""
     for name in (CSV, PARQUET):
         writable(folder / name)
     with suppress(OSError), (folder / CSV).open("rb") as file:

@@ -47,10 +47,7 @@ def _choices(text: str) -> str:
 
 
 def parsed(kind: type[T], command: str, words: list[str]) -> T:
-    """Return the dataclass of options that `words` give.
-
-    Raises InputError when the words do not fit the options: one line; SystemExit after help was printed.
-    """
+    """Return the options that `words` give; raises InputError, or SystemExit after help."""
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -64,10 +61,7 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
 
 
 def one_line(boxed: str) -> str:
-    """Return the first paragraph of a boxed complaint as one line, with the suggestion where there is one.
-
-    The box is drawn with lines or, where the terminal has none, with dashes.
-    """
+    """Return the first paragraph of a boxed complaint as one line, with the suggestion where there is one."""
     paragraphs: list[list[str]] = []
     for line in boxed.splitlines():
         words = line.strip("│| \t")
@@ -88,10 +82,7 @@ def one_line(boxed: str) -> str:
 
 
 def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height from a text like ``1280x720``.
-
-    Raises ParameterError when it is none, or beyond the limits.
-    """
+    """Return width and height from a text like ``1280x720``; raises ParameterError."""
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
         raise ParameterError(

@@ -14,10 +14,7 @@ PATIENCE = 1.0
 
 @contextmanager
 def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show how far `label` is; the value is a function to be called with the number done so far.
-
-    `label`: what is being done: "simulating". `quiet`: show nothing.
-    """
+    """Show how far `label` is; the value is a function to be called with the number done so far."""
     if quiet:
         yield lambda done: None
     elif sys.stderr.isatty():

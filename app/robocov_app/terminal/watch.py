@@ -25,8 +25,7 @@ def changes(
     """Yield the files that were written, removed or replaced since the last time, at first all of them.
 
     It never ends. Files need not be there yet. What counts is what a path leads to, so that a file which an
-    editor replaces by renaming another, and one behind a link, are seen as well. `sleep`: waits for so many
-    seconds.
+    editor replaces by renaming another, and one behind a link, are seen as well.
     """
     seen = {path: _state(path) for path in paths}
     yield tuple(paths)
