@@ -19,29 +19,14 @@ KIND = "robocov-draft"
 
 @dataclass(frozen=True)
 class Autosave:
-    """A map that an editor left behind.
+    """A map that an editor left behind."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where it lies.
-    path : Path or None
-        The file that it belongs to; None if it never had one.
-    name : str
-        The map's name.
-    when : datetime
-        When it was kept, in local time.
-    obstacles : int
-    disk : OnDisk or None
-        What the file was like when it was read or written last.
-    """
-
-    folder: Path
-    path: Path | None
-    name: str
-    when: datetime
+    folder: Path  # where it lies
+    path: Path | None  # the file that it belongs to; None if it never had one
+    name: str  # the map's name
+    when: datetime  # when it was kept, in local time
     obstacles: int
-    disk: OnDisk | None
+    disk: OnDisk | None  # what the file was like when it was read or written last
 
     def sketch(self) -> Sketch:
         """Return the map; MapError when it cannot be read any more."""

@@ -22,31 +22,17 @@ class Background:
     """A picture that lies under the map.
 
     Pixels count from the picture's upper left corner, x to the right and y down, as pictures have them.
-
-    Attributes
-    ----------
-    path : str
-        The file, as it stands in the map: relative to the map's folder, or absolute.
-    pixels : (width, height)
-    scale : float, m
-        Side of a pixel.
-    corner : (x, y), m
-        Where the picture's lower left corner lies.
-    turn : float, degrees
-        How far it is turned about that corner, counter-clockwise.
-    opacity : float
-        From 0, not to be seen, to 1.
-    shown : bool
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
 
+    # the file, as it stands in the map: relative to the map's folder, or absolute
     path: Annotated[str, Field(min_length=1)]
-    pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
-    scale: Annotated[float, Field(gt=0.0)] = 0.01
-    corner: tuple[float, float] = (0.0, 0.0)
-    turn: float = 0.0
-    opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]  # (width, height)
+    scale: Annotated[float, Field(gt=0.0)] = 0.01  # m; side of a pixel
+    corner: tuple[float, float] = (0.0, 0.0)  # m; where the picture's lower left corner lies
+    turn: float = 0.0  # degrees; how far it is turned about that corner, counter-clockwise
+    opacity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5  # from 0, not to be seen, to 1
     shown: bool = True
 
     def place_of(self, pixel: Point) -> Point:

@@ -22,21 +22,11 @@ class ChangedError(OutputError):
 
 @dataclass(frozen=True)
 class OnDisk:
-    """A file as it was when it was read or written.
+    """A file as it was when it was read or written."""
 
-    Attributes
-    ----------
-    path : Path
-        Absolute.
-    digest : str
-        SHA-256 of its content.
-    stamp : (size, time of change in ns)
-        What can be asked of the file quickly.
-    """
-
-    path: Path
-    digest: str
-    stamp: tuple[int, int]
+    path: Path  # absolute
+    digest: str  # SHA-256 of its content
+    stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
 
 
 def opened(path: Path) -> tuple[Sketch, OnDisk]:

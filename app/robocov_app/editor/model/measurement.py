@@ -31,39 +31,21 @@ _MOST_GAPS = 20
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a sketch is like, for robots of some radius.
+    """What a sketch is like, for robots of some radius."""
 
-    Attributes
-    ----------
-    free_area : float, m²
-    components : tuple of float, m²
-        Areas of the connected parts of the free space, the largest first.
-    reached : tuple of float, m²
-        Areas that a robot can sweep without passing a gap that is too narrow, the largest first: more than
-        one means that some places are out of reach from others.
-    gap : Gap or None
-        The narrowest passage; None where there is none.
-    impassable : MultiPolygon
-        Free space that keeps such robots out: at passages that are too narrow, the largest disc that passes;
-        all that no robot touches from anywhere, but for corners that are merely too sharp for a disc.
-    sealed : MultiPolygon
-        Free space where robots fit, but that is cut off from the largest part for them.
-    vertices : int
-        Of boundary, walls, polygons and their holes.
-    problems : tuple of Problem
-    radius : float, m
-        Of the robots that were asked about.
-    """
-
-    free_area: float
-    components: tuple[float, ...]
+    free_area: float  # m²
+    components: tuple[float, ...]  # m²; areas of the connected parts of the free space, the largest first
+    # m²; areas that a robot can sweep without passing a gap that is too narrow, the largest first: more than
+    # one means that some places are out of reach from others
     reached: tuple[float, ...]
-    gap: Gap | None
+    gap: Gap | None  # the narrowest passage; None where there is none
+    # free space that keeps such robots out: at passages that are too narrow, the largest disc that passes;
+    # all that no robot touches from anywhere, but for corners that are merely too sharp for a disc
     impassable: MultiPolygon
-    sealed: MultiPolygon
-    vertices: int
+    sealed: MultiPolygon  # free space where robots fit, but that is cut off from the largest part for them
+    vertices: int  # of boundary, walls, polygons and their holes
     problems: tuple[Problem, ...]
-    radius: float
+    radius: float  # m; of the robots that were asked about
 
 
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:

@@ -11,23 +11,12 @@ from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, W
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is a sketch like?
+    """What is a sketch like?"""
 
-    Attributes
-    ----------
-    rest : Sketch
-        Without its obstacles.
-    order : tuple of int
-        The keys of its obstacles.
-    changed : tuple of Item
-        Those that differ from what the process knows by the same key.
-    radius : float, m
-    """
-
-    rest: Sketch
-    order: tuple[int, ...]
-    changed: tuple[Item, ...]
-    radius: float
+    rest: Sketch  # without its obstacles
+    order: tuple[int, ...]  # the keys of its obstacles
+    changed: tuple[Item, ...]  # those that differ from what the process knows by the same key
+    radius: float  # m
 
 
 class MeasurementWire(Wire):

@@ -21,20 +21,12 @@ from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """A point of something that can be dragged.
+    """A point of something that can be dragged."""
 
-    Attributes
-    ----------
-    of : key of an obstacle, `BOUNDARY`, or name of a start
-    ring : int
-        0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon.
-    index : int
-        In the ring. Of a circle, and of a start that is a disc: 0 the centre, and 1 to 4 its rim in the
-        east, north, west and south.
-    """
-
-    of: Owner
-    ring: int
+    of: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
+    ring: int  # 0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon
+    # in the ring. Of a circle, and of a start that is a disc: 0 the centre, and 1 to 4 its rim in the east,
+    # north, west and south
     index: int
 
 

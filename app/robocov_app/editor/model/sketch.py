@@ -43,28 +43,15 @@ Owner: TypeAlias = int | str
 
 @dataclass(frozen=True)
 class Item:
-    """An obstacle of a sketch.
+    """An obstacle of a sketch."""
 
-    Attributes
-    ----------
-    key : int
-        Who it is, whatever it looks like: stays the same through every edit. Not in the file.
-    shape : Obstacle
-        As `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners.
-    note : str
-        What people wrote about it.
-    group : str
-        The name of the group that it is in; empty for none.
-    locked, hidden : bool
-        Not to be changed by the mouse, or not shown in the editor either; robots meet it all the same.
-    """
-
-    key: int
+    key: int  # who it is, whatever it looks like: stays the same through every edit; not in the file
+    # as `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners
     shape: Obstacle
-    note: str = ""
-    group: str = ""
-    locked: bool = False
-    hidden: bool = False
+    note: str = ""  # what people wrote about it
+    group: str = ""  # the name of the group that it is in; empty for none
+    locked: bool = False  # not to be taken by the mouse
+    hidden: bool = False  # not shown in the editor either; robots meet it all the same
 
     @cached_property
     def geometry(self) -> BaseGeometry:
@@ -84,34 +71,18 @@ class Item:
 
 @dataclass(frozen=True)
 class Sketch:
-    """A map in the making. Immutable; equal when the content is equal, the keys of obstacles included.
-
-    Attributes
-    ----------
-    name, description : str
-    boundary : ring of (x, y), m, or None
-    obstacles : tuple of Item
-        From the bottom to the top.
-    starts : tuple of (name, StartSpec)
-        The first is the default.
-    background : Background or None
-    extra : dict
-        Free keys of the file, without what the editor keeps there itself.
-    schema : str or None
-        The file's ``$schema``.
-    density : Density or None
-        How much each place counts; pictures are read when the map is.
-    """
+    """A map in the making. Immutable; equal when the content is equal, the keys of obstacles included."""
 
     name: str = "Untitled"
     description: str = ""
-    boundary: Ring | None = None
-    obstacles: tuple[Item, ...] = ()
-    starts: tuple[tuple[str, StartSpec], ...] = ()
+    boundary: Ring | None = None  # m
+    obstacles: tuple[Item, ...] = ()  # from the bottom to the top
+    starts: tuple[tuple[str, StartSpec], ...] = ()  # the first is the default
     background: Background | None = None
+    # free keys of the file, without what the editor keeps there itself
     extra: Mapping[str, Any] = field(default_factory=dict)
-    schema: str | None = None
-    density: Density | None = None
+    schema: str | None = None  # the file's ``$schema``
+    density: Density | None = None  # how much each place counts; pictures are read when the map is
 
     def __hash__(self) -> int:
         return hash((self.name, self.boundary, self.obstacles))

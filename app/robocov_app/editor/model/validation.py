@@ -61,25 +61,13 @@ _MAP_PLACE = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Something that is wrong, or may be.
+    """Something that is wrong, or may be."""
 
-    Attributes
-    ----------
-    words : str
-        A sentence for people.
-    where : shapely geometry or None
-        The place: a point, an edge, an area; None where it is nowhere, such as a missing boundary.
-    of : Owner or None
-        The key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole.
-    grave : bool
-        The map cannot run so; else it is a warning.
-    kind : str
-    """
-
-    words: str
+    words: str  # a sentence for people
+    # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
     where: BaseGeometry | None
-    of: Owner | None
-    grave: bool
+    of: Owner | None  # the key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole
+    grave: bool  # the map cannot run so; else it is a warning
     kind: Kind = "other"
 
 

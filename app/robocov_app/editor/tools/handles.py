@@ -31,23 +31,12 @@ MOST_VERTICES = 4000
 
 @dataclass(frozen=True)
 class Handle:
-    """Something that can be taken hold of.
+    """Something that can be taken hold of."""
 
-    Attributes
-    ----------
-    kind : str
-        ``vertex``, ``scale`` or ``turn``.
-    at : (x, y), m
-        Where it is shown.
-    vertex : Vertex or None
-    side : (x, y)
-        Of a handle that scales: -1, 0 or 1 along each axis.
-    """
-
-    kind: Kind
-    at: Point
+    kind: Kind  # ``vertex``, ``scale`` or ``turn``
+    at: Point  # m; where it is shown
     vertex: Vertex | None = None
-    side: tuple[int, int] = (0, 0)
+    side: tuple[int, int] = (0, 0)  # (x, y); of a handle that scales: -1, 0 or 1 along each axis
 
 
 def handled(selection: Selection) -> tuple[Owner, ...]:

@@ -37,22 +37,11 @@ _PARALLEL = 1e-9
 
 @dataclass(frozen=True)
 class Guide:
-    """Why a point snapped: what a window shows of it.
-
-    Attributes
-    ----------
-    kind : str
-        ``vertex``, ``middle`` (of an edge), ``centre`` (of a circle), ``crossing`` (of two edges), ``edge``,
-        ``angle``, ``aligned``, ``grid``.
-    line : points, m
-        A line to be shown, from where it comes to where the point is; a single point where a mark is enough.
-    words : str
-        Such as "vertex", "45°", "in line".
-    """
+    """Why a point snapped: what a window shows of it."""
 
     kind: Kind
-    line: tuple[Point, ...]
-    words: str
+    line: tuple[Point, ...]  # m; from where it comes to the point; a single point where a mark is enough
+    words: str  # such as "vertex", "45°", "in line"
 
 
 @dataclass(frozen=True)
@@ -65,24 +54,12 @@ class Snap:
 
 @dataclass(frozen=True)
 class Snapping:
-    """What to snap to.
+    """What to snap to."""
 
-    Attributes
-    ----------
-    reach : float, m
-        Nothing moves farther; a window gives what some pixels are.
-    grid : float, m
-        Spacing of the grid.
-    angle : float, degrees
-        Directions from the point before, counted from the x axis.
-    to : frozenset of str
-        Kinds of what is snapped to; empty for nothing.
-    """
-
-    reach: float
-    grid: float = 0.1
-    angle: float = 15.0
-    to: frozenset[Kind] = KINDS
+    reach: float  # m; nothing moves farther; a window gives what some pixels are
+    grid: float = 0.1  # m; spacing of the grid
+    angle: float = 15.0  # degrees; directions from the point before, counted from the x axis
+    to: frozenset[Kind] = KINDS  # kinds of what is snapped to; empty for nothing
 
 
 @dataclass(frozen=True)

@@ -23,21 +23,11 @@ ANGLE = 15.0
 
 @dataclass(frozen=True)
 class PointerEvent:
-    """Where the mouse points, and what is held down with it.
+    """Where the mouse points, and what is held down with it."""
 
-    Attributes
-    ----------
-    point : (x, y), m
-        After snapping.
-    raw : (x, y), m
-    reach : float, m
-        So many metres a finger is wide.
-    shift, alt, ctrl : bool
-    """
-
-    point: Point
-    raw: Point
-    reach: float
+    point: Point  # m; after snapping
+    raw: Point  # m
+    reach: float  # m; so many metres a finger is wide
     shift: bool = False
     alt: bool = False
     ctrl: bool = False
@@ -45,45 +35,19 @@ class PointerEvent:
 
 @dataclass(frozen=True)
 class Preview:
-    """What a tool shows of what it is about to do.
+    """What a tool shows of what it is about to do."""
 
-    Attributes
-    ----------
-    line : points, m
-        Drawn as a line with a mark at each point.
-    closed : bool
-        Whether it goes back to its first point.
-    lengths : bool
-        Whether each edge tells its length.
-    shapes : tuple of obstacles
-        Drawn as they would be.
-    start : StartSpec or None
-        Drawn as it would be.
-    box : two opposite corners, m, or None
-        What is being selected.
-    touched : bool
-        The box takes all that it touches, not only what lies in it.
-    words : str
-        Beside the cursor.
-    rings : tuple of rings, m
-        Drawn as outlines.
-    dots : tuple of points, m
-        Drawn as marks.
-    chosen : int or None
-        Which of these stands out.
-    """
-
-    line: tuple[Point, ...] = ()
-    closed: bool = False
-    lengths: bool = False
-    shapes: tuple[Obstacle, ...] = ()
-    start: StartSpec | None = None
-    box: tuple[Point, Point] | None = None
-    touched: bool = False
-    words: str = ""
-    rings: tuple[Ring, ...] = ()
-    dots: tuple[Point, ...] = ()
-    chosen: int | None = None
+    line: tuple[Point, ...] = ()  # m, points; drawn as a line with a mark at each point
+    closed: bool = False  # whether it goes back to its first point
+    lengths: bool = False  # whether each edge tells its length
+    shapes: tuple[Obstacle, ...] = ()  # drawn as they would be
+    start: StartSpec | None = None  # drawn as it would be
+    box: tuple[Point, Point] | None = None  # two opposite corners; what is being selected
+    touched: bool = False  # the box takes all that it touches, not only what lies in it
+    words: str = ""  # beside the cursor
+    rings: tuple[Ring, ...] = ()  # m; drawn as outlines
+    dots: tuple[Point, ...] = ()  # m; drawn as marks
+    chosen: int | None = None  # which of these stands out
 
 
 class ToolContext(Protocol):
