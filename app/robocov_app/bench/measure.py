@@ -67,11 +67,10 @@ class Row:
 
 @dataclass
 class InTurn:
-    """The median times of calls that are made in turn.
+    """Median times of calls that are made in turn, each round after an untimed call of `before`.
 
-    The moods of a shared machine then fall on all alike, and the ratio of two medians holds although
-    neither time does. Garbage is not collected meanwhile. `before` is called before every round; it takes no
-    time.
+    The moods of a shared machine fall on all alike: the ratio of two medians holds although neither time
+    does.
     """
 
     calls: Mapping[str, Call]
@@ -80,10 +79,7 @@ class InTurn:
     taken: dict[str, list[float]] = field(default_factory=dict)
 
     def rounds(self, count: int, seconds: float = 0.0) -> dict[str, float]:
-        """Return the medians of at least `count` rounds, and as many more as begin within `seconds`.
-
-        One round that does not count comes first.
-        """
+        """Return the medians of at least `count` rounds and of `seconds`, after one that does not count."""
         self.taken = {name: [] for name in self.calls}
         collecting = gc.isenabled()
         gc.collect()

@@ -181,10 +181,7 @@ def _path(name: str) -> Path:
 
 
 def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report, with what was otherwise in a former one.
-
-    `former`: of the same map before it was changed; None for none.
-    """
+    """Yield the lines of a report, with what was otherwise in one before the map was changed."""
     rows, was = _rows(report), {} if former is None else _rows(former)
     told = [(title, _changed(value, was.get(title), former)) for title, value in rows.items()]
     told += [(title, f"none, was {value}") for title, value in was.items() if title not in rows]

@@ -108,10 +108,7 @@ def command(options: Arguments) -> None:
 
 
 def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
-    """Return the speeds of so many robots, (n,) m/s, from one for all or one for each; None for none.
-
-    Raises ParameterError when they are neither, or not positive.
-    """
+    """Return the speeds of so many robots, (n,) m/s, from one for all or one for each; None for none."""
     if not given:
         return None
     if len(given) not in (1, robots):
@@ -125,10 +122,7 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
 
 
 def read_positions(path: Path) -> Array:
-    """Return the positions in a JSON file, (n, 2) m.
-
-    Raises InputError when it is not a list of [x, y]; the message names file, place and value.
-    """
+    """Return the positions in a JSON file, (n, 2) m, or raise InputError: file, place and value."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:

@@ -85,10 +85,7 @@ def command(options: Arguments) -> int:
 
 
 def map_path(name: str) -> Path:
-    """Return the file that is meant: a path, or that of a bundled map.
-
-    Raises MapError for a name that is neither.
-    """
+    """Return the file that is meant: a path, or that of a bundled map; raises MapError."""
     from robocov.mapfile import bundled_maps, map_file
 
     path = Path(name)

@@ -68,10 +68,7 @@ class Arguments:
 
 
 class _Gap(NamedTuple):
-    """How far the end of a run is above the best.
-
-    `mean_distance` in m. `gap`: None where the run covers other components than the best.
-    """
+    """How far the end of a run is above the best; None where it covers other components."""
 
     name: str
     mean_distance: float

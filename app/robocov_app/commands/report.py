@@ -102,11 +102,7 @@ def _with_references(result: Result, options: Arguments) -> Result:
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
-    """Make sure, before any work is done, that a page may be written there.
-
-    Raises InputError when there is a file that is no report, and it is not to be overwritten; OutputError
-    when there is no such folder, or something else than a file in its place.
-    """
+    """Raise InputError or OutputError, before any work is done, where no page may be written."""
     writable(target)
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")

@@ -165,27 +165,13 @@ Place: TypeAlias = "tuple[SharedSimulation, int]"
 
 
 class Episode:
-    """A team in one map, of which `cost` is the coverage cost, from one start.
+    """A team in one map, of which `cost` is the coverage cost, from the start of a run.
 
-    `start` and `seed` say where the positions, (n, 2) m, came from, for the record; `place` is where the team
-    is moved together with others.
-
-    Attributes
-    ----------
-    simulation, cost, task, team
-    working : (n,) bool
-        Which robots are there and have not failed.
-    result, initial : CoverageResult
-        The coverage cost of the robots that work, when it was last evaluated and at the beginning.
-    reference : float, m
-        The unit of rewards.
-    trail : list of (n, 2) m
-        The positions at each decision so far, from the start on.
-    shared : SharedSimulation or None
-        In which the team is moved together with others.
-
-    Raises StartError when a robot would start in a wall or in another robot; ParameterError when the lattice
-    of the cost is too coarse for the map.
+    `place` is where the team is moved together with others, which is its `shared` simulation then. `working`,
+    (n,), are the robots that are there and have not failed; `result` and `initial` the coverage cost of these
+    when it was last evaluated and at the beginning; `reference`, m, the unit of rewards; `trail` the
+    positions, (n, 2) m, at each decision so far. Raises StartError when a robot would start in a wall or in
+    another robot; ParameterError when the lattice of the cost is too coarse for the map.
     """
 
     def __init__(
@@ -281,10 +267,7 @@ class Episode:
         return since >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 
     def moved(self, contact: Array, rewarded: bool, result: CoverageResult | None = None) -> Outcome:
-        """Return what came of an action that has been held, with so much contact, (n,) s.
-
-        `result` is the coverage cost now, where it is known already.
-        """
+        """Return what came of an action that has been held, with so much contact, (n,) s."""
         self.trail.append(self.positions)
         gained = self._gained(rewarded, result) / self.reference
         return Outcome(np.asarray(gained - self.task.contact_penalty * contact), contact)
@@ -318,10 +301,7 @@ class Episode:
         return gained
 
     def record(self) -> Record:
-        """Return the episode so far as a record, with the forces that the actions gave; none at its end.
-
-        Raises ParameterError when the task does not say `recording`.
-        """
+        """Return the episode so far as a record, without forces at its end; the task says `recording`."""
         if not self.task.recording:
             raise ParameterError("record: a task with recording=True was wanted")
         recorder = self._spec.recorder(self.simulation.controller)
@@ -361,10 +341,7 @@ def _touching(simulation: Simulation, each: int) -> BoolArray:
 
 
 def checked_actions(actions: Any, count: int) -> Array:
-    """Return the actions of so many robots, (count, 2).
-
-    Raises ParameterError when they are not finite numbers of that shape; the message names the robot.
-    """
+    """Return the actions of so many robots, (count, 2), or raise ParameterError that names the robot."""
     array = np.asarray(actions, dtype=np.float64)
     if array.shape != (count, 2):
         raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")

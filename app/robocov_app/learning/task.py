@@ -171,10 +171,7 @@ class GeneratedMaps:
 
 
 class Scenarios:
-    """Draws maps, and keeps the coverage costs of some, on lattices of so many cells a side.
-
-    Raises InputError when a map cannot be read, or something is no map at all.
-    """
+    """Draws maps, and keeps the coverage costs of some; raises InputError when one cannot be read."""
 
     def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
         several = isinstance(maps, Sequence) and not isinstance(maps, str)
@@ -209,10 +206,7 @@ class Scenarios:
 
 
 def map_of(given: object, seed: int) -> Environment:
-    """Return a map: itself, that of a name or path, or what somebody's function makes of the seed.
-
-    Raises InputError when there is none, or a function gives something else.
-    """
+    """Return a map: itself, that of a name or path, or what somebody's function makes of the seed."""
     source = _source(given, "map")
     if isinstance(source, Environment):
         return source
@@ -353,11 +347,7 @@ class CoverageTask:
 
 
 def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> CoverageTask:
-    """Return a task with some of its attributes changed; None is the usual one.
-
-    Raises ParameterError when there is no attribute of that name, with the nearest one, or a value is out of
-    range.
-    """
+    """Return a task, by default the usual one, with some of its attributes changed; raises ParameterError."""
     known = [each.name for each in fields(CoverageTask)]
     for name in changes:
         if name not in known:
