@@ -30,8 +30,7 @@ TRACEBACK = "ROBOCOV_TRACEBACK"
 _COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "bench", "replay", "cost", "optimum"}
 """Commands that call kernels, see `robocov.compiled`."""
 
-_LONGEST = 1000
-"""Characters of an error that are told."""
+_LONGEST = 1000  # characters of an error that are told
 
 COMMANDS = {
     # name: (module, one line)

@@ -26,23 +26,15 @@ if TYPE_CHECKING:
     from robocov.metrics import CostHistory
     from robocov.record import Record
 
-COST_LATTICE = 64
-"""Lattice of the cost that is shown with a run in a notebook."""
-
-COST_SAMPLES = 120
-"""At so many moments of the run it is evaluated, at the most."""
+COST_LATTICE = 64  # lattice of the cost that is shown with a run in a notebook
+COST_SAMPLES = 120  # at so many moments of the run it is evaluated, at the most
 
 COST_VERTICES = 2500
 """Vertices of the free space up to which the cost is shown: beyond, notebooks would wait for seconds."""
 
-_MAP_SIZE = 640.0, 420.0
-"""Largest width and height of a map in a notebook, in pixels."""
-
-_REPLAY_SIZE = 760.0, 520.0
-"""The same of the map of a replay; the whole is not narrower than its controls."""
-
-_CONTROLS = 520.0
-"""Width at which the controls of a replay are beside each other, in pixels."""
+_MAP_SIZE = 640.0, 420.0  # largest width and height of a map in a notebook, in pixels
+_REPLAY_SIZE = 760.0, 520.0  # the same of the map of a replay; the whole is not narrower than its controls
+_CONTROLS = 520.0  # width at which the controls of a replay are beside each other, in pixels
 
 _MAP_CSS = """
 .robocov-map { margin: 0; padding: 12px; box-sizing: border-box; border-radius: 6px;

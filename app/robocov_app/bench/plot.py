@@ -22,8 +22,7 @@ WIDTH = 1100
 ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90
 """Pixels: for the title, for a line, for its words, for its value."""
 
-GAP = 66
-"""Pixels between what belongs to one part and the next, for its heading."""
+GAP = 66  # pixels between what belongs to one part and the next, for its heading
 
 HEADINGS = {
     "step": "Simulated step", "maps": "Exact coverage cost on maps",

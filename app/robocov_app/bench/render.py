@@ -23,8 +23,7 @@ from robocov_app.runs.recording import png_bytes, save_film
 
 SIZE = (1280, 720)
 
-FRAME_GOALS = {50: 4e-3}
-"""Wanted seconds for a frame, by number of robots."""
+FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots
 
 
 def cases(*, quick: bool = False) -> list[Case]:

@@ -24,11 +24,8 @@ BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}
 TOGETHER, TOGETHER_GOAL = 64, 5.0
 """Runs of six robots that are moved on together, and the wanted multiple of bare physics for each."""
 
-BARE = "bare Space.step"
-"""The physics engine alone: the same bodies in an empty space."""
-
-WARM_UP = 120
-"""Steps before the first that counts: two seconds, by when the team is on its way."""
+BARE = "bare Space.step"  # the physics engine alone: the same bodies in an empty space
+WARM_UP = 120  # steps before the first that counts: two seconds, by when the team is on its way
 
 
 def cases(*, quick: bool = False) -> list[Case]:

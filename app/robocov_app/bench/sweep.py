@@ -15,8 +15,7 @@ from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
-BEFORE = 6.0
-"""See `Row.before`."""
+BEFORE = 6.0  # see `Row.before`
 
 MAPS, CONTROLLERS, DURATION, WORKERS = ("rooms", "museum", "campus"), ("rapf", "lloyd"), 20.0, 2
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-_LISTED = 5
-"""Components whose areas are told."""
+_LISTED = 5  # components whose areas are told
 
 
 @dataclass

@@ -24,8 +24,7 @@ Job: TypeAlias = tuple[str, Callable[[], Environment]]
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
 
-MOST = 10_000
-"""Maps that are generated in one call at most."""
+MOST = 10_000  # maps that are generated in one call at most
 
 _SIDE = 10.0
 

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 _ROBOTS = 6
 
-_WITHIN = 0.001, 0.005, 0.02
-"""Parts of the best within which restarts are counted."""
+_WITHIN = 0.001, 0.005, 0.02  # parts of the best within which restarts are counted
 
 
 @dataclass

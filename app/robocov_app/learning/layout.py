@@ -20,8 +20,7 @@ from robocov.robots import Team
 Rows: TypeAlias = NDArray[np.float32]
 """(n, size): one row for each robot."""
 
-MOST_NEIGHBOURS = 1000
-"""Most neighbours that a row has room for."""
+MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from robocov_app.learning.task import Action, actions_of, checked_action, drivin
 Policy: TypeAlias = "Callable[[NDArray[np.float32]], Any]"
 """From an observation, (size,), to an action, (2,)."""
 
-_SOON = 5e-7
-"""Seconds that sums of control periods may miss."""
+_SOON = 5e-7  # seconds that sums of control periods may miss
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,7 @@ Action: TypeAlias = Literal["force", "velocity"]
 
 ACTIONS: tuple[Action, ...] = ("force", "velocity")
 
-FOLLOWING = 0.1
-"""Time constant in seconds with which a robot follows a velocity that it is told."""
+FOLLOWING = 0.1  # time constant in seconds with which a robot follows a velocity that it is told
 
 
 def checked_action(action: str) -> Action:
@@ -130,11 +129,9 @@ def _slope(result: CoverageResult) -> Array:
 MapSource: TypeAlias = "str | Path | Environment | Callable[[int], Environment]"
 """A map, its name or path, or what makes one of a seed."""
 
-SEEDS = 2**31
-"""A maker of maps is given a seed below this."""
+SEEDS = 2**31  # a maker of maps is given a seed below this
 
-_KEPT = 64
-"""Maps with their costs that are kept at most."""
+_KEPT = 64  # maps with their costs that are kept at most
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ _HEAD = {"format": "robocov-comparison", "version": 1}
 
 _FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
 
-_TIMED = ("mean_time_s",)
-"""Where robots are not equally fast."""
+_TIMED = ("mean_time_s",)  # where robots are not equally fast
 
 
 def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -13,11 +13,8 @@ from robocov.mapfile.check import MANY_VERTICES, vertex_count
 from robocov.robots import DEFAULT_RADIUS, Team
 from robocov_app.terminal.progress import late_progress
 
-PICTURE_LATTICE = 256
-"""Coarsest lattice for maps of distances: its cells are to be narrower than walls."""
-
-FILM_LATTICE = 128
-"""The same for films, of which every frame takes its time."""
+PICTURE_LATTICE = 256  # coarsest lattice for maps of distances: its cells are to be narrower than walls
+FILM_LATTICE = 128  # the same for films, of which every frame takes its time
 
 
 def built_cost(

@@ -32,20 +32,15 @@ from robocov_app.runs.run import Run
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
 
-USUAL_SIZE = (1920, 1080)
-"""Pixels that a film of several panes has at most, where no size is asked for."""
+USUAL_SIZE = (1920, 1080)  # pixels that a film of several panes has at most, where no size is asked for
+GAP = 2  # pixels of the line between two panes
 
-GAP = 2
-"""Pixels of the line between two panes."""
-
-_NARROWEST = 360
-"""Least width in pixels of a pane at scale 1: its caption fits."""
+_NARROWEST = 360  # least width in pixels of a pane at scale 1: its caption fits
 
 FILM_SCALE = 1.3
 """How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
 
-FILM_HOLD = 1.0
-"""Seconds for which a film stays on its last moment."""
+FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
 Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
 """Times, s, and mean distances, m; and mean times, s, where robots are not equally fast."""

@@ -20,11 +20,8 @@ if TYPE_CHECKING:
     from robocov.robots import Team
     from robocov_app.runs.spec import RunSpec
 
-MOST_ROWS = 2e7
-"""Largest record, in moments times robots: about 2 GB."""
-
-USUAL_ROWS = 4e6
-"""Largest record where its rate is left open: about 320 MB."""
+MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
+USUAL_ROWS = 4e6  # largest record where its rate is left open: about 320 MB
 
 
 @dataclass

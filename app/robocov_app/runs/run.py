@@ -28,11 +28,8 @@ if TYPE_CHECKING:
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
 
-STOPPED_SAMPLES = 200
-"""Samples of the coverage cost of a run that was stopped."""
-
-COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
-"""The header of ``cost.csv``."""
+STOPPED_SAMPLES = 200  # samples of the coverage cost of a run that was stopped
+COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"  # the header of ``cost.csv``
 
 
 @dataclass(frozen=True, eq=False)

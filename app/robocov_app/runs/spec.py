@@ -16,8 +16,7 @@ from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, Simulation
 
-COST_RATE = 10.0
-"""Samples of the coverage cost per simulated second."""
+COST_RATE = 10.0  # samples of the coverage cost per simulated second
 
 
 @dataclass(frozen=True, eq=False)

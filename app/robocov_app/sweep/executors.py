@@ -25,11 +25,8 @@ from robocov_app.sweep.performing import Outcome, failed, perform
 from robocov_app.sweep.study import Task
 from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
-_ENDS = 2
-"""Workers that may end through a task before it counts as failed."""
-
-_IN_A_ROW = 20
-"""Workers that may end one after the other without a finished run in between."""
+_ENDS = 2  # workers that may end through a task before it counts as failed
+_IN_A_ROW = 20  # workers that may end one after the other without a finished run in between
 
 
 class Lost(NamedTuple):
@@ -146,11 +143,8 @@ class Executor(ABC):
         return failed(lost.cause, lost.details)
 
 
-_STARTS = 3
-"""How often a process may end before it has begun."""
-
-_LAST_WORDS = 4000
-"""Characters of the complaints of a process that ended that are kept."""
+_STARTS = 3  # how often a process may end before it has begun
+_LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
 
 _OUTSIDE = -getattr(signal, "SIGKILL", 9)
 """The status of a process that was ended from outside: by a user, or because memory ran out."""
@@ -282,14 +276,10 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-PATIENCE = 10.0
-"""Seconds that a scheduler has for an answer."""
+PATIENCE = 10.0  # seconds that a scheduler has for an answer
 
-_LEAST = 4
-"""Tasks that are handed out to a cluster which has no workers yet."""
-
-_LOOK = 2.0
-"""Seconds between two looks at how many workers there are; they may come and go."""
+_LEAST = 4  # tasks that are handed out to a cluster which has no workers yet
+_LOOK = 2.0  # seconds between two looks at how many workers there are; they may come and go
 
 
 class Cluster(Executor):

@@ -21,8 +21,7 @@ T = TypeVar("T")
 Scale: TypeAlias = Literal["linear", "log"]
 Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 
-NO_LIMIT = "null"
-"""What stands for None where a file has no word for it."""
+NO_LIMIT = "null"  # what stands for None where a file has no word for it
 
 MOST_SAMPLES = 100_000
 

@@ -23,13 +23,11 @@ from robocov.files.atomic import locked, on_disk, written
 from robocov_app.sweep.performing import FIGURES, Outcome, made_with
 from robocov_app.sweep.study import Task
 
-RUNS = "runs"
-"""Name of the folder of the runs' folders."""
+RUNS = "runs"  # name of the folder of the runs' folders
 
 STUDY = "study.json"
 
-_ROW = "row.json"
-"""What the table holds of a run, in its folder."""
+_ROW = "row.json"  # what the table holds of a run, in its folder
 
 _HEAD = {"format": "robocov-row", "version": 2}
 
@@ -40,8 +38,7 @@ _LEFT_OVER = re.compile(
 )
 """Names of what a sweep that was killed has left half-written."""
 
-_NAMED = 5
-"""Damaged runs that are named."""
+_NAMED = 5  # damaged runs that are named
 
 
 class Entry(NamedTuple):

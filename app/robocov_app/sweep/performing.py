@@ -28,11 +28,8 @@ from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite
 from robocov_app.toolkit.worker import Line
 
-_REMEMBERED = 4
-"""Maps whose costs a worker keeps; tasks come map by map."""
-
-_TIDY = 1000
-"""Steps after which garbage is collected in a long run."""
+_REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
+_TIDY = 1000  # steps after which garbage is collected in a long run
 
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
@@ -40,8 +37,7 @@ FIGURES = (
 )
 """What the table holds of a run, in this order."""
 
-TIMED = "mean_time_s"
-"""What it holds as well where robots are not equally fast."""
+TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 
 
 _RESULTS = 3

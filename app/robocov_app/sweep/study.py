@@ -30,14 +30,9 @@ from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, onc
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
 
-WORDS = ("fail", "join")
-"""Conditions that are texts: ``3@20 5@40`` are two failures, in one run."""
-
-CONDITIONS = (*LIMITS, *WORDS)
-"""The conditions that a study may sweep."""
-
-GROUPS = "groups"
-"""Robots that differ, as JSON: the groups of a team file."""
+WORDS = ("fail", "join")  # conditions that are texts: ``3@20 5@40`` are two failures, in one run
+CONDITIONS = (*LIMITS, *WORDS)  # the conditions that a study may sweep
+GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
 """Units of all that may be varied."""
@@ -124,19 +119,16 @@ def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
 
 MOST_RUNS = 1_000_000
 
-ALL = "*"
-"""Stands for all starts of a map."""
+ALL = "*"  # stands for all starts of a map
 
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
 
-_RANGES = ("sensing_range", "communication_range")
-"""Those that may be without limit."""
+_RANGES = ("sensing_range", "communication_range")  # those that may be without limit
 
 _LONGEST_NAME = 100
 
-_HUGE = 1e300
-"""What a float can hold, with some to spare."""
+_HUGE = 1e300  # what a float can hold, with some to spare
 
 Swept: TypeAlias = float | Sequence[float | None] | None
 """One value, or several, each of which is tried."""
@@ -443,11 +435,8 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
 _FORMAT = "robocov-task 1"
 """Version of the digest; that the same inputs give other results is told by `made_with`."""
 
-_SHORT = 24
-"""Characters of each name in the name of a folder."""
-
-_DIGITS = 10
-"""Hexadecimal digits of the digest in the name of a folder."""
+_SHORT = 24  # characters of each name in the name of a folder
+_DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 
 
 @dataclass(frozen=True, slots=True)

@@ -190,8 +190,7 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         raise InputError(f"{where}: {error}") from error
 
 
-_ALONE = ("duration", "dt", "lattice", "cost_hz", "record_hz", "metrics")
-"""Keys whose values are never lists."""
+_ALONE = ("duration", "dt", "lattice", "cost_hz", "record_hz", "metrics")  # keys whose values are never lists
 
 
 def _gain(value: Any) -> Any:

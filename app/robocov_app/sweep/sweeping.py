@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 
-PERIOD = 10.0
-"""Seconds between two lines where there is no terminal."""
+PERIOD = 10.0  # seconds between two lines where there is no terminal
 
 
 @dataclass
@@ -132,11 +131,8 @@ def duration(seconds: float) -> str:
 
 MOST_WORKERS = 1024
 
-_PATIENCE = 0.2
-"""Seconds between two looks at what else there is to do."""
-
-_ERRORS = 3
-"""Different errors of runs that are told."""
+_PATIENCE = 0.2  # seconds between two looks at what else there is to do
+_ERRORS = 3  # different errors of runs that are told
 
 
 @dataclass

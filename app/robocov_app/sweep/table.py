@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 
 CSV, PARQUET = "results.csv", "results.parquet"
 
-_PART = ".results.part.{}"
-"""Temporary name, while a table is written."""
+_PART = ".results.part.{}"  # temporary name, while a table is written
 
-ROW_GROUP = 4096
-"""Rows of a row group, and the most that are in memory."""
+ROW_GROUP = 4096  # rows of a row group, and the most that are in memory
 
 
 class Column(NamedTuple):

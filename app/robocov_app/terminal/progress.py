@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import count
 
-PATIENCE = 1.0
-"""Seconds without a word."""
+PATIENCE = 1.0  # seconds without a word
 
 
 @contextmanager

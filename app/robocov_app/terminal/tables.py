@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-PIPED_WIDTH = 140
-"""Columns of a table that goes to a file or a pipe."""
+PIPED_WIDTH = 140  # columns of a table that goes to a file or a pipe
 
 
 def console() -> Console:

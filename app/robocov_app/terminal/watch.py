@@ -13,8 +13,7 @@ INTERVAL = 0.25
 SETTLED = 0.1
 """Seconds for which a file must be as it is: editors write in pieces, or remove a file and rename another."""
 
-LONGEST = 2.0
-"""Seconds after which a file that never settles counts as changed all the same."""
+LONGEST = 2.0  # seconds after which a file that never settles counts as changed all the same
 
 _State: TypeAlias = tuple[int, int, int, int] | None
 

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 _Answer = TypeVar("_Answer")
 _Covariant = TypeVar("_Covariant", covariant=True)
 
-READY = "ready"
-"""First message of a process: its service is loaded."""
+READY = "ready"  # first message of a process: its service is loaded
 
 _LENGTH = struct.Struct("<Q")
 _PIPE = 1 << 20

@@ -16,11 +16,9 @@ from robocov.errors import InputError, RobocovError
 from robocov_app.render.field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
-LATTICE = 128
-"""Sites along a side."""
+LATTICE = 128  # sites along a side
 
-_PAUSE = 0.05
-"""Seconds between two words on how far a map is."""
+_PAUSE = 0.05  # seconds between two words on how far a map is
 
 _INDICES = ("owner", "corner", "last_corner")
 
