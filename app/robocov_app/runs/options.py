@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from robocov.robots import Team
     from robocov_app.runs.spec import RunSpec
 
-MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
 USUAL_ROWS = 4e6  # largest record where its rate is left open: about 320 MB
 
 
@@ -149,6 +148,7 @@ class RunOptions:
         in_range("--fps", self.fps, 1, 240)
         in_range("--film-speed", self.film_speed, 0.01, 1e4)
         from robocov.simulation import check_dt  # asking for help must not load the physics
+        from robocov_app.runs.spec import MOST_ROWS
 
         check_dt(self.dt)
         if self.record_hz is not None:

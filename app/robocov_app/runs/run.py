@@ -16,17 +16,17 @@ from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
 from robocov.record import Record
 from robocov_app.runs.cost import built_cost, cost_for_pictures
-from robocov_app.runs.options import RunOptions
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
 from robocov_app.terminal.progress import counting, progress
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # not for the processes of a sweep
     from matplotlib.figure import Figure
 
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
+    from robocov_app.runs.options import RunOptions
 
 STOPPED_SAMPLES = 200  # samples of the coverage cost of a run that was stopped
 COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"  # the header of ``cost.csv``

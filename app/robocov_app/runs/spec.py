@@ -16,6 +16,7 @@ from robocov.record import Record, Recorder
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, Simulation
 
+MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
 COST_RATE = 10.0  # samples of the coverage cost per simulated second
 
 

@@ -24,7 +24,7 @@ from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
-from robocov_app.runs.options import MOST_ROWS
+from robocov_app.runs.spec import MOST_ROWS
 from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, whole
 
 TeamValue: TypeAlias = float | str | None
