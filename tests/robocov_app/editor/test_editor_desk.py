@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
-from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
+from robocov_app.editor.edits import create
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.snapping import KINDS
@@ -357,3 +358,39 @@ def test_problems_are_gone_through_one_by_one(tmp_path: Path) -> None:
     with opened_editor(tmp_path, of_map("square")) as hands:
         hands.key("n")
         assert hands.said == "nothing is wrong with the map"
+
+
+def test_groups_locks_and_what_is_hidden(hands: Hands) -> None:
+    hands.select(0, 1)
+    hands.key("ctrl+g")
+    hands.key("escape")
+    item = hands.sketch.obstacles[0]
+    before = hands.picture()
+    middle = item.geometry.representative_point()
+    hands.click_at((middle.x, middle.y))
+    assert hands.desk.selection.items == {0, 1}
+    hands.key("ctrl+l")
+    assert not hands.desk.selection.items and hands.said.endswith("locked")
+    hands.wait()
+    hands.click_at((middle.x, middle.y))
+    assert not hands.desk.selection.items & {0, 1}
+    hands.key("ctrl+shift+l")
+    hands.key("ctrl+h")
+    hands.go((0.2, 9.8))
+    assert not hands.same(before) and all(item.hidden for item in hands.sketch.obstacles[:2])
+    hands.key("ctrl+shift+l")
+    hands.key("ctrl+shift+g")
+    assert not any(item.group or item.hidden for item in hands.sketch.obstacles)
+
+
+def test_a_problem_is_mended_by_a_key(hands: Hands) -> None:
+    hands.desk.change(create.start_added(hands.sketch, PointsStart(((50.0, 5.0),))))
+    hands.settle()
+    hands.frames(3)
+    hands.key("f8")
+    assert "outside the boundary" in hands.said
+    hands.key("shift+f8")
+    assert "moved to where a robot fits" in hands.said
+    hands.settle()
+    hands.frames(3)
+    assert not any(problem.grave for problem in hands.desk.problems)

@@ -119,7 +119,11 @@ class Outlines:
         return self._bounds[1]
 
     def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
-        """Return the obstacles whose bounds touch a box, m, in their order."""
+        """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
         low_x, low_y, high_x, high_y = self.bounds(sketch).T
         there = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
-        return [sketch.obstacles[k] for k in np.flatnonzero(there).tolist()]
+        return [
+            item
+            for item, is_there in zip(sketch.obstacles, there.tolist(), strict=True)
+            if is_there and not item.hidden
+        ]

@@ -117,7 +117,7 @@ class Sheet:
             *(view.shown & {"grid", "names", "picture"}, view.folder, sketch.background),
             *(sketch.boundary, sketch.density),
         )
-        items = {item.key: item for item in sketch.obstacles if item.key not in lifted}
+        items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
         page = self._page
         if page is None or look != self._look or self._camera is None:
             return self._all(view, sketch, items, look)

@@ -89,6 +89,15 @@ def hidden(sketch: Sketch, selection: Selection, on: bool = True) -> Change:
     return _marked(sketch, selection, words, hidden=on)
 
 
+def released(sketch: Sketch) -> Change:
+    """Unlock and show all obstacles; those that were locked or hidden are selected then."""
+    keys = [item.key for item in sketch.obstacles if item.locked or item.hidden]
+    if not keys:
+        raise MapError("nothing is locked or hidden")
+    words = f"{Selection.of(*keys).words(sketch)} unlocked and shown"
+    return _marked(sketch, Selection.of(*keys), words, locked=False, hidden=False)
+
+
 def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | bool) -> Change:
     if not selection.items:
         raise MapError("select obstacles first")

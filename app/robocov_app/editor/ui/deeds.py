@@ -7,10 +7,21 @@ from typing import TYPE_CHECKING
 
 from robocov.environment import WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import boolean, create, motion_path, properties, simplify, transform, vertices
+from robocov_app.editor.edits import (
+    boolean,
+    create,
+    fixes,
+    motion_path,
+    properties,
+    simplify,
+    transform,
+    vertices,
+)
+from robocov_app.editor.edits import density as density_edits
 from robocov_app.editor.edits.clipboard import copied, pasted
 from robocov_app.editor.model.selection import Selection, place_of
 from robocov_app.editor.model.sketch import BOUNDARY
+from robocov_app.editor.tools.density import DensityTool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,6 +76,11 @@ def deeds(desk: Desk) -> dict[str, Callable[[], object]]:
         "distribute:y": lambda: _do(desk, transform.distributed, "y"),
         "raise": lambda: _do(desk, properties.raised, "top"),
         "lower": lambda: _do(desk, properties.raised, "bottom"),
+        "group": lambda: _do(desk, properties.grouped),
+        "ungroup": lambda: _do(desk, properties.ungrouped),
+        "lock": lambda: _do(desk, properties.locked),
+        "hide": lambda: _do(desk, properties.hidden),
+        "release": lambda: desk.change(properties.released(desk.sketch)),
         "unite": lambda: _do(desk, boolean.united),
         "subtract": lambda: _do(desk, boolean.subtracted),
         "intersect": lambda: _do(desk, boolean.intersected),
@@ -92,6 +108,9 @@ def deeds(desk: Desk) -> dict[str, Callable[[], object]]:
         "fewer": lambda: desk.set_robots(max(desk.robots - 1, 1)),
         "background:none": lambda: desk.change(properties.underlaid(desk.sketch, None)),
         "problem:next": lambda: next_problem(desk),
+        "problem:fix": lambda: fix_problem(desk),
+        "fill:unreachable": lambda: desk.change(fixes.unreachable_filled(desk.sketch, desk.radius)),
+        "density:area": lambda: _do(desk, density_edits.areas_made, density_weight(desk)),
         "path:repeat": lambda: _do(desk, motion_path.path_turned),
         "path:none": lambda: _do(desk, motion_path.path_removed),
         "path:play": lambda: play(desk),
@@ -291,6 +310,23 @@ def make_default(desk: Desk) -> None:
         raise MapError("select one start first")
     (name,) = desk.selection.starts
     desk.change(properties.start_first(desk.sketch, name))
+
+
+def density_weight(desk: Desk) -> float:
+    """Return the weight of what is drawn next with the tool Density."""
+    tool = desk.tools["density"]
+    return tool.weight if isinstance(tool, DensityTool) else 1.0
+
+
+def fix_problem(desk: Desk) -> None:
+    """Mend the problem that is shown, or the first that can be."""
+    found = [desk.problem] if desk.problem is not None else list(desk.problems)
+    for problem in found:
+        change = fixes.fixed(desk.sketch, problem, desk.radius)
+        if change is not None:
+            desk.change(change)
+            return
+    raise MapError("there is nothing that can be mended by itself")
 
 
 def next_problem(desk: Desk) -> None:

@@ -43,6 +43,9 @@ def offered(desk: Desk) -> list[str]:
         names += ["align:left", "align:bottom"]
         names += ["distribute:x", "distribute:y"] if len(shapes) > 2 else []
         names.append(_SEPARATE)
+    if shapes:
+        names += ["group"] if len(shapes) > 1 else []
+        names += ["lock", "hide", _SEPARATE]
     walls = [shape for shape in shapes if isinstance(shape, WallObstacle)]
     if len(walls) > 1 and len(walls) == len(shapes):
         names.append("join")
