@@ -5,8 +5,16 @@ import pytest
 from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
 from robocov.errors import ParameterError
+from robocov_app.render.picture import pane_layers
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.runs.film import FilmStyle, comparison_frames, frame_rows, pane_layout, side_by_side
+from robocov_app.runs.film import (
+    FilmStyle,
+    comparison_frames,
+    frame_rows,
+    iter_frames,
+    pane_layout,
+    side_by_side,
+)
 
 
 def plain(count, width=64, height=48, start=0):
@@ -86,6 +94,20 @@ class TestFrames:
         short, long = run_of(ROOMS, 2, steps=11), run_of(ROOMS, 2, steps=41)
         _, frames = film([short, long], size=(640, 300), speed=1.0)
         assert sum(1 for _ in frames) == len(frame_rows(long.time, 5))
+
+    def test_each_pane_is_the_film_of_its_own_run(self):
+        first = run_of(ROOMS, 3, steps=21)
+        second = replace(first, positions=first.positions[:, ::-1] + 0.4)
+        for records in ([first, second], [second, first]):
+            layout, frames = film(records, size=(1280, 640))
+            style, layers = FilmStyle(fps=5, speed=4.0), pane_layers("robots")
+            cost = records[1].time[:1], np.array([1.0])
+            alone = iter_frames(
+                records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale
+            )
+            for frame, wanted in zip(frames, alone, strict=True):
+                top = len(layout.header)
+                assert (frame[top : top + wanted.shape[0], -wanted.shape[1] :] == wanted).all()
 
     def test_one_legend_explains_what_any_of_them_shows(self):
         without = run_of(ROOMS, 3, controller="rpf")

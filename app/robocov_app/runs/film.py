@@ -181,12 +181,13 @@ def comparison_frames(
     records: Sequence[Record], costs: Sequence[Costs], layout: PaneLayout, style: FilmStyle
 ) -> Iterator[Frame]:
     """Draw the frames of several saved runs side by side, each with what is told of its cost."""
-    layers = pane_layers(style.colours)
+    look = theme_named(style.theme)
+    size, scale = layout.pane, layout.scale
     films = [
-        iter_frames(record, style, size=layout.pane, layers=layers, scale=layout.scale, cost=cost)
+        # layers keep what they have drawn: each film has its own
+        iter_frames(record, style, size=size, scale=scale, layers=pane_layers(style.colours), cost=cost)
         for record, cost in zip(records, costs, strict=True)
     ]
-    look = theme_named(style.theme)
     for body in side_by_side(films, layout.columns, GAP, look.grid, look.background):
         frame = np.empty((layout.size[1], layout.size[0], 3), dtype=np.uint8)
         frame[:] = look.background
