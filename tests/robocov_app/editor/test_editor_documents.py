@@ -377,3 +377,21 @@ def test_the_polygon_that_was_drawn_is_in_the_file(hands: Hands, tmp_path: Path)
     hands.key("ctrl+s")
     hands.key("return")
     assert PolygonObstacle(((1, 1), (3, 1), (3, 3))) in load_map(tmp_path / "untitled.json").obstacles
+
+
+def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: Path) -> None:
+    hands.key("ctrl+s")
+    hands.key("return")
+    (path,) = tmp_path.glob("*.json")
+    hands.desk.change(create.boundary_drawn(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
+    hands.key("ctrl+s")
+    assert hands.desk.asked is not None and "valid map" in hands.desk.asked.words
+    hands.key("c")
+    load_map(path)
+    hands.key("ctrl+s")
+    hands.key("r")
+    with pytest.raises(MapError):
+        load_map(path)
+    hands.desk.change(create.boundary_drawn(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
+    hands.key("ctrl+s")
+    assert hands.desk.asked is None and not hands.desk.document.unsaved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -211,17 +212,19 @@ class Documents:
 
         self.desk.asked = FileQuestion("Save as", self.desk.folder, chosen, [SUFFIX], text=text, saves=True)
 
-    def _save(self, path: Path, then: Callable[[], object] | None, *, over: bool = False) -> str | None:
+    def _save(
+        self, path: Path, then: Callable[[], object] | None, *, over: bool = False, spoil: bool = False
+    ) -> str | None:
         desk = self.desk
+        if not (over or spoil) and desk.document.spoils(path):
+            words = f"{path.name} holds a valid map; this one cannot run yet."
+            self._ask_over("Save a draft over it?", words, then, lambda: self._save(path, then, spoil=True))
+            return None
         try:
             words = desk.document.save(path, over=over)
         except ChangedError as error:
-            answers = (
-                Answer("Save as…", "a", lambda: self.ask_name(then)),
-                Answer("Replace it", "r", lambda: self._save(path, then, over=True)),
-                Answer("Cancel", "c", _nothing),
-            )
-            desk.asked = Question("Replace the file?", str(error), answers)
+            replace = partial(self._save, path, then, over=True)
+            self._ask_over("Replace the file?", str(error), then, replace)
             return None
         assert desk.document.path is not None
         self.remember(desk.document.path)
@@ -231,6 +234,16 @@ class Documents:
         if then is not None:
             then()
         return words
+
+    def _ask_over(
+        self, title: str, words: str, then: Callable[[], object] | None, go_on: Callable[[], object]
+    ) -> None:
+        answers = (
+            Answer("Save as…", "a", lambda: self.ask_name(then)),
+            Answer("Replace it", "r", go_on),
+            Answer("Cancel", "c", _nothing),
+        )
+        self.desk.asked = Question(title, words, answers)
 
     # exporting
 
