@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,6 @@ from robocov.controllers import gain_values, make_controller
 from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.record import versions
-from robocov.simulation import Simulation
 
 if TYPE_CHECKING:
     from robocov_app.figures.statistics import Interval
@@ -144,12 +143,11 @@ def _timed(
     stopped: Callable[[], bool],
     clock: Callable[[], float],
 ) -> dict[str, list[float]] | None:
+    from robocov_app.runs.spec import RunSpec
     from robocov_app.sweep.study import team_of
 
-    environment = load_map(MAP)
-    discs = team_of(robots, team)
-    starts = environment.start("uniform").sample(robots, seed=0)
-    runs = {name: Simulation(environment, make_controller(name), starts, discs, dt) for name in controllers}
+    spec = RunSpec(load_map(MAP), team=team_of(robots, team), start="uniform", dt=dt)
+    runs = {name: replace(spec, controller=name).simulation() for name in controllers}
     for run in runs.values():
         for _ in range(warm_up):
             run.step()
