@@ -136,7 +136,7 @@ WRONG = [
     (
         Picky,
         {"k": [1, 2]},
-        "controller 'Picky' cannot be made: ValueError: not two (test_sweep_gain_choices.py",
+        "controller 'Picky' cannot be made: ValueError: not two (test_sweep_gains.py",
     ),
     (object, {"k": 1}, "gains.x: 'k', but the controller has no gains"),
 ]
