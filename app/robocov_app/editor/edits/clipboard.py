@@ -42,16 +42,8 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
     """Paste what `copied` returned; it is selected then.
 
     A boundary becomes the map's if it has none; else it is left out, or a polygon if it was copied alone.
-    Starts get free names.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    text : str
-    at : (x, y) or None, m
-        Where the middle of its bounding box is to be; None leaves it where it was.
-    grid : float or None, m
-        What is on this grid stays on it: it moves by multiples of that.
+    Starts get free names. The middle of its bounding box comes to be at a place, m, None leaves it where it
+    was; what is on a grid stays on it.
     """
     part = _part(text)
     shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]

@@ -101,12 +101,8 @@ def _fewer(ring: Ring, tolerance: float, *, closed: bool) -> Ring:
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
     turned = np.roll(points, -first, axis=0)
-    far = int(np.hypot(*(turned - turned[0]).T).argmax())
-    halves = turned[: far + 1], np.concatenate([turned[far:], turned[:1]])
-    lines = [
-        np.array(LineString(half).simplify(tolerance, preserve_topology=False).coords) for half in halves
-    ]
-    kept = [(float(x), float(y)) for line in lines for x, y in line[:-1]]
+    line = LineString(np.concatenate([turned, turned[:1]])).simplify(tolerance, preserve_topology=False)
+    kept = [(float(x), float(y)) for x, y in line.coords[:-1]]
     if len(set(kept)) < 3 or not shapely.MultiPoint(kept).convex_hull.area > 0.0:
         return ring
     # in the order in which they were

@@ -29,17 +29,9 @@ def annotated(
     names: Sequence[str | None],
     background: Background | None,
 ) -> dict[str, Any]:
-    """Return the free keys of a map together with the editor's.
+    """Return the free keys of a map, `extra`, together with the editor's.
 
-    Parameters
-    ----------
-    extra : dict
-        Of everybody else.
-    marks : dict of place to dict
-        By the place of each obstacle, as `MARKS`.
-    names : sequence of str or None
-        Of the obstacles in their order.
-    background : Background or None
+    Marks, as `MARKS`, come by the place of each obstacle, and the names of all obstacles in their order.
     """
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():

@@ -27,21 +27,9 @@ _LOOKED_AGAIN = 1.0
 class Document:
     """A sketch with its history, its file, and the autosave that survives whatever happens.
 
-    Parameters
-    ----------
-    sketch : Sketch
-    drafts : Path or None
-        Where maps are kept aside; None for nowhere.
-    path : Path or None
-        Its file; None if it never had one.
-    disk : OnDisk or None
-        What the file was like.
-    resumed : Path or None
-        The folder of the autosave whose work goes on.
-    saved : bool
-        Whether losing it would lose nothing.
-    stem : str
-        What a file of it would be called.
+    It is kept aside in a folder below `drafts`, None for nowhere, or in the folder of an autosave that is
+    `resumed`. What never had a file has no `path`, but perhaps the `stem` of a name for one; of what is not
+    `saved`, something would be lost.
     """
 
     def __init__(
@@ -117,7 +105,7 @@ class Document:
         return False
 
     def save(self, path: Path, *, over: bool = False) -> str:
-        """Write the file; return what to tell.
+        """Write the file; return what to tell. ChangedError when something would be lost, unless `over`.
 
         A map that nobody has named is called like its file, at each of its steps: what was undone can be
         redone after saving.

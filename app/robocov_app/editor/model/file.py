@@ -42,15 +42,8 @@ def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: boo
     """Write a sketch to a file, whole or not at all; drafts too.
 
     Through a link, the file that it points to is replaced, not the link; who may read it stays as it was.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    path : Path
-    before : OnDisk or None
-        What the file was like when this program read or wrote it last; None if never.
-    over : bool
-        Replace whatever is there.
+    ChangedError when the file is not as it was `before`, or there is one of which nothing is known, unless
+    `over`.
     """
     path = path.absolute()
     text = sketch_text(sketch).encode()

@@ -18,21 +18,7 @@ class _Step:
 
 
 class History:
-    """A sketch and all that it was.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    saved : bool
-        Whether a file holds just that.
-
-    Attributes
-    ----------
-    sketch : Sketch
-        As it is now.
-    selection : Selection
-        What is selected; a window that selects something else sets it.
-    """
+    """A sketch as it is now, and all that it was; a window that selects something sets `selection`."""
 
     def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
         self.sketch = sketch

@@ -37,22 +37,12 @@ SAME = 1e-6
 
 
 class DrawTool(Tool, ABC):
-    """Draws point by point, or with a single drag; the tools below say what the points make.
-
-    Attributes
-    ----------
-    least, most : int
-        Points that are needed, and that are taken.
-    closes : bool
-        Whether a click on the first point ends it.
-    drags : bool
-        Whether it can be drawn by a single drag, too.
-    """
+    """Draws point by point, or with a single drag; the tools below say what the points make."""
 
     begins_typed = True
-    least, most = 2, 1_000_000
-    closes = False
-    drags = False
+    least, most = 2, 1_000_000  # points that are needed, and that are taken
+    closes = False  # whether a click on the first point ends it
+    drags = False  # whether it can be drawn by a single drag, too
 
     def __init__(self) -> None:
         super().__init__()

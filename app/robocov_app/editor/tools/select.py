@@ -52,22 +52,12 @@ _CURSORS = {
 
 
 class Drag:
-    """Something that is dragged: each move gives the change that letting go would make.
-
-    Attributes
-    ----------
-    change : Change or None
-        What letting go would make.
-    guides : tuple of Guide
-        Why it is where it is.
-    words : str
-        Beside the cursor.
-    """
+    """Something that is dragged: each move gives the change that letting go would make."""
 
     def __init__(self) -> None:
         self.change: Change | None = None
         self.guides: tuple[Guide, ...] = ()
-        self.words = ""
+        self.words = ""  # beside the cursor
 
     def to(self, context: ToolContext, event: PointerEvent) -> None:
         """Follow the mouse."""
@@ -104,15 +94,7 @@ class Drag:
 
 
 class Moving(Drag):
-    """Moves whole things, or copies them.
-
-    Attributes
-    ----------
-    moving : Selection
-    copies : bool
-    offset : (dx, dy) or None, m
-        By how much, where it is too much to work the change out in every frame.
-    """
+    """Moves whole things, or copies them; by an `offset`, m, where a change in each frame took too long."""
 
     def __init__(self, context: ToolContext, selection: Selection, begun: Point) -> None:
         super().__init__()

@@ -30,14 +30,7 @@ class Targets:
     """The vertices and edges of a sketch, to snap to: made once at the begin of a drag.
 
     Of a wall, its middle line and its outline; of a circle, its centre, its rim and the four ends of that.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    without : owners or vertices
-        What is being dragged, and so is no target: of a vertex, itself and its edges only.
-    more : points, m
-        More points to snap to, such as those drawn so far.
+    What is dragged is left out, of a vertex itself and its edges; `more` are points such as those drawn so far.
     """
 
     def __init__(
@@ -131,16 +124,10 @@ class Targets:
 
 
 class Snapper:
-    """The targets that were asked for last; of large maps worked out beside the window.
-
-    Attributes
-    ----------
-    patient : bool
-        Wait for the targets of large maps too.
-    """
+    """The targets that were asked for last; of large maps worked out beside the window."""
 
     def __init__(self) -> None:
-        self.patient = False
+        self.patient = False  # to wait for the targets of large maps too
         self._sketch: Sketch | None = None
         self._key: object = None
         self._known: Targets | None = None

@@ -86,26 +86,14 @@ class ToolContext(Protocol):
 
 
 class Tool:
-    """A tool that does nothing; the others are like it.
-
-    Attributes
-    ----------
-    name, title, hint : str
-        The hint says what to do next.
-    snaps : bool
-        Whether the point that it gets has snapped to something.
-    takes_numbers : bool
-        Whether numbers can be typed while it is `busy`.
-    begins_typed : bool
-        Whether they can be typed before, too.
-    """
+    """A tool that does nothing; the others are like it."""
 
     name = ""
     title = ""
-    hint = ""
-    snaps = True
-    takes_numbers = True
-    begins_typed = False
+    hint = ""  # what to do next
+    snaps = True  # whether the point that it gets has snapped to something
+    takes_numbers = True  # whether numbers can be typed while it is `busy`
+    begins_typed = False  # whether they can be typed before, too
 
     def __init__(self) -> None:
         self.guides: tuple[Guide, ...] = ()
