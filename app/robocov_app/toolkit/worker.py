@@ -21,15 +21,11 @@ import threading
 import time
 import traceback
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, BinaryIO, Generic, Protocol, TypeVar
+from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 
 from robocov.errors import RobocovError
 
-if TYPE_CHECKING:
-    pass
-
 _Answer = TypeVar("_Answer")
-_Covariant = TypeVar("_Covariant", covariant=True)
 
 READY = "ready"  # first message of a process: its service is loaded
 
@@ -39,13 +35,7 @@ _SET_DEATH_SIGNAL = 1
 
 
 class Service(Protocol):
-    """Answers questions.
-
-    Attributes
-    ----------
-    failing : str
-        Begins the message about an unforeseen error: ``the map could not be measured``.
-    """
+    """Answers questions; where that fails unforeseen, `failing` begins the message."""
 
     failing: str
 
@@ -75,48 +65,11 @@ class Reply:
     final: bool = True
 
 
-class Worker(Protocol[_Covariant]):
-    """What answers questions for a window; no call waits."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether the newest question is not answered yet."""
-
-    @property
-    def lives(self) -> bool:
-        """Whether the worker goes on; the next question starts it again."""
-
-    @property
-    def trouble(self) -> str:
-        """Why the last question has no answer, in words; empty if it has one."""
-
-    @property
-    def progress(self) -> Any:
-        """How far the newest question is, as the service tells; None if it has not told yet."""
-
-    def put(self, question: object) -> None:
-        """Ask; an older question without an answer does not count any more."""
-
-    def poll(self) -> _Covariant | None:
-        """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
-
-    def close(self) -> None:
-        """End what works."""
-
-
 class LatestWorker(Generic[_Answer]):
     """A service in a process of its own, which is started by a question and again after it has died.
 
-    Parameters
-    ----------
-    service : str
-        ``package.module:Class``.
-    doing : str
-        For people: ``measures the map``.
-    wire : type
-        Of `Wire`.
-    patience : float, s
-        A process that works longer on an older question than that is ended for a newer one.
+    `service` is ``package.module:Class``, `doing` what it does, for people: ``measures the map``. A process
+    that works longer than `patience`, s, on an older question is ended for a newer one.
     """
 
     def __init__(
@@ -204,6 +157,10 @@ class DirectWorker(Generic[_Answer]):
 
     def close(self) -> None:
         """There is nothing to end."""
+
+
+Worker: TypeAlias = LatestWorker[_Answer] | DirectWorker[_Answer]
+"""What answers questions for a window."""
 
 
 class _Talk:
