@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
     from robocov_app.runs.run import Run
-
-INTERRUPTED = 130
 
 
 @dataclass

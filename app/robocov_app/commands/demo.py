@@ -11,7 +11,7 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import ConditionOptions, robots_of
-from robocov_app.terminal.arguments import in_range, parsed_gains, parsed_size
+from robocov_app.terminal.arguments import in_range, parsed_gains, window_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -95,16 +95,12 @@ class Arguments:
             raise ParameterError("--video: --frames N or --tour was wanted beside it")
         if self.video is not None and self.video.suffix.lower() != ".mp4":
             raise ParameterError(f"--video: {str(self.video)!r}, but a name ending in .mp4 was wanted")
-        self.pixels()
+        window_size(self.size)
 
     @property
     def headless(self) -> bool:
         """Whether no display is wanted."""
         return self.frames is not None or self.video is not None
-
-    def pixels(self) -> tuple[int, int] | None:
-        """Return the size that was asked for, None when none was."""
-        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
 
 
 def command(options: Arguments) -> int:
@@ -116,14 +112,14 @@ def command(options: Arguments) -> int:
     from robocov_app.viewer.screen import show_compiling
 
     if not options.headless:
-        on_compile.append(lambda _: show_compiling(options.pixels() or (900, 600)))
+        on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     session = session_of(options)
     opening = Opening(
         session,
         options.map,
         options.folder,
         theme=options.theme,
-        size=options.pixels(),
+        size=window_size(options.size),
         scale=options.scale,
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
@@ -174,7 +170,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
     from robocov_app.runs.recording import kept_frames, save_film, save_frames
-    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.interruption import INTERRUPTED, Interruption
     from robocov_app.terminal.progress import progress
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.opening import HEADLESS_FPS
@@ -211,4 +207,4 @@ def rendered(opening: Opening, options: Arguments) -> int:
     for target in (options.out, options.video):
         if target is not None:
             print(f"saved {target}")
-    return 130 if stop.requested else 0
+    return INTERRUPTED if stop.requested else 0

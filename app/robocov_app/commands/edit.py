@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.terminal.arguments import in_range, parsed_size
+from robocov_app.terminal.arguments import in_range, window_size
 
 
 @dataclass
@@ -46,11 +46,7 @@ class Arguments:
             raise ParameterError(
                 f"--screenshot: {str(self.screenshot)!r}, but a name ending in .png was wanted"
             )
-        self.pixels()
-
-    def pixels(self) -> tuple[int, int] | None:
-        """Return the size that was asked for, None when none was."""
-        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
+        window_size(self.size)
 
 
 def command(options: Arguments) -> int:
@@ -62,7 +58,7 @@ def command(options: Arguments) -> int:
         options.folder,
         background=options.background,
         theme=options.theme,
-        size=options.pixels(),
+        size=window_size(options.size),
         scale=options.scale,
         headless=options.screenshot is not None,
     )

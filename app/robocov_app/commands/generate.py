@@ -17,6 +17,7 @@ from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.terminal.arguments import in_range
+from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
 Job: TypeAlias = tuple[str, Callable[[], Environment]]
@@ -148,8 +149,7 @@ def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
             raise InputError(
                 f"--out: {str(out)!r}, but the name of a file was wanted (--count makes a folder)"
             )
-        if writable(out).exists() and not overwrite:
-            raise InputError(f"{out}: exists already; another --out, or --overwrite, was wanted")
+        require_fresh(out, "another --out", overwrite=overwrite)
 
 
 def _check_ours(path: Path) -> None:

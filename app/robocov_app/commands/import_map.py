@@ -11,11 +11,11 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, one_line
-from robocov.files.atomic import writable
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.figures.figure_files import check_figure_path
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map
+from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
 
@@ -118,10 +118,10 @@ def command(options: Arguments) -> None:
         known = ", ".join(IMPORTERS)
         raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
     out = Path(f"{options.file.stem}.json") if options.out is None else options.out
-    _require_fresh(out, options, "another -o")
+    require_fresh(out, "another -o", overwrite=options.overwrite, source=options.file)
     if options.preview is not None:
         check_figure_path(options.preview)
-        _require_fresh(options.preview, options, "another --preview")
+        require_fresh(options.preview, "another --preview", overwrite=options.overwrite, source=options.file)
     quiet = options.json or not sys.stderr.isatty()
     with progress("importing", 3, quiet=quiet) as done:
         environment, report, foreign = import_map(
@@ -142,16 +142,6 @@ def command(options: Arguments) -> None:
     for line in report.lines():
         print(line)
     print(f"saved in {' and '.join(files.values())}")
-
-
-def _require_fresh(path: Path, options: Arguments, other: str) -> None:
-    """Check that `path` may be written: never the file that is read, and no other one unasked."""
-    if not writable(path).exists():
-        return
-    if options.file.exists() and path.samefile(options.file):
-        raise InputError(f"{path}: the file that is read; {other} was wanted")
-    if not options.overwrite:
-        raise InputError(f"{path}: exists already; {other}, or --overwrite, was wanted")
 
 
 def _read_options(options: Arguments) -> ReadOptions:

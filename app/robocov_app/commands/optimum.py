@@ -12,13 +12,13 @@ import numpy as np
 import tyro
 
 from robocov.errors import InputError, ParameterError
-from robocov.files.atomic import writable, written
+from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density_summary import density_kind, weighed_lines
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
-from robocov_app.terminal.output import finite
+from robocov_app.terminal.output import finite, require_fresh
 from robocov_app.terminal.progress import late_progress
 
 if TYPE_CHECKING:
@@ -127,9 +127,7 @@ def _check(options: Arguments) -> None:
     if options.seed < 0:
         raise ParameterError(f"--seed: {options.seed}, but a whole number of at least 0 was wanted")
     if options.positions is not None:
-        writable(options.positions)
-        if options.positions.exists() and not options.overwrite:
-            raise InputError(f"{options.positions}: exists already; another name, or --overwrite, was wanted")
+        require_fresh(options.positions, "another name", overwrite=options.overwrite)
     if options.plot is not None:
         from robocov_app.figures.runs import check_figure_path
 

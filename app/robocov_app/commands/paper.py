@@ -13,13 +13,13 @@ import tyro
 
 from robocov.errors import InputError, counted
 from robocov_app.terminal.arguments import in_range
+from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
     from robocov_app.replication.figures import Shown
     from robocov_app.replication.studying import Forecast, Means
     from robocov_app.replication.verdicts import Claim
 
-INTERRUPTED = 130
 
 _MOST_WORKERS = 1024
 

@@ -12,14 +12,14 @@ import tyro
 
 from robocov.errors import InputError, ParameterError, listed
 from robocov_app.runs.options import RunOptions
-from robocov_app.terminal.arguments import parsed_size
+from robocov_app.terminal.arguments import window_size
+from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
     from robocov_app.runs.run import Run
     from robocov_app.runs.saved import Saved
     from robocov_app.terminal.interruption import Interruption
 
-INTERRUPTED = 130
 
 _NO_DISPLAY = (
     "no display: the window needs one (over ssh, try ssh -X); --video --out DIR makes a film without"
@@ -76,7 +76,7 @@ class Arguments:
             for name, given in (("--out", self.out is not None), ("--json", self.json)):
                 if given:
                     raise ParameterError(f"{name}: --frames or --video was wanted beside it")
-            self.window_size()
+            window_size(self.size)
 
     @property
     def headless(self) -> bool:
@@ -97,10 +97,6 @@ class Arguments:
             size=self.size,
             json=self.json,
         )
-
-    def window_size(self) -> tuple[int, int] | None:
-        """Return the size of the window that was asked for (width, height), None when none was."""
-        return None if self.size is None else parsed_size("--size", self.size, (900, 600), (7680, 4320))
 
 
 def command(options: Arguments) -> int:
@@ -141,7 +137,7 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
         name,
         Path(),
         theme=options.theme,
-        size=options.window_size(),
+        size=window_size(options.size),
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
         laws=options.controller,

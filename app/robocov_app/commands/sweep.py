@@ -11,12 +11,13 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.terminal.arguments import in_range
+from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
     from robocov_app.sweep.study import Study
     from robocov_app.sweep.sweeping import Rehearsal, Totals
 
-FAILED, INTERRUPTED = 1, 130
+FAILED = 1
 
 
 @dataclass

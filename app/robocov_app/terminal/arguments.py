@@ -101,6 +101,11 @@ def in_range(option: str, value: float, low: float, high: float, unit: str = "")
         raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
 
 
+def window_size(text: str | None) -> tuple[int, int] | None:
+    """Return the size in pixels of a window that was asked for, None when none was."""
+    return None if text is None else parsed_size("--size", text, (900, 600), (7680, 4320))
+
+
 def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
 

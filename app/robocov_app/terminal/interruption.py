@@ -8,6 +8,8 @@ import threading
 from contextlib import suppress
 from types import FrameType
 
+INTERRUPTED = 130  # exit status
+
 
 class Interruption:
     """Context in which the first Ctrl-C (or SIGTERM) is only noted; a second one ends at once.

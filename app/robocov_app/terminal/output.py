@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from robocov.files.atomic import written
+from robocov.errors import InputError
+from robocov.files.atomic import writable, written
 
 
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
@@ -19,6 +20,16 @@ def free_name(folder: Path, stem: str, suffix: str) -> Path:
     while os.path.lexists(folder / f"{stem}-{k}{suffix}"):  # a link to nothing is there, too
         k += 1
     return folder / f"{stem}-{k}{suffix}"
+
+
+def require_fresh(path: Path, other: str, *, overwrite: bool, source: Path | None = None) -> None:
+    """Raise InputError where `path` may not be written: it is the source, or there is a file already."""
+    if not writable(path).exists():
+        return
+    if source is not None and source.exists() and path.samefile(source):
+        raise InputError(f"{path}: the file that is read; {other} was wanted")
+    if not overwrite:
+        raise InputError(f"{path}: exists already; {other}, or --overwrite, was wanted")
 
 
 def listed(folder: Path) -> str:
