@@ -2,42 +2,30 @@
 
 A comma between two digits is a decimal comma, so numbers stand apart by blanks or semicolons; a comma with
 a blank on a side of it parts numbers too, and so does one among numbers with decimal points, as in
-``3.2,1.5``.
+``3.2,1.5``. What means nothing is a MapError of one sentence: what was typed, and what can be.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
+from robocov.environment import Point
 from robocov.errors import MapError, shown
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.geometry import cos_sin
 
-if TYPE_CHECKING:
-    from robocov.environment import Point
-
-_UNITS = {
-    "": 1.0,
-    "m": 1.0,
-    "km": 1000.0,
-    "dm": 0.1,
-    "cm": 0.01,
-    "mm": 0.001,
-    "in": 0.0254,
-    '"': 0.0254,
-    "ft": 0.3048,
-    "'": 0.3048,
-}
+_METRIC = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+_UNITS = _METRIC | {"in": 0.0254, '"': 0.0254, "ft": 0.3048, "'": 0.3048}
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?"
-_UNIT = r"(?:km|dm|cm|mm|m|in|ft|\"|')?"
-_LENGTH = re.compile(rf"({_NUMBER})\s*({_UNIT})")
+_LENGTH = re.compile(rf"({_NUMBER})\s*({'|'.join(sorted(_UNITS, key=len, reverse=True))})")
 _FEET_AND_INCHES = re.compile(rf"({_NUMBER})\s*'\s*({_NUMBER})\s*\"")
 _ANGLE = re.compile(rf"({_NUMBER})\s*(°|deg|rad|)")
 _LENGTHS = "type a length, such as 3.2, 120cm or 12'6\""
 _POINTS = "type x and y in metres, such as 3.2 1.5, relative as +0.5 0 or @2<45"
 _SIZES = "type width and height in metres, such as 3 x 2"
+_Meant = TypeVar("_Meant")
 
 
 def length_of(text: str, *, now: float | None = None) -> float:
@@ -45,22 +33,20 @@ def length_of(text: str, *, now: float | None = None) -> float:
 
     With `now`, what it is at present, also ``+0.5``, ``-0.5``, ``*2``, ``/2`` and ``50%``.
 
-    Examples
-    --------
     >>> length_of("120cm"), length_of("3,2"), length_of("+0.5", now=2.0), length_of("/4", now=2.0)
     (1.2, 3.2, 2.5, 0.5)
     """
     typed = _clean(text)
-    if now is not None and typed[:1] in ("*", "/", "×", "÷"):
-        factor = _number(typed[1:].strip(), text, _LENGTHS)
-        if typed[0] in "/÷" and factor == 0.0:
+    sign = typed[:1]
+    if now is not None and sign and sign in "*/×÷":
+        factor = _wanted(_number(typed[1:].strip()), text, _LENGTHS)
+        if sign in "/÷" and factor == 0.0:
             raise MapError(f"{shown(text)}: nothing can be divided by 0")
-        return _limited(now * factor if typed[0] in "*×" else now / factor, text)
+        return _limited(now * factor if sign in "*×" else now / factor, text)
     if now is not None and typed.endswith("%"):
-        return _limited(now * _number(typed[:-1].strip(), text, _LENGTHS) / 100.0, text)
-    relative = now is not None and typed[:1] in ("+", "-")
-    length = _length(typed, text, _LENGTHS)
-    return _limited(length + (now or 0.0) if relative else length, text)
+        return _limited(now * _wanted(_number(typed[:-1].strip()), text, _LENGTHS) / 100.0, text)
+    relative = now if now is not None and sign in ("+", "-") else 0.0
+    return _limited(_wanted(_length(typed), text, _LENGTHS) + relative, text)
 
 
 def point_of(text: str, *, last: Point | None = None) -> Point:
@@ -68,8 +54,6 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
 
     Relative to `last`: ``@0.5 0``, ``@2<45``, and ``+0.5 0``, whose first sign is a plus.
 
-    Examples
-    --------
     >>> point_of("3.2 1.5"), point_of("3,2 1,5"), point_of("320 cm; 1.5 m"), point_of("3.2,1.5")
     ((3.2, 1.5), (3.2, 1.5), (3.2, 1.5), (3.2, 1.5))
     >>> point_of("@2<90", last=(1.0, 1.0)), point_of("+0.5 -1", last=(1.0, 1.0))
@@ -77,15 +61,14 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     """
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
-    body = typed.removeprefix("@").strip()
     if relative and last is None:
         raise MapError(f"{shown(text)}: there is no point before that it could be relative to")
-    if "<" in body or "∠" in body:
-        length, _, angle = body.replace("∠", "<").partition("<")
-        away = _length(length.strip(), text, _POINTS)
-        x, y = _polar(away, _angle(angle.strip(), text, _POINTS))
+    length, sign, angle = typed.removeprefix("@").strip().partition("<")
+    if sign:
+        away = _wanted(_length(length.strip()), text, _POINTS)
+        x, y = _polar(away, _wanted(_angle(angle.strip()), text, _POINTS))
     else:
-        x, y = _pair(body, text, _POINTS, "")
+        x, y = _wanted(_pair(length, ""), text, _POINTS)
     if relative and last is not None:
         x, y = last[0] + x, last[1] + y
     if max(abs(x), abs(y)) > FARTHEST:
@@ -98,43 +81,33 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
 
     ``<45`` alone keeps the cursor's distance at that angle.
 
-    Examples
-    --------
     >>> next_point_of("2", (1.0, 1.0), (1.0, 1.3))
     (1.0, 3.0)
     """
     typed = _clean(text)
     if last is not None and towards is not None:
         dx, dy = towards[0] - last[0], towards[1] - last[1]
-        away = math.hypot(dx, dy)
-        if typed[:1] in ("<", "∠"):
-            x, y = _polar(away, _angle(typed[1:].strip(), text, _POINTS))
+        away, length = math.hypot(dx, dy), _length(typed)
+        if typed[:1] == "<":
+            x, y = _polar(away, _wanted(_angle(typed[1:].strip()), text, _POINTS))
             return _exact(last[0] + x), _exact(last[1] + y)
-        if _LENGTH.fullmatch(typed) or _FEET_AND_INCHES.fullmatch(typed):
-            length = _limited(_length(typed, text, _LENGTHS), text)
+        if length is not None:
+            length = _limited(length, text)
             if away == 0.0:
                 raise MapError(f"{shown(text)}: point the cursor where the line is to go")
             return _exact(last[0] + dx / away * length), _exact(last[1] + dy / away * length)
     return point_of(text, last=last)
 
 
-def size_of(text: str, *, now: tuple[float, float] | None = None) -> tuple[float, float]:
+def size_of(text: str) -> tuple[float, float]:
     """Return width and height in metres: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both.
 
-    With `now`, what they are at present, ``*2`` and ``50%`` scale both.
-
-    Examples
-    --------
-    >>> size_of("3 x 2"), size_of("120cm×80cm"), size_of("1,5"), size_of("50%", now=(3.0, 2.0))
-    ((3.0, 2.0), (1.2, 0.8), (1.5, 1.5), (1.5, 1.0))
+    >>> size_of("3 x 2"), size_of("120cm×80cm"), size_of("1,5")
+    ((3.0, 2.0), (1.2, 0.8), (1.5, 1.5))
     """
     typed = _clean(text)
-    if now is not None and (typed[:1] in ("*", "/", "÷") or typed.endswith("%")):
-        width, height = length_of(typed, now=now[0]), length_of(typed, now=now[1])
-    elif _LENGTH.fullmatch(typed) or _FEET_AND_INCHES.fullmatch(typed):
-        width = height = _length(typed, text, _SIZES)
-    else:
-        width, height = _pair(typed, text, _SIZES, "x×*")
+    both = _length(typed)
+    width, height = (both, both) if both is not None else _wanted(_pair(typed, "x×*"), text, _SIZES)
     if min(width, height) <= 0.0:
         raise MapError(f"{shown(text)}: width and height must be above 0 m")
     return _limited(width, text), _limited(height, text)
@@ -143,42 +116,41 @@ def size_of(text: str, *, now: tuple[float, float] | None = None) -> tuple[float
 def angle_of(text: str) -> float:
     """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``.
 
-    Examples
-    --------
     >>> angle_of("22,5°")
     22.5
     """
-    return _angle(_clean(text), text, "type an angle in degrees, such as 45")
+    return _wanted(_angle(_clean(text)), text, "type an angle in degrees, such as 45")
 
 
 def _clean(text: str) -> str:
     """Return what was typed with plain signs, in lower case."""
-    for sign, plain in (("−", "-"), ("–", "-"), ("″", '"'), ("”", '"'), ("′", "'"), ("’", "'")):
-        text = text.replace(sign, plain)
-    return " ".join(text.lower().split())
+    return " ".join(text.translate(str.maketrans("−–″”′’∠", "--\"\"''<")).lower().split())
 
 
-def _number(typed: str, text: str, wanted: str) -> float:
-    if not re.fullmatch(_NUMBER, typed):
+def _wanted(meant: _Meant | None, text: str, wanted: str) -> _Meant:
+    if meant is None:
         raise MapError(f"{shown(text)}: {wanted}")
-    value = float(typed.replace(",", "."))
-    if not math.isfinite(value):
-        raise MapError(f"{shown(text)}: {wanted}")
-    return value
+    return meant
 
 
-def _length(typed: str, text: str, wanted: str) -> float:
+def _number(typed: str) -> float | None:
+    value = float(typed.replace(",", ".")) if re.fullmatch(_NUMBER, typed) else math.nan
+    return value if math.isfinite(value) else None
+
+
+def _length(typed: str) -> float | None:
     feet = _FEET_AND_INCHES.fullmatch(typed)
-    if feet:
-        whole, inches = _number(feet[1], text, wanted), _number(feet[2], text, wanted)
-        return _exact(math.copysign(abs(whole) * 0.3048 + inches * 0.0254, whole))
     match = _LENGTH.fullmatch(typed)
-    if match is None:
-        raise MapError(f"{shown(text)}: {wanted}")
-    return _exact(_number(match[1], text, wanted) * _UNITS[match[2]])
+    if feet:
+        whole, inches = _number(feet[1]), _number(feet[2])
+        if whole is None or inches is None:
+            return None
+        return _exact(math.copysign(abs(whole) * 0.3048 + inches * 0.0254, whole))
+    number = _number(match[1]) if match else None
+    return None if match is None or number is None else _exact(number * _UNITS[match[2]])
 
 
-def _pair(typed: str, text: str, wanted: str, signs: str) -> tuple[float, float]:
+def _pair(typed: str, signs: str) -> tuple[float, float] | None:
     """Return two lengths, parted by a semicolon, a blank, a comma that is no decimal one, or by a sign."""
     parted = [re.split(rf"\s*[{re.escape(sign)}]\s*", typed) for sign in signs]
     parted += [re.split(r"\s*;\s*", typed), re.split(r"\s*,\s+|\s+,\s*", typed)]
@@ -188,17 +160,15 @@ def _pair(typed: str, text: str, wanted: str, signs: str) -> tuple[float, float]
     parted.append(re.split(r"\s+(?=[+\-.,\d])", typed))
     for parts in parted:
         if len(parts) == 2 and all(_LENGTH.fullmatch(part) for part in parts):
-            x, y = (_length(part, text, wanted) for part in parts)
-            return x, y
-    raise MapError(f"{shown(text)}: {wanted}")
+            x, y = map(_length, parts)
+            return None if x is None or y is None else (x, y)
+    return None
 
 
-def _angle(typed: str, text: str, wanted: str) -> float:
+def _angle(typed: str) -> float | None:
     match = _ANGLE.fullmatch(typed)
-    if match is None:
-        raise MapError(f"{shown(text)}: {wanted}")
-    value = _number(match[1], text, wanted)
-    return math.degrees(value) if match[2] == "rad" else value
+    value = _number(match[1]) if match else None
+    return math.degrees(value) if match and value is not None and match[2] == "rad" else value
 
 
 def _polar(length: float, degrees: float) -> tuple[float, float]:

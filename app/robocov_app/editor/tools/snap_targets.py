@@ -30,7 +30,7 @@ class Targets:
     """The vertices and edges of a sketch, to snap to: made once at the begin of a drag.
 
     Of a wall, its middle line and its outline; of a circle, its centre, its rim and the four ends of that.
-    What is dragged is left out, of a vertex itself and its edges; `more` are points such as those drawn.
+    What is dragged is left out, of a vertex itself and its edges; `more` points are those drawn so far.
     """
 
     def __init__(
