@@ -49,6 +49,11 @@ class Simulation:
     ----------
     starts, velocities, time : (n, 2) m, (n, 2) m/s, s
         At the beginning; by default robots are at rest.
+    steps : int
+        Made before, since `time`.
+    resumed : bool
+        Go on from positions and velocities that a simulation had, bit for bit as it did: who leaned on
+        something may stand deeper in it than who starts.
     team : Team
         By default `Team.homogeneous(n)`.
     dt : float, s
@@ -85,6 +90,8 @@ class Simulation:
         *,
         velocities: Array | None = None,
         time: float = 0.0,
+        steps: int = 0,
+        resumed: bool = False,
         conditions: Conditions | None = None,
         runs: int = 1,
     ) -> None:
@@ -112,12 +119,13 @@ class Simulation:
         if conditions is not None:
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
+        self.environment, self.controller, self.dt = environment, controller, dt
+        self._began, self._steps = time, steps
         # who moves may lean on something, and sink in a little
         slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
-        there = None if conditions is None else conditions.working(time, len(positions))
-        for run in self._each_run:
-            check_starts(environment.at(time), positions[run], self.team[run], slack, there)
-        self.environment, self.controller, self.dt = environment, controller, dt
+        there = None if conditions is None else conditions.working(self.time, len(positions))
+        for run in self._each_run if not resumed else ():
+            check_starts(environment.at(self.time), positions[run], self.team[run], slack, there)
         self._built_in = type(controller) in CONTROLLERS.values()
         self.conditions = conditions
         walls, moving = solid_pieces(environment), movers(environment)
@@ -126,7 +134,8 @@ class Simulation:
         self.sensor = RangeSensor(walls, moving)
         self._world: World | ChangingWorld
         if conditions is not None and changes:
-            self._world = ChangingWorld(conditions, environment, self.team, positions, velocities, time=time)
+            given = conditions, environment, self.team, positions, velocities
+            self._world = ChangingWorld(*given, time=self.time)
         else:
             self._world = World(walls, self.team, positions, velocities, movers=moving, runs=runs)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
@@ -134,7 +143,6 @@ class Simulation:
         self._everybody = None
         if np.isinf(self.team.communication_range).all():
             self._everybody = Neighbours.beside([Neighbours(each)] * runs)
-        self._began, self._steps = time, 0
         self._law = self._asked(informed, controller, environment.static)
         self.memory = self._asked(self._law.begin, environment.region, self.team)
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
@@ -337,7 +345,8 @@ class Simulation:
             self.team if team is None else team,
             self.dt,
             velocities=self.velocities if velocities is None else velocities,
-            time=self.time,
+            time=self._began,
+            steps=self._steps,
             conditions=self.conditions if conditions is None else conditions,
         )
         if len(twin.team) == len(self.team):

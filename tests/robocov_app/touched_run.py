@@ -9,7 +9,6 @@ import shapely
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Desk
-from robocov_app.viewer.session.pane import with_failed
 from robocov_app.viewer.session.scenario import Law, Scenario
 from robocov_app.viewer.session.session import Session
 
@@ -50,7 +49,7 @@ def all_told(session: Session) -> list[object]:
     told: list[object] = [session.scenario, session.hand, session.settled, session.playing, session.serial]
     told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
     told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
-    told += [session.undo.can_undo, session.undo.can_redo]
+    told += [session.head.number, session.can_undo, session.can_redo]
     for lane in session.lanes:
         told += [lane.number, lane.circumstances, lane.time]
         told += [
@@ -68,7 +67,7 @@ def too_deep(session: Session) -> float:
     """Return by how many metres some robot is too near to a wall or an obstacle, inf inside of one."""
     deepest = -np.inf
     for lane in session.lanes:
-        free = with_failed(lane.circumstances).free
+        free = lane.circumstances.solid.free
         places = shapely.points(lane.simulation.positions)
         if not shapely.contains_properly(free, places).all():
             return np.inf

@@ -22,11 +22,17 @@ class Arguments(RunOptions):
     The folder holds run.json and record.npz (all of the run), cost.csv, trajectories and cost as
     PNG and SVG, and on request frames and a film.
 
+    For MAP a session of the window may stand, story.robocov: it is made again, touch by touch.
+
     Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
     """
 
     controller: str = "rapf"
-    """A controller by name, or mine.py:MyController."""
+    """A controller by name, or mine.py:MyController. Of a session: yours that it may run, as a.py:A,b.py:B"""
+    branch: str | None = None
+    """Of a session, the story to make again: its name, or its number; by default the one it was saved in."""
+    all_branches: bool = False
+    """Of a session, all stories, each in a folder of its own."""
 
 
 def command(options: Arguments) -> int:
@@ -41,6 +47,8 @@ def command(options: Arguments) -> int:
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
 
+    if options.map.endswith(".robocov"):
+        return remade(options)
     # everything that the user gave is checked before a folder is made
     gains = parsed_gains(options.gains)
     spec = options.spec(load_map(options.map), options.controller, gains)
@@ -59,6 +67,45 @@ def command(options: Arguments) -> int:
         print_summary(run)
         end = f"stopped at {run.record.time[-1]:.1f} s; what was done is in"
         print(f"{end if stop.requested else 'saved in'} {out}/: {listed(out)}{options.record_words}")
+    return INTERRUPTED if stop.requested else 0
+
+
+def remade(options: Arguments) -> int:
+    """Make stories of a session again, and save them."""
+    from robocov.compiled import compile_kernels
+    from robocov.files.result_folder import results
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.terminal.output import finite, listed
+    from robocov_app.viewer.session.file import load_session, save_session
+    from robocov_app.viewer.story import save_story
+
+    path = Path(options.map)
+    saved = load_session(path, [name for name in options.controller.split(",") if ":" in name])
+    document, stories = saved.document, [(saved.head, saved.step, "")]
+    if options.branch is not None:
+        branch = document.branch(options.branch)
+        stories = [(branch.node, branch.end, "")]
+    elif options.all_branches:
+        stories = [(each.node, each.end, f"-{k}") for k, each in enumerate(document.branches(), 1)]
+    compile_kernels()
+    answers = []
+    with Interruption() as stop:
+        for node, step, suffix in stories:
+            out = Path(f"{options.out or path.stem}{suffix}")
+            with results(out, "story", overwrite=options.overwrite) as result:
+                save_session(result.new / f"session{path.suffix}", document, node, step, saved.view)
+                answers.append({"out": str(out), **save_story(document, node, step, result, options, stop)})
+                result.keep()
+            if not options.json:
+                for row in answers[-1]["runs"]:
+                    told = answers[-1]["parts"][row["part"] - 1]
+                    span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
+                    print(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
+                print(f"saved in {out}/: {listed(out)}")
+            if stop.requested:
+                break
+    if options.json:
+        print(json.dumps(finite(answers[0] if len(answers) == 1 else {"stories": answers})))
     return INTERRUPTED if stop.requested else 0
 
 

@@ -40,6 +40,7 @@ _NARROWEST = 360  # least width in pixels of a pane at scale 1: its caption fits
 FILM_SCALE = 1.3
 """How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
 
+FILMS = "run.mp4", "comparison.mp4"  # of one run, of several side by side
 FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
 Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
@@ -320,21 +321,29 @@ def save_moving(
     layout = pane_layout(records, style, options.picture_size()) if len(runs) > 1 else None
 
     def frames() -> Iterator[Frame]:
-        drawn = (
-            iter_frames(records[0], style, size=options.film_size(), cost=costs[0])
-            if layout is None
-            else comparison_frames(records, costs, layout, style)
-        )
-        for done, frame in enumerate(drawn, start=1):
+        if layout is None:
+            return iter_frames(records[0], style, size=options.film_size(), cost=costs[0])
+        return comparison_frames(records, costs, layout, style)
+
+    write_moving(frames(), total, folder / FILMS[layout is not None], options, stop)
+
+
+def write_moving(
+    frames: Iterator[Frame], total: int, film: Path, options: RunOptions, stop: Interruption
+) -> None:
+    """Write frames beside a film, as PNGs, and the film, as the options say; Ctrl-C ends both early."""
+
+    def told() -> Iterator[Frame]:
+        for done, frame in enumerate(frames, start=1):
             yield frame
             update(done)
             if stop.requested:
                 return
 
-    pictures = folder / "frames"
+    pictures = film.parent / "frames"
     with progress("film" if options.video else "frames", total, quiet=options.json) as update:
         if not options.video:
-            save_frames(pictures, frames())
+            save_frames(pictures, told())
         else:
-            shown = kept_frames(pictures, frames()) if options.frames else frames()
-            save_film(folder / ("run.mp4" if layout is None else "comparison.mp4"), shown, fps=options.fps)
+            shown = kept_frames(pictures, told()) if options.frames else told()
+            save_film(film, shown, fps=options.fps)

@@ -15,7 +15,6 @@ import shapely
 
 from robocov.environment import WallObstacle
 from robocov.metrics import SETTLED_DISTANCE, TOUCHING
-from robocov_app.viewer.session.pane import with_failed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,7 +83,7 @@ def report_on(desk: Desk, number: int) -> Report:
     return explain(
         session.snapshot(lane),
         circumstances.team,
-        with_failed(circumstances),
+        circumstances.solid,
         circumstances.numbers.index(number),
         names=circumstances.numbers,
         recent=session.recent(lane, number),

@@ -320,12 +320,12 @@ class Desk:
 
     def undo(self) -> None:
         """Take the last edit back."""
-        words = self.session.undo.undo()
-        self.say(f"undone: {words}" if words else "nothing to undo")
+        words = self.session.undo()
+        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else "nothing to undo")
 
     def redo(self) -> None:
         """Do again what was taken back."""
-        words = self.session.undo.redo()
+        words = self.session.redo()
         self.say(f"done again: {words}" if words else "nothing to redo")
 
     def ask_next(self, by: int) -> None:

@@ -27,9 +27,9 @@ from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import plain
 from robocov_app.viewer.report_page import ReportPage
+from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
-from robocov_app.viewer.session.keeping import Keeper
 from robocov_app.viewer.status import HINT, draw_status, facts
 from robocov_app.viewer.tour import Tour
 
@@ -90,7 +90,7 @@ class Window:
         self.help = False
         self.tour: Tour | None = None
         self.film: Film | None = None
-        self.keeper = Keeper()
+        self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         self.windowed: tuple[int, int] | None = None
         self.screen = screen or shown(size)
@@ -182,6 +182,8 @@ class Window:
             desk.version += 1
             if session.settled:
                 desk.say(f"settled at {session.time:.1f} s")
+            elif session.at_end_of_record and session.live and not desk.trouble:
+                desk.say("the record ends here; Space goes on from it, by simulating")
         if seconds > 0:
             self._steps_rate += 0.1 * (steps / seconds - self._steps_rate)
         desk.look_at_map()

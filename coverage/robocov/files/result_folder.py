@@ -21,7 +21,7 @@ from typing import Literal, TypeAlias
 from robocov.errors import InputError, OutputError, reason, shown
 from robocov.files.atomic import locked, on_disk, written
 
-Kind: TypeAlias = Literal["run", "comparison", "replay"]
+Kind: TypeAlias = Literal["run", "comparison", "replay", "story"]
 REPORT = "report.html"
 """A page about the result, which goes with it."""
 _MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
@@ -32,6 +32,7 @@ _FILES: dict[Kind, tuple[str, ...]] = {
     "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_PICTURES),
     "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_PICTURES),
     "replay": ("replay.json", "run.mp4", "comparison.mp4"),
+    "story": ("story.json", "session.robocov", "cost.csv", "run.mp4", "comparison.mp4"),
 }
 """Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
 _NAMES = {_MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}

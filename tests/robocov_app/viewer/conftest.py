@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from driven_window import Driver, opened
 
-from robocov_app.viewer.session import history, timeline
+from robocov_app.viewer.session import history, session
 
 
 @pytest.fixture
@@ -22,4 +22,4 @@ def driver(tmp_path: Path) -> Iterator[Driver]:
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the past be thinned soon."""
     monkeypatch.setattr(history, "_FEWEST", 20)
-    monkeypatch.setattr(timeline, "History", lambda dt: history.History(dt, 60_000))
+    monkeypatch.setattr(session, "History", lambda dt, most=0: history.History(dt, 60_000))

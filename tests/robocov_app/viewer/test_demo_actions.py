@@ -177,7 +177,7 @@ def prepared(driver: Driver) -> Driver:
     desk.hand.selected = 2
     session.add_robot((8.0, 8.0))
     session.add_robot((8.0, 2.0))
-    session.undo.undo()
+    session.undo()
     session.playing = False
     desk.do("tool:polygon")
     desk.tool.press(session, (6.0, 6.0), 0.1, None)

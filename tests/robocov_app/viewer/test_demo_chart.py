@@ -102,7 +102,7 @@ def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> N
     last = first.curve.last_time
     values = {lane.number: lane.curve.value[-1] for lane in (first, second)}
     second.curve.add(last + 0.01, 99.0)
-    driver.session._step += 60
+    driver.session._run.step += 60
     time, known = compared(driver.session)
     assert time == last
     assert known == pytest.approx(values)

@@ -32,7 +32,7 @@ def test_an_empty_curve():
     assert curve.last_time == -math.inf
     assert math.isnan(curve.at(1.0))
     assert curve.time.shape == curve.value.shape == (0,)
-    assert len(curve.cut(1.0)) == 0
+    assert len(curve.between(0.0, 1.0)) == 0
 
 
 def test_what_comes_late_is_left_out():
@@ -81,29 +81,6 @@ def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
             assert len(curve) <= most
         assert (np.diff(curve.time) > 0).all()
         assert curve.value == pytest.approx(curve.time, abs=1e-9)
-
-
-@given(st.lists(st.floats(0.01, 1.0), max_size=30), st.floats(-1.0, 20.0))
-def test_what_is_cut_off_begins_where_it_was_cut(steps, time):
-    times = np.cumsum(steps).tolist()
-    curve = drawn(*((at, 2 * at) for at in times))
-    rest = curve.cut(time)
-    assert curve.time.tolist() == [at for at in times if at <= time + 1e-6]
-    assert rest.time.tolist() == times[max(len(curve) - 1, 0) :]
-    assert rest.value.tolist() == [2 * at for at in rest.time.tolist()]
-    # on their own from now on
-    rest.add(1e3, 1.0)
-    curve.add(1e2, 1.0)
-    assert curve.last_time == 1e2
-
-
-def test_a_copy_is_on_its_own():
-    curve = drawn((0.0, 3.0), (1.0, 2.0))
-    twin = curve.copy()
-    twin.add(2.0, 1.0)
-    twin.cut(0.0)
-    assert curve.time.tolist() == [0.0, 1.0]
-    assert curve.value.tolist() == [3.0, 2.0]
 
 
 def test_events_and_ghosts_say_what_they_are():

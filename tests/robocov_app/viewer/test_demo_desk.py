@@ -272,9 +272,9 @@ def test_undo_and_redo_say_what_they_did() -> None:
     assert desk.message == "nothing to redo"
     desk.session.add_robot((5.0, 3.0))
     desk.do("undo")
-    assert desk.message == "undone: robot 4" and desk.session.numbers == (1, 2, 3)
+    assert desk.message == "undone: robot 4 joined; back at 0.0 s" and desk.session.numbers == (1, 2, 3)
     desk.do("redo")
-    assert desk.message == "done again: robot 4" and desk.session.numbers == (1, 2, 3, 4)
+    assert desk.message == "done again: robot 4 joined" and desk.session.numbers == (1, 2, 3, 4)
 
 
 # tools

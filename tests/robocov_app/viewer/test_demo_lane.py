@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation import Decision
 from robocov_app.viewer.session.history import Circumstances
-from robocov_app.viewer.session.pane import SENSED_EVERY, Lane, Wanted, resumed, simulation_of, with_failed
+from robocov_app.viewer.session.pane import SENSED_EVERY, Lane, Wanted, begun, resumed
 from robocov_app.viewer.session.scenario import Law, Limits
 
 DT = 1 / 60
@@ -55,8 +55,12 @@ def own(tmp_path_factory) -> Law:
     return Law(f"{file}:Mine")
 
 
+def lane_in(circumstances, number=0) -> Lane:
+    return Lane(number, circumstances, begun(circumstances, PLACES, DT))
+
+
 def lane_of(law=RAPF, steps=0, **changes) -> Lane:
-    lane = Lane(7, replace(THEN, law=law, **changes), PLACES, DT)
+    lane = lane_in(replace(THEN, law=law, **changes), number=7)
     for _ in range(steps):
         lane.step()
     return lane
@@ -70,12 +74,12 @@ def test_a_lane_begins_at_its_starts():
     np.testing.assert_array_equal(lane.trail.positions, [PLACES])
     assert len(lane.curve) == len(lane.sensed) == 0
     with pytest.raises(StartError, match="outside the boundary"):
-        Lane(0, THEN, PLACES - 5.0, DT)
+        begun(THEN, PLACES - 5.0, DT)
 
 
 def test_it_steps_as_the_simulation_does():
     lane = lane_of(steps=30)
-    twin = simulation_of(THEN, PLACES, DT, None, 0.0)
+    twin = begun(THEN, PLACES, DT)
     for _ in range(30):
         twin.step()
     np.testing.assert_array_equal(lane.simulation.positions, twin.positions)
@@ -90,7 +94,7 @@ def test_what_is_sensed_is_noted_now_and_then():
     assert len(lane.sensed) == 3
     np.testing.assert_array_equal(
         lane.sensed.until(0.0)[0],
-        simulation_of(THEN, PLACES, DT, None, 0.0).snapshot.seen.obstacle_points,
+        begun(THEN, PLACES, DT).snapshot.seen.obstacle_points,
     )
     slow = lane_of(steps=SENSED_EVERY)
     assert slow.sensed.until(1.0)[1].tolist() == [1, 2, 3]
@@ -99,10 +103,10 @@ def test_what_is_sensed_is_noted_now_and_then():
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
 def test_it_goes_on_from_a_state_as_it_did(law):
     lane = lane_of(law, steps=25)
-    state, time = lane.state(), lane.time
+    state, step = lane.state(), 25
     assert state.memory is None
-    twin = resumed(state, DT, time)
-    assert twin.time == time
+    twin = resumed(state, DT, step)
+    assert twin.time == lane.time
     for _ in range(40):
         lane.step()
         twin.step()
@@ -112,43 +116,16 @@ def test_it_goes_on_from_a_state_as_it_did(law):
 
 def test_so_it_does_with_a_controller_that_changes_what_it_remembers(own):
     lane = lane_of(own, steps=25)
-    state, time = lane.state(), lane.time
+    state, step = lane.state(), 25
     assert state.memory["steps"] == 25
     for _ in range(40):
         lane.step()
     assert state.memory["steps"] == 25
     for _ in range(2):
-        twin = resumed(state, DT, time)
+        twin = resumed(state, DT, step)
         for _ in range(40):
             twin.step()
         np.testing.assert_array_equal(twin.positions, lane.simulation.positions)
-
-
-def test_a_lane_resumes():
-    lane = lane_of(steps=40)
-    state = lane.state()
-    known = len(lane.sensed)
-    time, trail, sensed = lane.time, lane.trail, lane.sensed
-    for _ in range(60):
-        lane.step()
-    more = len(lane.sensed)
-    assert more > known
-    lane.resume(state, resumed(state, DT, time), PLACES, trail)
-    assert lane.time == time
-    assert len(lane.sensed) == known
-    # what there was before is not altered
-    assert len(sensed) == more
-
-
-def test_robots_pressed_too_far_into_something_come_back_out_of_it():
-    state = lane_of(steps=5).state()
-    deep = state.positions.copy()
-    deep[0] = (0.08, 2.0)
-    simulation = resumed(state._replace(positions=deep), DT, 1.0)
-    assert simulation.positions[0] == pytest.approx((0.101, 2.0), abs=1e-6)
-    np.testing.assert_array_equal(simulation.positions[1:], deep[1:])
-    np.testing.assert_array_equal(simulation.velocities[1:], state.velocities[1:])
-    assert simulation.velocities[0].tolist() == [0.0, 0.0]
 
 
 def changed(lane, **changes) -> Lane:
@@ -237,8 +214,7 @@ class TestChanges:
 
 def test_robots_that_failed_are_sensed_as_obstacles_are():
     failed = replace(THEN, failed={8: (1.3, 1.5)})
-    assert with_failed(failed) is failed.solid
-    lane = Lane(0, failed, PLACES, DT)
+    lane = lane_in(failed)
     seen = lane.simulation.snapshot.seen
     assert len(seen.positions) == seen.neighbours.count == 3
     away = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)

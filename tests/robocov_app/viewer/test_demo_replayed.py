@@ -125,9 +125,13 @@ def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: Law) -> None:
     whole = stepped(begun(law, robots=8, start="spread"), 2 * STEPS)
     session = replayed(recorded(law, robots=8, start="spread"))
     session.playing = True
-    for _ in range(2 * STEPS):
+    for _ in range(STEPS + 5):
         session.advance(1 / 60)
-    assert session.live
+    assert session.live and session.at_end_of_record and not session.playing, "to go on is to be decided"
+    session.playing = True
+    for _ in range(STEPS):
+        session.advance(1 / 60)
+    assert session.live and not session.at_end_of_record
     assert session.end == whole.end
     for mine, theirs in zip(state_of(session), state_of(whole), strict=True):
         np.testing.assert_array_equal(mine, theirs)
@@ -152,7 +156,7 @@ def test_it_can_be_touched_at_any_moment(record: Record) -> None:
     assert session.live
     assert session.numbers == (1, 3, 4)
     stepped(session, 10)
-    assert session.undo.can_undo
+    assert session.can_undo
 
 
 def test_it_begins_anew_where_it_began(record: Record) -> None:
@@ -368,6 +372,9 @@ def test_the_window_shows_what_it_can(tmp_path: Path, counting: Law) -> None:
         for _ in range(40):
             window.frame(1 / 30)
         assert window.desk.session.live
+        assert window.desk.message.startswith("the record ends here")
+        window.do("pause")
+        window.frame(1 / 30)
         assert "not gone on with" in window.desk.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)

@@ -38,21 +38,20 @@ def test_it_begins_anew_as_it_began():
     for lane in session.lanes:
         np.testing.assert_array_equal(session.positions(lane), start)
     assert list(session.events) == list(session.ghosts) == []
-    assert not session.undo.can_undo
+    assert session.undo() == "begun anew"
+    assert robots_of(session) == ((2, 3, 4), (1,)) and session.time == 20 / 60
 
 
-def test_what_was_drawn_can_be_undone_after_a_restart_but_not_what_was_done_to_robots() -> None:
+def test_everything_can_be_undone_to_the_first_moment_also_restarts() -> None:
     session = begun()
     session.edit(with_obstacle(session.environment, CircleObstacle((5.2, 0.4), 0.2)), "circle drawn")
     session.add_robot((3.4, 3.0))
     session.restart(seed=3)
     assert robots_of(session) == ((1, 2, 3), ())
-    assert session.undo.undo() == "circle drawn"
-    assert session.environment.obstacles == HALL.obstacles
-    assert not session.undo.can_undo
-    assert session.undo.redo() == "circle drawn"
-    session.restart(environment=HALL)
-    assert not session.undo.can_undo and not session.undo.can_redo
+    assert [session.undo() for _ in range(4)] == ["begun anew", "robot 4 joined", "circle drawn", None]
+    assert session.environment is HALL and not session.can_undo
+    assert [session.redo() for _ in range(4)] == ["circle drawn", "robot 4 joined", "begun anew", None]
+    assert session.scenario.seed == 3 and robots_of(session) == ((1, 2, 3), ())
 
 
 def test_it_begins_anew_with_changes():

@@ -153,7 +153,7 @@ class TestHand:
         assert hand.release(session, (4.5, 2.2)) == "circle “pillar” moved"
         assert session.environment.obstacles == (preview.obstacle, HALL.obstacles[1])
         assert hand.preview(session) is None
-        assert session.undo.undo() == "circle “pillar” moved"
+        assert session.undo() == "circle “pillar” moved"
         assert session.environment == HALL
 
     def test_a_click_on_an_obstacle_or_the_floor_moves_nothing(self):
@@ -397,7 +397,7 @@ def test_however_tools_are_used_nothing_breaks(actions):
             elif action == "move":
                 said = tool.move(session, point)
             elif action == "undo":
-                said = session.undo.undo()
+                said = session.undo()
             elif action == "step":
                 said = session.advance(0.05) and None
             elif action == "cancel":

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
 
 from robocov.environment import CircleObstacle, Environment
-from robocov.errors import ParameterError, StartError
+from robocov.errors import MapError, ParameterError, StartError
 from robocov.robots import Team
-from robocov_app.viewer.session import touches as module
+from robocov_app.viewer.session import changes as module
+from robocov_app.viewer.session.changes import nearest_free
 from robocov_app.viewer.session.scenario import Limits
-from robocov_app.viewer.session.touches import nearest_free
 
 RADIUS = 0.1
 places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
@@ -152,11 +152,11 @@ def test_robots_leave_and_come_back_to_their_rows():
     assert where[0] != where[1]
     session.remove_robot(2)
     assert robots_of(session) == ((1, 3, 4), ())
-    session.undo.undo()
+    session.undo()
     assert robots_of(session) == ((1, 2, 3, 4), ())
     # in each pane to its own place
     assert [place_of(session, 2, pane) for pane in (0, 1)] == where
-    session.undo.redo()
+    session.redo()
     assert robots_of(session) == ((1, 3, 4), ())
 
 
@@ -166,10 +166,10 @@ def test_a_robot_that_failed_leaves_and_comes_back_failed():
     where = [failed_at(session, 1, pane) for pane in (0, 1)]
     session.remove_robot(1)
     assert robots_of(session) == ((2, 3), ())
-    session.undo.undo()
+    session.undo()
     assert robots_of(session) == ((2, 3), (1,))
     assert [failed_at(session, 1, pane) for pane in (0, 1)] == where
-    assert session.undo.undo() == "failure of robot 1"
+    assert session.undo() == "robot 1 failed"
     assert robots_of(session) == ((1, 2, 3), ())
 
 
@@ -232,8 +232,8 @@ def test_who_fails_is_let_go():
         assert session.hand is not None
         touch(2)
         assert session.hand is None
-        session.undo.undo()
-        session.undo.undo()
+        session.undo()
+        session.undo()
         assert robots_of(session) == ((1, 2, 3), ())
 
 
@@ -254,8 +254,8 @@ def test_revival_beside_an_obstacle_that_was_drawn_meanwhile():
 def test_what_cannot_be_changes_nothing():
     session = stepped(begun(RAPF, RPF), 12)
     session.fail_robot(3)
-    session.undo.undo()
-    session.undo.redo()
+    session.undo()
+    session.redo()
     for paused in (True, False):
         session.playing = not paused
         before = all_told(session)
@@ -317,7 +317,7 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
     assert session.end == pytest.approx(10 / 60)
     assert robots_of(session) == ((1, 3), ())
     np.testing.assert_array_equal(session.positions(session.lanes[1]), then[[0, 2]])
-    session.undo.undo()
+    session.undo()
     np.testing.assert_array_equal(session.positions(session.lanes[1]), then)
 
 
@@ -329,7 +329,7 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
         lambda session: session.remove_robot(4),
         lambda session: session.place(4, (1.0, 1.0)),
         lambda session: session.add_robot((1.0, 1.0), 2),
-        lambda session: session.edit(replace(HALL, boundary=((0, 0), (0.3, 0), (0.3, 0.3))), "shrunk"),
+        lambda session: session.edit(replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"),
         lambda session: session.set_limits(Limits(radius=2.5)),
     ],
 )
@@ -339,13 +339,13 @@ def test_what_could_not_be_then_keeps_what_came_after(touch):
         for k in range(20):
             lane.curve.add(k / 60, 2.0)
     session.add_robot((3.0, 3.0))
-    session.undo.undo()
-    session.undo.redo()
+    session.undo()
+    session.redo()
     stepped(session, 20)
     session.look_at(10 / 60)
     session.playing = True
     before = all_told(session)
-    with pytest.raises((ParameterError, StartError)):
+    with pytest.raises((ParameterError, StartError, MapError)):
         touch(session)
     assert all_told(session) == before
     assert not session.live
@@ -360,12 +360,12 @@ def test_undo_is_of_the_present():
     stepped(session, 20)
     session.look_at(10 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
-    assert session.undo.undo() == "robot 2 taken out"
+    assert session.undo() == "robot 2 taken out"
     assert session.live
-    assert session.end == pytest.approx(40 / 60)
+    assert session.end == pytest.approx(20 / 60)
     assert robots_of(session) == ((1, 2, 3), ())
     session.look_at(10 / 60)
-    assert session.undo.redo() == "robot 2 taken out"
+    assert session.redo() == "robot 2 taken out"
     assert robots_of(session) == ((1, 3), ())
     assert session.live
 

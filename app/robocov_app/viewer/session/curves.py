@@ -72,19 +72,19 @@ class Curve:
         self._time.append(time)
         self._value.append(value)
 
-    def copy(self) -> Curve:
-        """Return a curve of its own with the same samples."""
-        twin = Curve()
-        twin._time, twin._value = self._time[:], self._value[:]
-        return twin
+    def between(self, begin: float, end: float) -> Curve:
+        """Return the samples from a time, s, to another."""
+        first = int(np.searchsorted(self._time, begin - 1e-6))
+        last = int(np.searchsorted(self._time, end + 1e-6, side="right"))
+        part = Curve()
+        part._time, part._value = self._time[first:last], self._value[first:last]
+        return part
 
-    def cut(self, time: float) -> Curve:
-        """Forget what came after `time`; return it, the last sample before it too."""
-        k = int(np.searchsorted(self._time, time + 1e-6, side="right"))
-        rest = Curve()
-        rest._time, rest._value = self._time[max(k - 1, 0) :], self._value[max(k - 1, 0) :]
-        del self._time[k:], self._value[k:]
-        return rest
+    def extend(self, later: Curve, until: float) -> None:
+        """Append those samples of another curve that are later than the last one here, up to a time, s."""
+        for time, value in zip(later._time, later._value, strict=True):
+            if self.last_time + 1e-9 < time <= until + 1e-6:
+                self.add(time, value)
 
     def at(self, time: float) -> float:
         """Return the value at a time, between samples on the straight line; nan before the first.
@@ -110,6 +110,8 @@ class Ghost:
     value : (k,) m or s
     of : str
         What the value is: "distance" or "time".
+    node : int
+        Of the document, at whose end the branch ends.
     """
 
     law: str
@@ -117,6 +119,7 @@ class Ghost:
     time: Array
     value: Array
     of: str = "distance"
+    node: int = 0
 
 
 class Plotted(NamedTuple):

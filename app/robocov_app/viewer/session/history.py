@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Decision
     from robocov.robots import Team
-    from robocov_app.viewer.session.scenario import Law, Limits
+    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
 
 MOST_BYTES = 24_000_000
 """Memory that the moments of a window may take."""
@@ -108,17 +108,26 @@ class State(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """All panes at one moment.
+    """All panes at one moment: enough to go on from there, bit for bit.
 
     Attributes
     ----------
     step : int
         Steps since the start.
     states : dict of pane to State
+    scenario : Scenario or None
+        Controllers, limits and map as they were last chosen; None in the past of a record.
+    hand : (number, (x, y) m) or None
+        The robot that is dragged, and where to.
+    node : int
+        Node of the document in whose time it is.
     """
 
     step: int
     states: Mapping[int, State]
+    scenario: Scenario | None = None
+    hand: tuple[int, tuple[float, float]] | None = None
+    node: int = 0
 
 
 class History:
@@ -136,7 +145,7 @@ class History:
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
         self.dt = dt
-        self._most = most_bytes
+        self.most_bytes = most_bytes
         self._moments: list[Moment] = []
         self._steps: list[int] = []
         self._sizes: list[int] = []
@@ -175,7 +184,7 @@ class History:
         self._sizes.append(_size(moment))
         self._bytes += self._sizes[-1]
         count = len(self._moments) + 1
-        while self._bytes > self._most and _FEWEST < len(self._moments) < count:
+        while self._bytes > self.most_bytes and _FEWEST < len(self._moments) < count:
             count = len(self._moments)
             self._thin()
 
@@ -196,7 +205,7 @@ class History:
 
     def until(self, k: int) -> History:
         """Return a history of its own that ends with moment `k`."""
-        twin = History(self.dt, self._most)
+        twin = History(self.dt, self.most_bytes)
         twin._moments, twin._steps = self._moments[: k + 1], self._steps[: k + 1]
         twin._sizes = self._sizes[: k + 1]
         twin._bytes, twin.thinned = sum(twin._sizes), self.thinned

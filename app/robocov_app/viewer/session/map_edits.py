@@ -2,51 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.density import Raster, sampled
+from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
-
-if TYPE_CHECKING:
-    from robocov.environment import Environment, Obstacle
 
 SHORTEST = 0.02
 """Metres below which what is drawn is taken for a slip of the hand."""
 
 
-def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return the map with one obstacle more, on top of the others.
+def with_obstacles(environment: Environment, obstacles: tuple[Obstacle, ...]) -> Environment:
+    """Return the map with other obstacles, without starts that they cover.
 
-    Raises
-    ------
-    MapError
-        When the map would break a rule; the message is a sentence for people.
+    Raises MapError where it would break a rule; the message is a sentence for people.
     """
-    return _checked(replace(environment, obstacles=(*environment.obstacles, obstacle)))
+    return _checked(replace(environment, obstacles=obstacles))
+
+
+def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
+    """Return the map with one obstacle more, on top of the others; MapError as `with_obstacles`."""
+    return with_obstacles(environment, (*environment.obstacles, obstacle))
 
 
 def without_obstacle(environment: Environment, index: int) -> Environment:
     """Return the map without obstacle number `index`."""
-    kept = environment.obstacles[:index] + environment.obstacles[index + 1 :]
-    return _checked(replace(environment, obstacles=kept))
+    return with_obstacles(environment, environment.obstacles[:index] + environment.obstacles[index + 1 :])
 
 
 def with_moved(environment: Environment, index: int, dx: float, dy: float) -> Environment:
-    """Return the map with one obstacle moved by (dx, dy) m.
-
-    Raises
-    ------
-    MapError
-        When the map would break a rule.
-    """
-    obstacles = list(environment.obstacles)
-    obstacles[index] = moved(obstacles[index], dx, dy)
-    return _checked(replace(environment, obstacles=tuple(obstacles)))
+    """Return the map with one obstacle moved by (dx, dy) m; MapError as `with_obstacles`."""
+    there = environment.obstacles
+    return with_obstacles(environment, (*there[:index], moved(there[index], dx, dy), *there[index + 1 :]))
 
 
 def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
@@ -156,3 +148,42 @@ def _is_about(message: str, start: str) -> bool:
     """Whether a message begins with the place of a start, or of something in it."""
     where = place(("starts", start))
     return message.startswith(tuple(f"{where}{after}" for after in (":", ".", "[")))
+
+
+CELLS = 96
+"""Cells along the longer side of a map whose density is painted."""
+
+LEAST, MOST = 0.05, 50.0
+"""Between these a place counts once it has been painted."""
+
+_DAB = 1.15
+"""Factor of one dab on the density at its centre."""
+
+_DECIMALS = 3
+"""Of what is painted, so that a map that is saved stays short."""
+
+
+def painted(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
+    """Return a map's density after dabs of a brush at points, m: raised or lowered, most in their middle."""
+    raster = painted_raster(environment)
+    values, (x_min, y_min, x_max, y_max) = np.array(raster.values), raster.extent
+    rows, columns = values.shape
+    x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
+    y = y_min + (np.arange(rows) + 0.5) * ((y_max - y_min) / rows)
+    for at_x, at_y in dabs:
+        square = ((x[None, :] - at_x) ** 2 + (y[:, None] - at_y) ** 2) / radius**2
+        soft = np.where(square < 1.0, (1.0 - np.minimum(square, 1.0)) ** 2, 0.0)
+        change = np.exp((-1.0 if lowers else 1.0) * np.log(_DAB) * soft)
+        values = np.where(soft > 0.0, np.clip(np.maximum(values, LEAST) * change, LEAST, MOST), values)
+    return Raster(np.round(values, _DECIMALS), raster.extent)
+
+
+def painted_raster(environment: Environment) -> Raster:
+    """Return a map's density as a raster that can be painted: as it is where it is one, else sampled."""
+    density = environment.density
+    if isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1:
+        return density
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    step = max(high_x - low_x, high_y - low_y) / CELLS
+    columns, rows = (max(round(side / step), 2) for side in (high_x - low_x, high_y - low_y))
+    return sampled(density, (low_x, low_y, high_x, high_y), columns, rows)

@@ -12,9 +12,8 @@ from robocov.errors import StartError
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
 from robocov_app.render.sensed import Sensed
-from robocov_app.viewer.session.curves import Curve, Ghost
+from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Circumstances, State
-from robocov_app.viewer.session.scenario import branch_words
 from robocov_app.viewer.session.trail import Trail
 
 if TYPE_CHECKING:
@@ -50,39 +49,13 @@ class Lane:
 
     A robot that failed stands where it is and says nothing: the others do not hear it any more, but their
     range sensors see it, as they see any obstacle.
-
-    Parameters
-    ----------
-    number : int
-        Of the pane, for good.
-    circumstances : Circumstances
-    positions : (n, 2) m
-    dt : float, s
-    velocities : (n, 2) m/s or None
-        At rest by default.
-    time : float, s
-
-    Raises
-    ------
-    StartError
-        When a robot is in a wall or in another one.
     """
 
-    def __init__(
-        self,
-        number: int,
-        circumstances: Circumstances,
-        positions: Array,
-        dt: float,
-        velocities: Array | None = None,
-        time: float = 0.0,
-    ) -> None:
-        self.number = number
-        self.circumstances = circumstances
-        self.simulation = simulation_of(circumstances, positions, dt, velocities, time)
-        self.starts = np.array(positions, dtype=float)
-        self.trail = Trail(len(positions))
-        self.trail.add(time, self.simulation.positions)
+    def __init__(self, number: int, circumstances: Circumstances, simulation: Simulation) -> None:
+        self.number, self.circumstances, self.simulation = number, circumstances, simulation
+        self.starts = simulation.positions
+        self.trail = Trail(len(self.starts))
+        self.trail.add(simulation.time, self.starts)
         self.curve, self.times = Curve(), Curve()
         self.sensed = Sensed()
         self._steps = 0
@@ -125,13 +98,6 @@ class Lane:
         self.simulation.step(pushes)
         self.trail.add(self.time, self.simulation.positions)
 
-    def leave(self, time: float) -> list[Ghost]:
-        """Cut the curves at a time, s; return what came after it, where there is more than a moment."""
-        self.curve, self.times = self.curve.copy(), self.times.copy()
-        rests = (("distance", self.curve.cut(time)), ("time", self.times.cut(time)))
-        words = branch_words(self.law)
-        return [Ghost(self.law.name, words, rest.time, rest.value, of) for of, rest in rests if len(rest) > 1]
-
     def state(self) -> State:
         """Return what is needed to go on from here."""
         simulation = self.simulation
@@ -140,23 +106,6 @@ class Lane:
         return State(
             self.circumstances, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox
         )
-
-    def resume(self, state: State, simulation: Simulation, starts: Array, trail: Trail) -> None:
-        """Go on from an earlier state.
-
-        Parameters
-        ----------
-        state : State
-        simulation : Simulation
-            What `resumed` returns of it.
-        starts : (n, 2) m
-        trail : Trail
-            Up to then, of the robots that worked then.
-        """
-        self.circumstances, self.simulation = state.circumstances, simulation
-        self.starts, self.trail = starts, trail
-        self.sensed = self.sensed.copy()
-        self.sensed.cut(simulation.time)
 
     def changed(self, wanted: Wanted) -> Simulation:
         """Return the simulation that goes on from here as wanted; the lane stays as it is.
@@ -226,21 +175,10 @@ class Lane:
         self.trail, self.starts = trail, starts
 
 
-def with_failed(circumstances: Circumstances) -> Environment:
-    """Return the map with the robots that failed as obstacles, which is what the others sense."""
-    return circumstances.solid
-
-
-def simulation_of(
-    circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None, time: float
+def begun(
+    circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None = None
 ) -> Simulation:
-    """Return a simulation in these circumstances.
-
-    Raises
-    ------
-    StartError, ParameterError
-        As `Simulation`.
-    """
+    """Return a simulation that begins in these circumstances; StartError, ParameterError as `Simulation`."""
     return Simulation(
         circumstances.solid,
         circumstances.law.made(),
@@ -248,27 +186,26 @@ def simulation_of(
         circumstances.team,
         dt,
         velocities=velocities,
-        time=time,
         conditions=circumstances.conditions,
     )
 
 
-def resumed(state: State, dt: float, time: float) -> Simulation:
-    """Return a simulation that goes on from a state, with what the controller remembered.
+def resumed(state: State, dt: float, step: int) -> Simulation:
+    """Return the simulation that goes on from a state, bit for bit as the one whose state it was.
 
-    Raises
-    ------
-    StartError, ParameterError
-        When there is no room for robots that were pressed too far into something, or the controller
-        cannot begin any more.
+    Raises ParameterError when the controller cannot be had any more.
     """
     circumstances = state.circumstances
-    simulation = _fitted(
-        lambda positions, velocities: simulation_of(circumstances, positions, dt, velocities, time),
-        circumstances.solid.at(time),
-        circumstances.team,
+    simulation = Simulation(
+        circumstances.solid,
+        circumstances.law.made(),
         state.positions,
-        state.velocities,
+        circumstances.team,
+        dt,
+        velocities=state.velocities,
+        steps=step,
+        resumed=True,
+        conditions=circumstances.conditions,
     )
     if state.memory is not None or state.inbox is not None:
         memory = simulation.memory if state.memory is None else state.memory

@@ -12,8 +12,8 @@ from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.observation import Decision
 from robocov_app.runs.saved import roster_of
-from robocov_app.viewer.session.curves import Event
 from robocov_app.viewer.session.history import MOST_BYTES, Circumstances, History, Moment, State
+from robocov_app.viewer.session.lockstep import Happening
 from robocov_app.viewer.session.pane import SENSED_EVERY, Lane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, Law, Limits, Scenario
 from robocov_app.viewer.session.session import Session
@@ -125,32 +125,28 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
         Circumstances(environment, law, limits, roster.numbers, roster.failed)
         for law, roster in zip(laws, rosters, strict=True)
     ]
-    history = _history_of(records, casts, dt)
-    begin = history[0].states[0]
-    standing = begin._replace(circumstances=_standing(begin.circumstances))
-    given = resumed(standing._replace(memory=None), dt, 0.0)
-    # robots that join later have no place yet but that in the record
-    places, moving = np.array(first.positions[0]), np.array(first.velocities[0])
-    places[first.working[0]], moving[first.working[0]] = given.positions, given.velocities
-    session = Session(
-        Scenario(
-            environment,
-            tuple(_standing(cast).law for cast in casts),
-            len(first.team),
-            first.start if first.start in environment.starts else None,
-            first.seed or 0,
-            limits,
-            dt,
-            places,
-            moving if first.velocities[0].any() else None,
-            first.conditions,
-        )
+    standing = [_standing(cast) for cast in casts]
+    scenario = Scenario(
+        environment,
+        tuple(cast.law for cast in standing),
+        len(first.team),
+        first.start if first.start in environment.starts else None,
+        first.seed or 0,
+        limits,
+        dt,
+        np.array(first.positions[0]),
+        np.array(first.velocities[0]),
+        first.conditions,
     )
-    session.scenario = replace(session.scenario, laws=tuple(laws))
+    session = Session(scenario)
+    history = _history_of(records, casts, replace(scenario, laws=tuple(laws)))
     for lane, each in zip(session.lanes, saved, strict=True):
         _put(lane, each, history)
-    session.recall(session.lanes, history)
-    session.events.extend(_events_of(first))
+    for touched in first.session.get("touched", ()):
+        words = f"robot {', '.join(map(str, touched['robots']))} was dragged"
+        session.head.happenings.add(Happening(round(touched["to_s"] / dt), "hand", words))
+    session.recall(history)
+    session.repeatable = all(record.session.get("repeatable", True) for record in records)
     return session
 
 
@@ -231,15 +227,15 @@ def _standing(circumstances: Circumstances) -> Circumstances:
     return replace(circumstances, law=_StandIn(law.name, law.gains, law.title, law.reason))
 
 
-def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], dt: float) -> History:
+def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], scenario: Scenario) -> History:
     """Return the past that records tell of; its arrays are theirs."""
-    first = records[0]
+    first, dt = records[0], scenario.dt
     stride = round(first.dt / dt)
     needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
     history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
     states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
     for k in range(len(first)):
-        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}))
+        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}, scenario))
     return history
 
 
@@ -311,7 +307,7 @@ def _put(lane: Lane, saved: Saved, history: History) -> None:
     record, last = saved.record, history.last
     state = last.states[lane.number]
     standing = state._replace(circumstances=_standing(state.circumstances))
-    lane.simulation = resumed(standing, history.dt, last.step * history.dt)
+    lane.simulation = resumed(standing, history.dt, last.step)
     lane.circumstances = state.circumstances
     lane.starts = record.positions[0][record.working[-1]]
     for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
@@ -323,14 +319,6 @@ def _put(lane: Lane, saved: Saved, history: History) -> None:
         if saved.history.mean_time is not None:
             for time, value in zip(saved.history.time, saved.history.mean_time, strict=True):
                 lane.times.add(float(time), float(value))
-
-
-def _events_of(record: Record) -> list[Event]:
-    """Return when robots were dragged."""
-    return [
-        Event(touched["to_s"], "hand", f"robot {', '.join(map(str, touched['robots']))} was dragged")
-        for touched in record.session.get("touched", ())
-    ]
 
 
 def _fixed(array: Array) -> Array:

@@ -1,42 +1,577 @@
-"""The session: what is going on in the window, and every way to touch it. Knows no pygame."""
+"""The session: panes in lockstep with their whole past, every way to touch them, and to take touches back.
+
+What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`;
+the past is looked at through kept moments. Whatever fails leaves everything as it was: a new state is built,
+then taken over.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from operator import itemgetter
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov.errors import ParameterError
-from robocov_app.viewer.session.pane import Wanted
-from robocov_app.viewer.session.scenario import MOST_PANES, gain_words
-from robocov_app.viewer.session.touches import Touches
-from robocov_app.viewer.session.undo import Edit
+from robocov.arrays import Array
+from robocov.environment import Environment, Point
+from robocov.errors import ParameterError, RobocovError
+from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
+from robocov.observation import Snapshot
+from robocov.sensor import RangeSensor
+from robocov.world.solid import movers, solid_pieces
+from robocov_app.render.sensed import Sensed
+from robocov_app.viewer.session.changes import (
+    Change,
+    Drag,
+    Fail,
+    Join,
+    Leave,
+    Paint,
+    Place,
+    Release,
+    RemovePane,
+    Restart,
+    Revive,
+    SetController,
+    SetDensity,
+    SetLimits,
+    map_change,
+)
+from robocov_app.viewer.session.clock import Clock
+from robocov_app.viewer.session.curves import Curve, Event, Ghost
+from robocov_app.viewer.session.document import Branch, Document, Node
+from robocov_app.viewer.session.history import Circumstances, History, Moment
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.past import Past
+from robocov_app.viewer.session.scenario import MOST_PANES, branch_words, gain_words
+from robocov_app.viewer.session.trail import starts_of, trail_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from robocov.environment import Environment
+    from robocov_app.viewer.session.file import SavedSession
     from robocov_app.viewer.session.pane import Lane
-    from robocov_app.viewer.session.scenario import Law, Limits
+    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+    from robocov_app.viewer.session.trail import Trail
+
+MOST_GHOSTS = 8
+"""Branches whose curves are shown."""
 
 PUSHED = 5e-3
 """Metres from which on a robot counts as pushed out of the way: who leans on something moves in any case."""
 
+MOST_SENSED = 300
+"""Moments of another branch from which it is found out anew what was sensed."""
 
-class Session(Touches):
-    """What is going on in the window: scenario, controllers and map can be touched, and the robots."""
+_SLIDE = 1.0
+"""Seconds of simulation within which changes of a value are one touch, as of a slider that is dragged."""
 
-    # scenario
+_SLICE = 0.03
+"""Seconds of a frame for making a branch again."""
+
+
+class Session:
+    """What is going on in the window; StartError, ParameterError when the scenario cannot be begun.
+
+    What touches it goes on from the moment that is looked at. What cannot be is refused with an error, and
+    nothing has changed then.
+
+    Attributes
+    ----------
+    document : Document
+    head : Node
+        Where in the document the present is.
+    playing : bool
+    clock : Clock
+    stop_when_settled : bool
+    settled : bool
+        Whether no robot has got anywhere for a while.
+    recorded_until : float or None, s
+        Up to there the run is a record; None where there is none.
+    history : History
+    serial : int
+        Grows when what is known of times so far does not hold any more.
+    revision : int
+        Grows with every touch.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.clock = Clock(scenario.dt)
+        self.playing, self.stop_when_settled, self.settled = True, False, False
+        self.recorded_until: float | None = None
+        self.repeatable = True
+        """Whether a record that the run began with is what its scenario leads to."""
+        self.serial = self.revision = 0
+        self._past = Past()
+        self._run = Lockstep(scenario)
+        self.document = Document(scenario)
+        self.head = self.document.nodes[0]
+        self._remaking: Iterator[float] | None = None
+        self.progress = 0.0
+        """How much of the branch that is being made again is there, 0 to 1."""
+        self._begin_time_line()
+
+    @classmethod
+    def opened(cls, saved: SavedSession) -> Session:
+        """Return the session of a file, made again up to its present; paused."""
+        scenario = _scenario_of(saved.document.path(saved.head)[0])
+        session = cls(scenario)
+        session.playing = False
+        session.document, session.head = saved.document, saved.document.path(saved.head)[0]
+        session._begin_time_line()
+        for _ in session._remade(saved.head, saved.step):
+            pass
+        return session
+
+    def _begin_time_line(self) -> None:
+        """Take note of a run that begins at `head`."""
+        scenario = self._run.scenario
+        self.clock.dt = self._past.dt = scenario.dt
+        self.history = History(scenario.dt)
+        self.history.add(self._run.moment(self.head.number))
+        self._cursor: int | None = None
+        self._waited = 0
+        self._gesture: tuple[object, float] | None = None
+        self._rebuilt: dict[int, tuple[object, Trail]] = {}
+        self._ghosts: list[Ghost] | None = None
+        self.settled = False
+        self.serial += 1
+
+    def recall(self, history: History) -> None:
+        """Take over a past that was recorded, and look at its beginning; the panes are at its end."""
+        self.history, last = history, history.last.step
+        self._run.step = self.head.end = last
+        assert history.last.scenario is not None
+        self._run.scenario = history.last.scenario
+        self.recorded_until = last * history.dt
+        self._cursor = 0 if len(history) > 1 else None
+        self.serial += 1
+        for lane in self.lanes:
+            lane.trail = trail_of(history, lane.number, len(history) - 1)
+
+    # what there is
+
+    @property
+    def scenario(self) -> Scenario:
+        """What the run began with; controllers, gains, limits and the map as they were last chosen."""
+        return self._run.scenario
+
+    @property
+    def lanes(self) -> list[Lane]:
+        """The panes, as they are in the present."""
+        return self._run.panes
+
+    @property
+    def hand(self) -> tuple[int, Point] | None:
+        """The robot that is dragged, and where to, m."""
+        return self._run.hand
+
+    @property
+    def environment(self) -> Environment:
+        """The map as it is now, or was at the moment that is looked at."""
+        return self.circumstances(self.lanes[0]).environment
+
+    @property
+    def time(self) -> float:
+        """Time of the moment that is looked at, s."""
+        return self.history.time(self._cursor) if self._cursor is not None else self.end
+
+    @property
+    def end(self) -> float:
+        """Time up to which the run has come, s."""
+        return self._run.time
+
+    @property
+    def live(self) -> bool:
+        """Whether the present is looked at, not the past."""
+        return self._cursor is None
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """What people call the robots that work, in the first pane."""
+        return self.circumstances(self.lanes[0]).numbers
+
+    @property
+    def step_now(self) -> int:
+        """The step of the present."""
+        return self._run.step
+
+    def require_document(self) -> None:
+        """Make sure that everything can be made again; ParameterError says why it cannot."""
+        if self.recorded_until is not None and not self.repeatable:
+            raise ParameterError("this began with a recorded run, which cannot be made again")
+        for lane in self.lanes:
+            lane.law.made()
+
+    @property
+    def at_end_of_record(self) -> bool:
+        """Whether the present is the end of a record that nobody has gone on from."""
+        return self.recorded_until is not None and self.end <= self.recorded_until + 1e-9
+
+    def circumstances(self, lane: Lane) -> Circumstances:
+        """Return what holds for a pane at the moment that is looked at."""
+        if self._cursor is None:
+            return lane.circumstances
+        return self.history[self._cursor].states[lane.number].circumstances
+
+    def snapshot(self, lane: Lane) -> Snapshot:
+        """Return the moment that is looked at; a controller that fails on it has decided nothing."""
+        if self._cursor is None:
+            try:
+                return lane.simulation.snapshot
+            except RobocovError:
+                return self._past.snapshot(self.history.last.states[lane.number], self.time)
+        return self._past.snapshot(self.history[self._cursor].states[lane.number], self.time)
+
+    def positions(self, lane: Lane) -> Array:
+        """Return where the robots are at the moment that is looked at, (n, 2) m."""
+        if self._cursor is None:
+            return lane.simulation.positions
+        return self.history[self._cursor].states[lane.number].positions
+
+    def trail(self, lane: Lane) -> tuple[Array, Array]:
+        """Return where the robots went up to the moment that is looked at: (k, n, 2) m and (k,) s."""
+        if self._cursor is None or self.circumstances(lane).numbers == lane.numbers:
+            return lane.trail.until(self.time)
+        key = self._cursor, self.serial
+        kept, trail = self._rebuilt.get(lane.number, (None, lane.trail))
+        if kept != key:
+            trail = trail_of(self.history, lane.number, self._cursor)
+            self._rebuilt[lane.number] = key, trail
+        return trail.positions, trail.time
+
+    @property
+    def events(self) -> list[Event]:
+        """What has happened on the way to the present, in order."""
+        limits, found = self.document.limits(self.head, self._run.step), []
+        for node in self.document.path(self.head):
+            happened = [] if node.scenario is not None else [(node.at, node.kind, node.words)]
+            happened += sorted((each.step, each.kind, each.words) for each in node.happenings)
+            found += [each for each in happened if each[0] <= limits[node.number]]
+        return [
+            Event(step * self.scenario.dt, kind, words)
+            for step, kind, words in sorted(found, key=itemgetter(0))
+        ]
+
+    @property
+    def ghosts(self) -> list[Ghost]:
+        """The cost curves of other branches, from where they left this one; the newest last."""
+        if self._ghosts is None:
+            self._ghosts = self._other_curves()[-2 * MOST_GHOSTS * len(self.lanes) :]
+        return self._ghosts
+
+    def summary(self) -> Mapping[int, float]:
+        """Return the newest mean distance of each pane, m, by its number."""
+        return {lane.number: lane.curve.at(self.time) for lane in self.lanes}
+
+    def recent(self, lane: Lane, number: int) -> Array:
+        """Return where a robot was during the last seconds before the moment looked at, (k, 2) m."""
+        last = self._cursor if self._cursor is not None else len(self.history) - 1
+        first = self.history.at(self.time - SETTLED_WINDOW)
+        places = []
+        for k in range(first, last + 1, max(1, (last - first) // 30)):
+            state = self.history[k].states.get(lane.number)
+            if state is not None and number in state.circumstances.numbers:
+                places.append(state.positions[state.circumstances.numbers.index(number)])
+        return np.array(places).reshape(-1, 2)
+
+    # time
+
+    def advance(self, seconds: float) -> int:
+        """Let so many seconds pass on the clock; return how many steps were made or shown."""
+        if self._remaking is not None:
+            self.remake(_SLICE)
+            return 0
+        return self.clock.advance(seconds, self._play_on) if self.playing else 0
+
+    def step(self) -> None:
+        """Make a single step, or show the next moment of the past; it pauses what is playing."""
+        self.playing = False
+        if self._cursor is not None:
+            self._show_next()
+        else:
+            self._advance()
+
+    def look_at(self, time: float) -> None:
+        """Look at the last moment not after `time`; at the end, at the present."""
+        cursor = self.history.at(time)
+        self.release()
+        self._cursor, self._waited = (cursor if cursor < len(self.history) - 1 else None), 0
+
+    def look_by(self, moments: int) -> None:
+        """Look so many moments further on, or back."""
+        now = self._cursor if self._cursor is not None else len(self.history) - 1
+        self.look_at(self.history.time(min(max(now + moments, 0), len(self.history) - 1)))
+
+    def _play_on(self) -> bool:
+        """Make one step, or show the next moment of the past; say whether to go on."""
+        if self._cursor is not None:
+            steps = self.history.steps
+            self._waited += 1
+            # where the past was thinned, moments stay for as many steps as are missing
+            if self._waited >= steps[self._cursor + 1] - steps[self._cursor]:
+                self._show_next()
+            if self._cursor is None and self.at_end_of_record:
+                self.playing = False  # to go on from there is for people to decide
+            return self.playing
+        try:
+            self._advance()
+        except RobocovError:
+            self.playing = False
+            raise
+        if self.stop_when_settled and self.settled:
+            self.playing = False
+            return False
+        return True
+
+    def _show_next(self) -> None:
+        assert self._cursor is not None
+        self._waited = 0
+        self._cursor += 1
+        if self._cursor >= len(self.history) - 1:
+            self._cursor = None
+
+    def _advance(self) -> None:
+        self.head.happenings.update(self._run.advance())
+        self.head.end = max(self.head.end, self._run.step)
+        self.history.add(self._run.moment(self.head.number))
+        if self._run.step % 12 == 0:
+            self.settled = self._has_settled()
+
+    def _has_settled(self) -> bool:
+        """Whether no robot of any pane got anywhere for a while, as `metrics.settled_at` says it."""
+        if self.hand is not None or self.end < SETTLED_WINDOW:
+            return False
+        before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
+        for lane in self.lanes:
+            state = before.states.get(lane.number)
+            if state is None or state.circumstances is not lane.circumstances:
+                return False
+            moved = np.hypot(*(lane.simulation.positions - state.positions).T)
+            if len(moved) and float(moved.max()) >= SETTLED_DISTANCE:
+                return False
+        return True
+
+    # branches
+
+    def branch(self) -> bool:
+        """Go on from the moment looked at; what came after it stays, as a branch that can be gone back to.
+
+        Return whether there was anything to leave: at the present there is not.
+        """
+        if self._cursor is None:
+            return False
+        moment = self.history[self._cursor]
+        self._take_over(Lockstep.resumed(moment), moment.node, self.history.until(self._cursor))
+        return True
+
+    @property
+    def branches(self) -> list[Branch]:
+        """All stories that there are, the newest last."""
+        return self.document.branches()
+
+    def enter(self, node: Node, step: int | None = None) -> None:
+        """Go to a step of a node, its end by default: to what was kept, and from there by simulating again.
+
+        Where that takes long, `remaking` says so, and it goes on with every `advance`.
+        """
+        self.finish_remaking()
+        self._remaking = self._remade(node, node.end if step is None else step)
+        self.progress = 0.0
+        self.remake(np.inf if np.isinf(self.clock.budget) else 4 * _SLICE)
+
+    @property
+    def remaking(self) -> bool:
+        """Whether a branch is still being made again; until then the present stays as it was."""
+        return self._remaking is not None
+
+    def remake(self, seconds: float) -> None:
+        """Go on with making a branch again for so many seconds."""
+        began = perf_counter()
+        while self._remaking is not None:
+            try:
+                self.progress = next(self._remaking)
+            except StopIteration:
+                self._remaking = None
+            except BaseException:
+                self._remaking = None
+                raise
+            if perf_counter() - began > seconds:
+                return
+
+    def finish_remaking(self) -> None:
+        """Make all of a branch again."""
+        self.remake(np.inf)
+
+    def give_up_remaking(self) -> None:
+        """Stay where we are."""
+        self._remaking = None
+
+    def undo(self) -> str | None:
+        """Go back to right before the newest touch; return what it was, None if there is none."""
+        node = self.head
+        if node.parent is None:
+            return None
+        node.parent.redo = node
+        self.enter(node.parent, node.at)
+        return node.words
+
+    def redo(self) -> str | None:
+        """Go to the end of what was undone last; return what it was, None if there is none."""
+        node = self.head.redo
+        if node is None:
+            return None
+        self.enter(node)
+        return node.words
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a touch to take back."""
+        return self.head.parent is not None
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether something was taken back."""
+        return self.head.redo is not None
+
+    def _remade(self, node: Node, step: int) -> Iterator[float]:
+        """Make the run up to a step of a node again, and take it over; yield how much of it is there."""
+        path, limits = self.document.path(node), self.document.limits(node, step)
+        rank = {each.number: k for k, each in enumerate(path)}
+        on_the_way = set(rank) & {each.number for each in self.document.path(self.head)}
+        kept = [moment for moment in self.history.since(0) if moment.node in on_the_way]
+        kept += [moment for each in path if each.number not in on_the_way for moment in each.kept]
+        kept = [moment for moment in kept if moment.step <= limits[moment.node]]
+        kept.sort(key=lambda moment: (rank[moment.node], moment.step))
+        run = Lockstep.resumed(kept[-1]) if kept else Lockstep(_scenario_of(path[0]))
+        history = History(run.scenario.dt, self.history.most_bytes)
+        for moment in kept or [run.moment(path[0].number)]:
+            history.amend(moment)
+        at, begun = rank[history.last.node], run.step
+        while (here := path[at]) is not node or run.step < step:
+            if run.step < limits[here.number]:
+                here.happenings.update(run.advance())
+            else:
+                at += 1
+                here = path[at]
+            for when, change in here.changes:
+                if when == run.step:
+                    run.apply(change)
+            history.amend(run.moment(here.number))
+            yield (run.step - begun) / max(step - begun, 1)
+        self._take_over(run, node.number, history)
+
+    def _take_over(self, run: Lockstep, node: int, history: History, change: Change | None = None) -> None:
+        """Let another moment of the document be the present, and carry out a change there if that can be."""
+        self._stow()
+        left = self.document.limits(self.head, self._run.step)
+        on_the_way, head = run.step <= left.get(node, -1), self.document.nodes[node]
+        path, limits = self.document.path(head), self.document.limits(head, run.step)
+        for pane in run.panes:
+            last = len(history) - 1
+            pane.starts = starts_of(history, pane.number, last)
+            pane.trail = trail_of(history, pane.number, last)
+            for what, curve in (("distance", pane.curve), ("time", pane.times)):
+                for each in path:
+                    if (pane.number, what) in each.curves:
+                        curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
+            before = next((lane for lane in self.lanes if lane.number == pane.number), None)
+            if before is not None and on_the_way:
+                pane.sensed = before.sensed.copy()
+                pane.sensed.cut(run.time)
+            else:
+                pane.sensed = _sensed_in(history, pane.number)
+        if change is not None:
+            run.apply(change)
+        self.head, self._run, self.history = head, run, history
+        self.clock.dt = self._past.dt = run.scenario.dt
+        self._cursor, self._waited, self._gesture, self._ghosts = None, 0, None, None
+        self.serial += 1
+        self.settled = False
+
+    def _stow(self) -> None:
+        """Remember moments and curves of the present branch in its nodes."""
+        moments: dict[int, list[Moment]] = {}
+        for moment in self.history.since(0):
+            moments.setdefault(moment.node, []).append(moment)
+        path = self.document.path(self.head)
+        for k, node in enumerate(path):
+            if node is self.head or node.number not in moments:
+                later = [each for each in node.kept if each.step > self._run.step]
+            else:
+                later = []
+            node.keep([*moments.get(node.number, []), *later])
+            begin = node.begin * self.scenario.dt
+            end = path[k + 1].at * self.scenario.dt if k + 1 < len(path) else np.inf
+            for lane in self.lanes:
+                node.controllers[lane.number] = lane.law
+                for what, curve in (("distance", lane.curve), ("time", lane.times)):
+                    known = curve.between(begin, end)
+                    if (lane.number, what) in node.curves:
+                        known.extend(node.curves[lane.number, what], np.inf)
+                    if len(known):
+                        node.curves[lane.number, what] = known
+
+    def _other_curves(self) -> list[Ghost]:
+        limits, dt, found = self.document.limits(self.head, self._run.step), self.scenario.dt, []
+        root = self.document.path(self.head)[0]
+        for branch in self.branches:
+            path = self.document.path(branch.node)
+            if path[0] is not root:
+                continue
+            theirs = self.document.limits(branch.node, branch.end)
+            for pane, law in branch.node.controllers.items():
+                for what in ("distance", "time"):
+                    curve = Curve()
+                    for node in path:
+                        since = limits.get(node.number, -1)
+                        if (pane, what) in node.curves and theirs[node.number] > since:
+                            known = node.curves[pane, what]
+                            begin = since * dt if since >= 0 else -np.inf
+                            curve.extend(known.between(begin, theirs[node.number] * dt), np.inf)
+                    if len(curve) > 1:
+                        words = branch_words(law)
+                        found.append(
+                            Ghost(law.name, words, curve.time, curve.value, what, branch.node.number)
+                        )
+        return found
+
+    # how it is touched
+
+    def do(self, change: Change, kind: str, words: str, gesture: object = None) -> None:
+        """Carry a change out from the moment looked at, as a touch of its own or a part of the present one.
+
+        Changes of the same `gesture`, not None, without anything else between, are one touch.
+        """
+        self.finish_remaking()
+        if self._cursor is None:
+            self._run.apply(change)
+        else:
+            moment, history = self.history[self._cursor], self.history.until(self._cursor)
+            self._take_over(Lockstep.resumed(moment), moment.node, history, change)
+        run = self._run
+        if (
+            gesture is not None
+            and self._gesture is not None
+            and self._gesture[0] == gesture
+            and (kind == "hand" or self.end - self._gesture[1] < _SLIDE)
+        ):
+            head, last = self.head, self.head.changes[-1]
+            if last[0] == run.step and type(last[1]) is type(change) and len(head.changes) > 1:
+                head.changes.pop()
+            head.changes.append((run.step, change))
+            head.kind, head.words = kind, words
+        else:
+            self.head = self.document.add(self.head, run.step, kind, words, change)
+        self._gesture = None if gesture is None else (gesture, self.end)
+        self.revision += 1
+        self._ghosts = None
+        self.settled = False
+        self.history.amend(run.moment(self.head.number))
 
     def restart(self, **changes: object) -> None:
-        """Begin anew, with changes of the scenario if there are any.
-
-        Raises
-        ------
-        StartError, ParameterError
-            When that cannot be; the run then goes on as it is.
-        """
+        """Begin anew, with changes of the scenario if there are any."""
         scenario = self.scenario
         if "environment" in changes or "robots" in changes or "start" in changes or "seed" in changes:
             changes.setdefault("given", None)
@@ -45,133 +580,128 @@ class Session(Touches):
         elif scenario.start not in {None, "uniform", *scenario.environment.starts}:
             # an obstacle has covered it
             changes.setdefault("start", None)
-        self._begin(replace(scenario, **changes))  # type: ignore[arg-type]
+        self.begin(replace(scenario, **changes), "begun anew")  # type: ignore[arg-type]
+
+    def begin(self, scenario: Scenario, words: str) -> None:
+        """Begin another scenario at time 0; undo comes back to this one."""
+        self.finish_remaking()
+        run = Lockstep(scenario)
+        self._stow()
+        self.head = self.document.add(self.head, self._run.step, "begin", words, Restart(scenario))
+        self._run = run
+        self.recorded_until = None
+        self.revision += 1
+        self._begin_time_line()
 
     def set_law(self, lane: Lane, law: Law) -> None:
-        """Let another controller, or other gains, take over in a lane.
-
-        Raises
-        ------
-        ParameterError
-            When the controller cannot be made, or cannot begin; nothing has changed then.
-        """
-        if law == self.circumstances(lane).law:
+        """Let another controller, or other gains, take over in a pane."""
+        before = self.circumstances(lane).law
+        if law == before:
             return
         law.made()
-        with self._touching():
-            before, circumstances = lane.law, replace(lane.circumstances, law=law)
-            lane.take(circumstances, lane.changed(Wanted(circumstances)))
-            self.scenario = replace(self.scenario, laws=tuple(each.law for each in self.lanes))
-            takes_over = law.name != before.name
-            words = f"{law.label} takes over" if takes_over else f"{law.label}: {gain_words(before, law)}"
-            self._changed("law", words)
+        if law.name != before.name:
+            self.do(SetController(lane.number, law), "law", f"{law.label} takes over")
+        else:
+            words = gain_words(before, law)
+            gesture = "gain", lane.number, words.partition(" = ")[0]
+            self.do(SetController(lane.number, law), "law", f"{law.label}: {words}", gesture)
 
     def set_limits(self, limits: Limits) -> None:
-        """Change what all robots are and can do.
-
-        Raises
-        ------
-        ParameterError, StartError
-            When a value is out of range, or the robots do not fit; nothing has changed then.
-        """
-        if limits == self.circumstances(self.lanes[0]).limits:
-            return
-        limits.team(1)
-        with self._touching():
-            self._change_all(lambda lane: Wanted(replace(lane.circumstances, limits=limits)))
-            self.scenario = replace(self.scenario, limits=limits)
-            self._changed("limits", "limits changed")
+        """Change what all robots are and can do."""
+        if limits != self.circumstances(self.lanes[0]).limits:
+            self.do(SetLimits(limits), "limits", "limits changed", "limits")
 
     def add_pane(self, law: Law) -> None:
-        """Compare with one controller more; all begin anew, from the same starts.
-
-        Raises
-        ------
-        ParameterError
-            When there are as many as there is room for.
-        """
+        """Compare with one controller more; all begin anew, from the same starts."""
         if len(self.lanes) >= MOST_PANES:
             raise ParameterError(f"there is room for {MOST_PANES} controllers side by side")
         self.restart(laws=(*self.scenario.laws, law))
 
     def remove_pane(self, lane: Lane) -> None:
-        """Leave a lane out from now on; the others go on.
-
-        Raises
-        ------
-        ParameterError
-            When it is the only one.
-        """
-        if len(self.lanes) == 1:
-            raise ParameterError("the last pane stays")
-        self.lanes.remove(lane)
-        self.scenario = replace(self.scenario, laws=tuple(each.law for each in self.lanes))
-
-    # map
+        """Leave a pane out from now on; the others go on."""
+        self.do(RemovePane(lane.number), "pane", f"{lane.law.label} left out")
 
     def edit(self, environment: Environment, words: str) -> int:
-        """Go on with another map of the same place; return how many robots had to be pushed out of the way.
+        """Go on with other obstacles; return how many robots had to be pushed out of the way."""
+        change = map_change(self.environment, environment)
+        before = {lane.number: self.positions(lane) for lane in self.lanes}
+        self.do(change, "obstacle", words)
+        after = {lane.number: lane.simulation.positions for lane in self.lanes}
+        return max(int((np.hypot(*(after[k] - before[k]).T) > PUSHED).sum()) for k in before)
 
-        Raises
-        ------
-        StartError
-            When there is no room for a robot any more; nothing has changed then.
+    def paint(self, dabs: tuple[Point, ...], radius: float, *, lowers: bool, stroke: object) -> None:
+        """Dab the density with a brush; the dabs of a stroke are one touch."""
+        words = "density lowered" if lowers else "density raised"
+        self.do(Paint(dabs, radius, lowers), "density", words, ("stroke", stroke))
+
+    def set_density(self, environment: Environment, words: str) -> None:
+        """Go on with the density of another map of the same place."""
+        self.do(SetDensity(environment.density), "density", words)
+
+    def grab(self, number: int, point: Point) -> None:
+        """Drag a robot towards a point: by a spring while the run goes on, at once while it is paused.
+
+        One that failed comes at once.
         """
-        with self._touching():
-            before = self.environment
-            pushed = self._put(environment, words)
-            self.undo.add(
-                Edit(
-                    words,
-                    lambda: self._put(before, f"{words}: undone"),
-                    lambda: self._put(environment, words),
-                    of_map=True,
-                )
-            )
-        return pushed
+        to = round(float(point[0]), 4), round(float(point[1]), 4)
+        if not self.playing or number not in self.numbers:
+            self._place(number, point)
+        else:
+            self.do(Drag(number, to), "hand", f"robot {number} was dragged", ("hand", number))
 
-    def show_density(self, environment: Environment) -> None:
-        """Go on with the same place by another density, as while it is painted; there is no way back."""
-        with self._touching():
-            self._weigh(environment)
-            self._amend()
+    def release(self) -> None:
+        """Let go of a robot that is dragged; one that was swung flies on."""
+        if self.hand is not None and self._cursor is None:
+            number = self.hand[0]
+            self.do(Release(), "hand", f"robot {number} was dragged", ("hand", number))
+        self._gesture = None
 
-    def painted(self, before: Environment, environment: Environment, words: str) -> None:
-        """Go on with a density that has been painted, from what it was before."""
-        with self._touching():
-            self._repaint(environment, words)
-            self.undo.add(
-                Edit(
-                    words,
-                    lambda: self._repaint(before, f"{words}: undone"),
-                    lambda: self._repaint(environment, words),
-                    of_map=True,
-                )
-            )
+    def place(self, number: int, point: Point) -> None:
+        """Put a robot, or one that failed, at a point or as near as it fits."""
+        self._place(number, point)
+        self._gesture = None
 
-    def _repaint(self, environment: Environment, words: str) -> None:
-        self._weigh(environment)
-        self._changed("density", words)
+    def _place(self, number: int, point: Point) -> None:
+        at = float(point[0]), float(point[1])
+        self.do(Place(number, at), "hand", f"robot {number} was moved", ("place", number))
 
-    def _weigh(self, environment: Environment) -> None:
-        """Let the map as it is now have the density of another one, and be that one if they are alike."""
-        now = self.environment
-        if not environment.same_place(now) or environment.starts != now.starts:
-            environment = now.with_density(environment.density)
-        self._change_all(lambda lane: Wanted(replace(lane.circumstances, environment=environment)))
-        self.scenario = replace(self.scenario, environment=environment)
+    def add_robot(self, point: Point, number: int | None = None) -> int:
+        """Let one robot more join at a point, or as near as it fits; return its number."""
+        there = {*self.numbers, *self.circumstances(self.lanes[0]).failed}
+        new = max(there) + 1 if number is None else number
+        at = float(point[0]), float(point[1])
+        self.do(Join(new, at), "robot", f"robot {new} joined")
+        return new
 
-    def _put(self, environment: Environment, words: str) -> int:
-        places = [lane.simulation.positions for lane in self.lanes]
-        self._change_all(lambda lane: Wanted(replace(lane.circumstances, environment=environment)))
-        moved = [
-            int((np.hypot(*(lane.simulation.positions - before).T) > PUSHED).sum())
-            for lane, before in zip(self.lanes, places, strict=True)
-        ]
-        self.scenario = replace(self.scenario, environment=environment)
-        self._changed("obstacle", words)
-        return max(moved)
+    def remove_robot(self, number: int) -> None:
+        """Take a robot out, whether it works or not."""
+        self.do(Leave(number), "robot", f"robot {number} taken out")
 
-    def summary(self) -> Mapping[int, float]:
-        """Return the newest mean distance of each lane, m, by its number."""
-        return {lane.number: lane.curve.at(self.time) for lane in self.lanes}
+    def fail_robot(self, number: int) -> None:
+        """Let a robot fail: it stays where it is, stops, and is not heard any more."""
+        self.do(Fail(number), "failure", f"robot {number} failed")
+
+    def revive_robot(self, number: int) -> None:
+        """Let a robot that failed work again, where it stands or as near as it fits."""
+        self.do(Revive(number), "robot", f"robot {number} works again")
+
+
+def _scenario_of(node: Node) -> Scenario:
+    scenario = node.scenario
+    assert scenario is not None
+    return scenario
+
+
+def _sensed_in(history: History, pane: int) -> Sensed:
+    """Return what a pane's robots have sensed, as far as kept moments tell."""
+    found, sensor = Sensed(), None
+    setup: Circumstances | None = None
+    for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
+        state = history[k].states[pane]
+        if state.circumstances is not setup or sensor is None:
+            setup = state.circumstances
+            sensor = RangeSensor(solid_pieces(setup.solid), movers(setup.solid))
+        sensor.show(history.time(k))
+        points = sensor.nearest(state.positions, setup.team.sensing_range)
+        found.add(history.time(k), setup.numbers, points)
+    return found

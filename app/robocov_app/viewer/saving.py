@@ -1,0 +1,138 @@
+"""Saving what the session holds as a run's folder, by ``robocov run`` in a process beside the window."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, NamedTuple
+
+from robocov.controllers import CONTROLLERS
+from robocov.errors import OutputError
+from robocov_app.runs.compare import folder_names
+from robocov_app.terminal.output import free_name
+from robocov_app.viewer.session.changes import Restart, SetController
+from robocov_app.viewer.session.document import Document
+from robocov_app.viewer.session.file import SUFFIX, save_session
+from robocov_app.viewer.session.session import Session
+
+LATTICE = 64
+"""Sites along a side, of the coverage cost."""
+
+
+class Said(NamedTuple):
+    """Something to tell."""
+
+    words: str
+    trouble: bool
+
+
+@dataclass
+class _Job:
+    target: Path
+    process: subprocess.Popen[bytes]
+    errors: IO[bytes]
+    temporary: tempfile.TemporaryDirectory[str]
+
+
+class RunSaver:
+    """Has runs saved by other processes. No call but `finish` waits for them."""
+
+    def __init__(self, lattice: int = LATTICE) -> None:
+        self._lattice = lattice
+        self._jobs: list[_Job] = []
+
+    def save(self, session: Session, folder: Path, map_name: str = "") -> str:
+        """Begin to save the story up to the present in a new folder; return what to tell.
+
+        OutputError when the folder cannot be made; ParameterError where the past is a record, or a controller
+        is not there any more.
+        """
+        session.require_document()
+        target = _made(folder, _stem(session, map_name))
+        temporary = tempfile.TemporaryDirectory(prefix="robocov-")
+        file = Path(temporary.name) / f"session{SUFFIX}"
+        save_session(file, session.document, session.head, session.step_now, {})
+        errors = tempfile.TemporaryFile()  # noqa: SIM115, read when the process has ended
+        command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
+        command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
+        if own := own_controllers(session.document):
+            command += ["--controller", ",".join(own)]
+        nothing = subprocess.DEVNULL
+        process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+        self._jobs.append(_Job(target, process, errors, temporary))
+        return f"saving the run: {target}/"
+
+    def poll(self) -> list[Said]:
+        """Return what is to be told since the last call."""
+        said = []
+        for job in [job for job in self._jobs if job.process.poll() is not None]:
+            self._jobs.remove(job)
+            job.errors.seek(0)
+            lines = job.errors.read().decode(errors="replace").strip().splitlines()
+            job.errors.close()
+            job.temporary.cleanup()
+            if job.process.returncode == 0:
+                said.append(Said(f"run saved: {job.target}/ (record, cost, pictures)", trouble=False))
+            else:
+                reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
+                with suppress(OSError):
+                    job.target.rmdir()  # fails, as it should, where there is something in it
+                said.append(Said(f"run not saved: {job.target}/: {reason}", trouble=True))
+        return said
+
+    def finish(self) -> None:
+        """Wait until all is saved; after Ctrl-C what is being saved stays as it is."""
+        for k, job in enumerate(self._jobs):
+            try:
+                job.process.wait(0.5)
+            except subprocess.TimeoutExpired:
+                if k == 0:
+                    sys.stderr.write("saving runs; Ctrl-C gives up\n")
+                try:
+                    job.process.wait()
+                except BaseException:
+                    for each in self._jobs:
+                        each.process.kill()
+                        each.process.wait()
+                    raise
+
+
+def own_controllers(document: Document) -> list[str]:
+    """Return the names of the controllers of a session that are the user's own."""
+    names: dict[str, None] = {}
+    for node in document.nodes:
+        for _, change in node.changes:
+            if isinstance(change, Restart):
+                names |= dict.fromkeys(law.name for law in change.scenario.laws)
+            elif isinstance(change, SetController):
+                names[change.law.name] = None
+    return [name for name in names if name not in CONTROLLERS]
+
+
+def _stem(session: Session, map_name: str) -> str:
+    """Return what the folder is called, but for its number."""
+    name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
+    laws = [lane.law.name for lane in session.lanes]
+    what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
+    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
+    return f"{stem}-{what}"
+
+
+def _made(folder: Path, stem: str) -> Path:
+    """Make a folder that was not there before; OutputError when it cannot be made."""
+    while True:
+        target = free_name(folder, stem, "")
+        try:
+            target.mkdir(parents=True)
+        except FileExistsError:
+            if not target.exists():  # a file stands where a folder is wanted
+                raise OutputError(f"{target}: cannot be made") from None
+        except OSError as error:
+            raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
+        else:
+            return target

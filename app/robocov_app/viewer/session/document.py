@@ -1,0 +1,150 @@
+"""The session's document: a tree of touches, from which every moment can be made again.
+
+Physics is deterministic, so a scenario and the touches with their steps *are* the run. Nothing is ever taken
+out of the tree: undo goes back to the node before, a touch in the past is one more child of its node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+from robocov.errors import ParameterError
+from robocov_app.viewer.session.changes import Change, Restart
+from robocov_app.viewer.session.curves import Curve
+from robocov_app.viewer.session.history import Moment
+from robocov_app.viewer.session.lockstep import Happening
+from robocov_app.viewer.session.scenario import Law, Scenario
+
+MOST_KEPT = 160
+"""Moments of a node that are kept while another branch is shown."""
+
+
+@dataclass(eq=False)
+class Node:
+    """One touch, and the time that passed after it until the next.
+
+    Attributes
+    ----------
+    number : int
+    parent : Node or None
+    at : int
+        Step of the parent's time at which it was made.
+    kind, words : str
+        As of an `Event`.
+    changes : list of (step, Change)
+        What the touch consists of, in its own time.
+    end : int
+        Step up to which the run has come.
+    name : str
+        What people call the branch that ends here; empty for none.
+    redo : Node or None
+        The child that was left by undo.
+    kept, curves, controllers, happenings
+        Remembered while another branch is shown: moments, cost curves by pane and kind, controllers of the
+        panes, who failed and joined by itself. It can be made again, and is in no file.
+    """
+
+    number: int
+    parent: Node | None
+    at: int
+    kind: str
+    words: str
+    changes: list[tuple[int, Change]]
+    end: int
+    name: str = ""
+    redo: Node | None = field(default=None, repr=False)
+    kept: list[Moment] = field(default_factory=list, repr=False)
+    curves: dict[tuple[int, str], Curve] = field(default_factory=dict, repr=False)
+    controllers: dict[int, Law] = field(default_factory=dict, repr=False)
+    happenings: set[Happening] = field(default_factory=set, repr=False)
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """The scenario that begins here; None where the run goes on."""
+        change = self.changes[0][1]
+        return change.scenario if isinstance(change, Restart) else None
+
+    @property
+    def begin(self) -> int:
+        """The step at which it begins, in its own time."""
+        return self.at if self.scenario is None else 0
+
+    def keep(self, moments: list[Moment]) -> None:
+        """Remember some of the moments, the last among them."""
+        stride = -(-len(moments) // MOST_KEPT)
+        self.kept = moments[-1::-stride][::-1] if moments else []
+
+
+class Branch(NamedTuple):
+    """A story that can be gone back to: the end of a node after which nothing else was done.
+
+    Attributes
+    ----------
+    node : Node
+    end : int
+        Its last step.
+    words : str
+        What people call it, or else its newest touch.
+    """
+
+    node: Node
+    end: int
+    words: str
+
+
+class Document:
+    """Nodes in the order in which they came to be; the first begins with a scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.nodes: list[Node] = []
+        self.add(None, 0, "begin", "begun", Restart(scenario))
+
+    @classmethod
+    def of(cls, nodes: list[Node]) -> Document:
+        """Return a document of nodes whose numbers are their places."""
+        document = cls.__new__(cls)
+        document.nodes = nodes
+        return document
+
+    def add(self, parent: Node | None, at: int, kind: str, words: str, change: Change) -> Node:
+        """Add a touch in a node's time."""
+        begin = 0 if isinstance(change, Restart) else at
+        node = Node(len(self.nodes), parent, at, kind, words, [(begin, change)], begin)
+        self.nodes.append(node)
+        return node
+
+    def path(self, node: Node) -> list[Node]:
+        """Return the nodes from the beginning of its run, time 0, to a node."""
+        found = [node]
+        while (before := found[-1].parent) is not None and found[-1].scenario is None:
+            found.append(before)
+        return found[::-1]
+
+    def limits(self, node: Node, step: int) -> dict[int, int]:
+        """Return the last step of each node, by number, on the way to a step of one."""
+        path = self.path(node)
+        return {each.number: after.at for each, after in pairwise(path)} | {node.number: step}
+
+    def children(self, node: Node) -> Iterator[Node]:
+        """Yield what was done next in a node's time, whether or not time began anew with it."""
+        return (each for each in self.nodes if each.parent is node)
+
+    def branches(self) -> list[Branch]:
+        """Return all stories, the newest last."""
+        return [
+            Branch(node, node.end, node.name or node.words)
+            for node in self.nodes
+            if node.end > max((child.at for child in self.children(node)), default=-1)
+        ]
+
+    def branch(self, name: str) -> Branch:
+        """Return the story of a name, or of a number from 1 on; ParameterError if there is none."""
+        branches = self.branches()
+        for k, each in enumerate(branches, 1):
+            if name in (each.node.name, str(k)):
+                return each
+        known = ", ".join(f"{k} ({each.words})" for k, each in enumerate(branches, 1))
+        raise ParameterError(f"branch: {name!r}, but one of {known} was wanted")

@@ -1,0 +1,198 @@
+"""Panes in lockstep: several controllers on the same team, stepped together and touched alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.conditions import SOON
+from robocov.environment import Point
+from robocov.errors import ParameterError
+from robocov_app.viewer.session.changes import (
+    Change,
+    Drag,
+    EditObstacles,
+    Fail,
+    Join,
+    Paint,
+    Place,
+    Release,
+    RemovePane,
+    Restart,
+    SetController,
+    SetDensity,
+    SetLimits,
+)
+from robocov_app.viewer.session.history import Circumstances, Moment
+from robocov_app.viewer.session.pane import Lane, Wanted, begun, resumed
+from robocov_app.viewer.session.scenario import Scenario
+
+SPRING = 60.0
+"""Stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²."""
+
+STRONGEST = 80.0
+"""Largest pull of the spring, per kg, m/s²."""
+
+
+class Happening(NamedTuple):
+    """A robot that failed or joined by itself, as the conditions of the run say."""
+
+    step: int
+    kind: str
+    words: str
+
+
+class Lockstep:
+    """Panes that begin as a scenario says; StartError, ParameterError when they cannot.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What the run began with; controllers, gains, limits and the map as they were last chosen.
+    panes : list of Lane
+    step : int
+        Control steps since the beginning.
+    hand : (number, (x, y) m) or None
+        The robot that is dragged, and where to.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        positions = scenario.positions()
+        conditions, moving = scenario.conditions, None if scenario.given is None else scenario.moving
+        working = np.ones(len(positions), dtype=bool)
+        if conditions is not None:
+            conditions.check_team(len(positions))
+            working = conditions.working(0.0, len(positions))
+            conditions = conditions.of_robots_that_stay()
+        numbers = tuple((np.flatnonzero(working) + 1).tolist())
+        moving = None if moving is None else moving[working]
+        self.scenario, self.step = scenario, 0
+        self.hand: tuple[int, Point] | None = None
+        self.panes = []
+        for number, law in enumerate(scenario.laws):
+            setup = Circumstances(scenario.environment, law, scenario.limits, numbers, {}, conditions)
+            self.panes.append(Lane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
+
+    @classmethod
+    def resumed(cls, moment: Moment) -> Lockstep:
+        """Return panes that go on from a moment, bit for bit as it went on."""
+        assert moment.scenario is not None
+        run = cls.__new__(cls)
+        run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
+        run.panes = [
+            Lane(number, state.circumstances, resumed(state, run.scenario.dt, run.step))
+            for number, state in moment.states.items()
+        ]
+        return run
+
+    def moment(self, node: int = 0) -> Moment:
+        """Return the present, as a moment in the time of a node of the document."""
+        states = {pane.number: pane.state() for pane in self.panes}
+        return Moment(self.step, states, self.scenario, self.hand, node)
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.step * self.scenario.dt
+
+    def advance(self) -> list[Happening]:
+        """Make one control step; return who failed and joined by itself."""
+        for pane in self.panes:
+            pane.decide()  # a controller that fails does so before any pane has moved on
+        for pane in self.panes:
+            pane.step(self._pull(pane))
+        self.step += 1
+        return list(self._come_and_go())
+
+    def apply(self, change: Change) -> None:
+        """Carry a change out; when that cannot be, an error says why, and nothing has changed.
+
+        Raises
+        ------
+        StartError, ParameterError, MapError
+        """
+        match change:
+            case Drag(robot, to):
+                self.hand = robot, to
+            case Release():
+                self.hand = None
+            case RemovePane(number):
+                self._remove(number)
+            case EditObstacles() | Paint() | SetDensity():
+                environment = change.on(self.scenario.environment)
+                self._change_all(lambda pane: Wanted(replace(pane.circumstances, environment=environment)))
+                self.scenario = replace(self.scenario, environment=environment)
+            case SetController(_, law):
+                law.made()
+                self._change_all(change.of)
+                self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
+            case SetLimits(limits):
+                limits.team(1)
+                self._change_all(change.of)
+                self.scenario = replace(self.scenario, limits=limits)
+            case Restart():
+                raise AssertionError("a restart is a run of its own")
+            case _:
+                self._change_all(change.of)
+                if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
+                    self.hand = None
+
+    def pane(self, number: int) -> Lane:
+        """Return the pane with a number."""
+        return next(pane for pane in self.panes if pane.number == number)
+
+    def _works(self, robot: int) -> bool:
+        return robot in self.panes[0].numbers
+
+    def _remove(self, number: int) -> None:
+        if len(self.panes) == 1:
+            raise ParameterError("the last pane stays")
+        self.panes = [pane for pane in self.panes if pane.number != number]
+        self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
+
+    def _change_all(self, wanted: Callable[[Lane], Wanted]) -> None:
+        """Let every pane go on as is wanted; if one cannot, none does."""
+        wants = [(pane, wanted(pane)) for pane in self.panes]
+        changes = [
+            (pane, want, pane.changed(want))
+            for pane, want in wants
+            if want.positions is not None or want.circumstances is not pane.circumstances
+        ]
+        for pane, want, simulation in changes:
+            pane.take(want.circumstances, simulation)
+
+    def _pull(self, pane: Lane) -> Array | None:
+        """Return the pull of the hand on the robots of a pane, N."""
+        row = pane.row(self.hand[0]) if self.hand is not None else None
+        if row is None or self.hand is None:
+            return None
+        simulation = pane.simulation
+        pull = SPRING * (np.array(self.hand[1]) - simulation.positions[row])
+        pull -= 2.0 * np.sqrt(SPRING) * simulation.velocities[row]
+        size = float(np.hypot(*pull))
+        pulls = np.zeros_like(simulation.positions)
+        pulls[row] = pull * (simulation.team.mass[row] * min(1.0, STRONGEST / max(size, 1e-12)))
+        return pulls
+
+    def _come_and_go(self) -> Iterator[Happening]:
+        """Let robots fail and join whose time has come; the last one that works goes on."""
+        conditions = self.scenario.conditions
+        if conditions is None or not conditions.team_changes:
+            return
+        begins, ends = conditions.lives(self.scenario.robots)
+        now, before = self.time + SOON, self.time - self.scenario.dt + SOON
+        there = {*self.panes[0].numbers, *self.panes[0].circumstances.failed}
+        for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
+            if number not in there:
+                place = next(join.place for join in conditions.joins if join.robot == number)
+                x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
+                self.apply(Join(number, (x, y)))
+                yield Happening(self.step, "robot", f"robot {number} joined")
+        for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
+            if self._works(number) and len(self.panes[0].numbers) > 1:
+                self.apply(Fail(number))
+                yield Happening(self.step, "failure", f"robot {number} failed")

@@ -1,0 +1,319 @@
+"""A branch of a session made again without a window: records, costs, pictures and a film of the whole story.
+
+A record has one map, one controller and one team. So a story with touches has a part for each: from the touch
+(its last change, where it took time) to the next. Without touches there is one part, and the folder is that
+which ``robocov run`` or ``robocov compare`` would write.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robocov.controllers import remembers
+from robocov.environment import CircleObstacle, Environment
+from robocov.metrics import CostHistory
+from robocov.record import Record, Recorder
+from robocov_app.runs.compare import begin_comparison, folder_names, save_comparison
+from robocov_app.runs.cost import built_cost
+from robocov_app.runs.film import FILM_HOLD, FILMS, write_moving
+from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers, save_pictures
+from robocov_app.runs.saved import wreck_name
+from robocov_app.terminal.output import write_csv, write_json
+from robocov_app.viewer.session.changes import Place, Restart
+from robocov_app.viewer.session.document import Document, Node
+from robocov_app.viewer.session.history import Circumstances
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.map_edits import with_obstacle
+
+if TYPE_CHECKING:
+    from robocov.files.result_folder import ResultFolder
+    from robocov_app.render.picture import Painter
+    from robocov_app.runs.options import RunOptions
+    from robocov_app.runs.recording import Frame
+    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.viewer.session.pane import Lane
+
+
+def retold(document: Document, node: Node, end: int) -> Iterator[tuple[Lockstep, Node]]:
+    """Make a branch again from time 0: yield the run at each step, with the touch in whose time it is.
+
+    The run is one object that goes on. Raises what the controllers, or touches that cannot be, raise.
+    """
+    path, limits = document.path(node), document.limits(node, end)
+    scenario = path[0].scenario
+    assert scenario is not None
+    run, at = Lockstep(scenario), 0
+    _apply(run, path[0])
+    while True:
+        while path[at] is not node and run.step >= limits[path[at].number]:
+            at += 1
+            _apply(run, path[at])
+        yield run, path[at]
+        if path[at] is node and run.step >= end:
+            return
+        run.advance()
+        _apply(run, path[at])
+
+
+def _apply(run: Lockstep, node: Node) -> None:
+    for step, change in node.changes:
+        if step == run.step and not isinstance(change, Restart):
+            run.apply(change)
+
+
+@dataclass(eq=False)
+class Part:
+    """A stretch of a story with the same map, team and controllers in all panes.
+
+    Attributes
+    ----------
+    node : Node
+    begin : int
+        Step.
+    setups : dict of pane to Circumstances
+    recorders : dict of pane to Recorder
+    touched : list of [begin, end, robot]
+        Steps between which a robot was moved by hand.
+    """
+
+    node: Node
+    begin: int
+    setups: dict[int, Circumstances]
+    recorders: dict[int, Recorder]
+    touched: list[list[int]] = field(default_factory=list)
+    ends: int = 0
+
+    @property
+    def words(self) -> str:
+        """What it begins with."""
+        return self.node.words
+
+
+def parts_of(document: Document, node: Node, end: int) -> list[Part]:
+    """Return the parts of a branch, with records of all their steps."""
+    parts: list[Part] = []
+    dt = 0.0
+    for run, here in retold(document, node, end):
+        dt = run.scenario.dt
+        setups = {pane.number: pane.circumstances for pane in run.panes}
+        if not parts or parts[-1].setups != setups:
+            if parts and parts[-1].node is here and here.scenario is None:
+                parts.pop()  # the touch is still going on
+            parts.append(
+                Part(here, run.step, setups, {pane.number: _recorder(pane, dt) for pane in run.panes})
+            )
+        part = parts[-1]
+        part.ends = run.step
+        for pane in run.panes:
+            part.recorders[pane.number].add(pane.simulation.snapshot)
+        held = {run.hand[0]} if run.hand is not None else set()
+        held |= {each.robot for step, each in here.changes if step == run.step and isinstance(each, Place)}
+        for robot in held:
+            last = next((each for each in part.touched if each[2] == robot and each[1] >= run.step - 1), None)
+            if last is None:
+                part.touched.append([run.step, run.step + 1, robot])
+            else:
+                last[1] = run.step + 1
+    return parts
+
+
+def records_of_part(part: Part, root: Node) -> list[Record]:
+    """Return the records of a part, one for each pane, of a branch that began at a node; time begins at 0."""
+    scenario, found = root.scenario, []
+    assert scenario is not None
+    dt = scenario.dt
+    for number, recorder in part.recorders.items():
+        record, setup = recorder.record(), part.setups[number]
+        record = replace(record, time=np.arange(len(record), dtype=float) * dt)
+        origin: dict[str, Any] = {}
+        if part.begin == 0 and part.node is root and scenario.given is None:
+            origin = {"start": scenario.start_name, "seed": scenario.seed}
+        found.append(replace(record, session=_session_of(part, setup, record, dt), **origin))
+    return found
+
+
+def _recorder(pane: Lane, dt: float) -> Recorder:
+    setup = pane.circumstances
+    return Recorder(
+        with_wrecks(setup), setup.team, setup.law.made(), dt, name=setup.law.name, conditions=setup.conditions
+    )
+
+
+def with_wrecks(setup: Circumstances) -> Environment:
+    """Return the map with the robots that failed as obstacles with names."""
+    environment = setup.environment
+    for number, place in setup.failed.items():
+        wreck = CircleObstacle(place, setup.limits.radius_of(number), wreck_name(number))
+        environment = with_obstacle(environment, wreck)
+    return environment
+
+
+def _session_of(part: Part, setup: Circumstances, record: Record, dt: float) -> dict[str, Any]:
+    """Return what ``run.json`` says of where the record comes from; nothing where there is nothing to say."""
+    said: dict[str, Any] = {}
+    if part.begin:
+        said["began_at_s"] = part.begin * dt
+    if record.velocities[0].any():
+        said["start_velocities_m_per_s"] = record.velocities[0].tolist()
+    if setup.failed or setup.numbers != tuple(range(1, len(setup.numbers) + 1)):
+        said["robots"] = list(setup.numbers)
+        said["failed"] = {str(number): list(place) for number, place in setup.failed.items()}
+    if part.touched:
+        said["touched"] = [
+            {"from_s": (begin - part.begin) * dt, "to_s": (end - part.begin) * dt, "robots": [robot]}
+            for begin, end, robot in part.touched
+        ]
+    known = part.begin == 0 or not remembers(setup.law.made())
+    repeatable = known and not part.touched
+    return {**said, "repeatable": repeatable} if said or not repeatable else {}
+
+
+def save_story(
+    document: Document,
+    node: Node,
+    end: int,
+    result: ResultFolder,
+    options: RunOptions,
+    stop: Interruption,
+) -> dict[str, Any]:
+    """Write a branch into a folder: numbers and pictures of its parts, all costs, a film."""
+    root = document.path(node)[0]
+    assert root.scenario is not None
+    parts, dt = parts_of(document, node, end), root.scenario.dt
+    several = len(parts) > 1
+    histories: list[tuple[float, str, CostHistory]] = []
+    told, rows = [], []
+    for k, part in enumerate(parts, 1):
+        folder = f"{k:02d}-{_file_name(part.words)}" if several else ""
+        records = records_of_part(part, root)
+        names = folder_names([record.controller for record in records])
+        runs: dict[str, Run] = {}
+        if len(records) > 1:
+            (result.new / folder).mkdir(exist_ok=True)
+            begin_comparison(result.new / folder, names)
+        costs = []
+        for name, record in zip(names, records, strict=True):
+            place = result.new / folder / (name if len(records) > 1 else "")
+            record.save(place)
+            costs.append(built_cost(record.environment, options.lattice, quiet=True))
+            runs[name] = evaluated(record, costs[-1], stop, quiet=options.json)
+            save_numbers(runs[name], place, options.lattice)
+            histories.append((part.begin * dt, name, runs[name].history))
+            rows.append(
+                {"part": k, "controller": name, "mean_distance_m": runs[name].summary["mean_distance_m"]}
+            )
+        if len(records) > 1:
+            save_comparison(runs, costs[0], result.new / folder, options)
+        else:
+            save_pictures([runs[names[0]]], costs[0], result.new / folder, options)
+        told.append(
+            {"folder": folder, "from_s": part.begin * dt, "to_s": part.ends * dt, "words": part.words}
+        )
+        result.keep()
+    if several:
+        content = {"format": "robocov-story", "version": 1, "parts": told}
+        write_json(result.new / "story.json", content)
+        header = "controller," + cost_columns(histories[0][2])
+        lines = (
+            (name, begin + row[0], *row[1:])
+            for begin, name, history in histories
+            for row in cost_rows(history)
+        )
+        write_csv(result.new / "cost.csv", header, lines)
+    if options.video or options.frames:
+        film = result.new / FILMS[len(parts[-1].setups) > 1]
+        total = round((end * dt / options.film_speed + FILM_HOLD) * options.fps) + 1
+        write_moving(story_frames(document, node, end, histories, options), total, film, options, stop)
+    return {"parts": told, "runs": rows}
+
+
+def story_frames(
+    document: Document,
+    node: Node,
+    end: int,
+    histories: list[tuple[float, str, CostHistory]],
+    options: RunOptions,
+) -> Iterator[Frame]:
+    """Draw a branch from its beginning: trajectories go on through all touches."""
+    from robocov_app.render.picture import Painter, pane_layers, standard_layers
+    from robocov_app.render.theme import theme_named
+    from robocov_app.runs.panes import side_by_side
+
+    theme = theme_named(options.theme)
+    stride = options.film_speed / options.fps
+    painters: dict[int, Painter] = {}
+    frames: list[Frame] = []
+    due, frame = 0.0, None
+    width, height = options.film_size()
+    for run, here in retold(document, node, end):
+        last = here is node and run.step >= end
+        if run.time + 1e-9 < due and not last:
+            continue
+        due += stride
+        count = len(run.panes)
+        size = (width, height) if count == 1 else (width // 2 - 4, height if count == 2 else height // 2 - 4)
+        names = folder_names([pane.law.name for pane in run.panes])
+        frames = []
+        for pane, name in zip(run.panes, names, strict=True):
+            painter = painters.get(pane.number)
+            if (
+                painter is None
+                or painter.size != size
+                or painter.environment.boundary != run.scenario.environment.boundary
+            ):
+                layers = standard_layers(options.colours) if count == 1 else pane_layers(options.colours)
+                painter = painters[pane.number] = Painter(run.scenario.environment, size, theme, layers)
+                painter.change(frozenset(options.show), frozenset(options.hide))
+            painter.environment = run.scenario.environment
+            frames.append(painter.frame(_scene(pane, histories, name)))
+        if count == 1:
+            frame = frames[0]
+        else:
+            (frame,) = side_by_side([iter([each]) for each in frames], 2, 8, theme.grid, theme.background)
+        yield frame
+    if frame is not None:
+        for _ in range(round(FILM_HOLD * options.fps)):
+            yield frame
+
+
+def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
+    """Return what a frame shows of a pane."""
+    from robocov_app.render.phi import cost_words, mean_words
+    from robocov_app.render.scene import Scene
+
+    setup, snapshot = pane.circumstances, pane.simulation.snapshot
+    known = [
+        (begin + time, value)
+        for begin, of, history in histories
+        if of == name and begin <= pane.time + 1e-9
+        for time, value in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True)
+    ]
+    values = [value for time, value in known if time <= pane.time + 1e-9]
+    cost = cost_words(mean_words(setup.environment), values[-1], None) if values else ""
+    trail, times = pane.trail.until(pane.time)
+    scene = Scene.of(
+        setup.environment.at(snapshot.time),
+        setup.team,
+        snapshot,
+        starts=pane.starts if len(pane.starts) == len(setup.numbers) else None,
+        trail=trail if len(trail) else None,
+        trail_time=times,
+        label=setup.law.label,
+        cost=cost,
+    )
+    radii = {number: setup.limits.radius_of(number) for number in setup.failed}
+    return replace(scene, numbers=setup.numbers, failed=setup.failed, failed_radii=radii)
+
+
+def _file_name(words: str) -> str:
+    """Return words as they can be the name of a folder.
+
+    >>> _file_name("robot 3 failed: RAPF, k_rep = 0.5")
+    'robot-3-failed-RAPF-k_rep-0.5'
+    """
+    return re.sub(r"[^\w.]+", "-", words).strip(".-")[:48] or "part"

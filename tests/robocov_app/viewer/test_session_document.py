@@ -1,0 +1,264 @@
+"""The session as a document: made again bit for bit, in a file and out of it, branch by branch."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from touched_run import HALL, LLOYD, RAPF, begun, positions_of, stepped, with_curves
+
+from robocov.conditions import Conditions, Failure, Join
+from robocov.environment import CircleObstacle, ObstaclePath
+from robocov.errors import InputError, MapError, RobocovError
+from robocov.mapfile import load_map
+from robocov_app.viewer.session import session as module
+from robocov_app.viewer.session.file import dumped, load_session, save_session, session_json, session_schema
+from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.session import Session
+
+ATLAS = Law("atlas")
+points = st.tuples(st.floats(0.2, 5.8), st.floats(0.2, 3.8))
+touches = st.lists(
+    st.tuples(
+        st.sampled_from(
+            [
+                "drag",
+                "draw",
+                "fail",
+                "join",
+                "leave",
+                "gain",
+                "limits",
+                "paint",
+                "past",
+                "undo",
+                "redo",
+                "restart",
+            ]
+        ),
+        points,
+        st.integers(1, 9),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> None:
+    """Do something with a session, as far as it can be done."""
+    numbers = session.numbers
+    with suppress(RobocovError):
+        if kind == "drag":
+            session.playing = True
+            for _ in range(k):
+                session.grab(numbers[k % len(numbers)], point)
+                session.advance(1 / 60)
+            session.release()
+        elif kind == "draw":
+            session.edit(with_obstacle(session.environment, CircleObstacle(point, 0.2)), "circle drawn")
+        elif kind == "fail":
+            session.fail_robot(numbers[k % len(numbers)])
+        elif kind == "join":
+            session.add_robot(point)
+        elif kind == "leave":
+            session.remove_robot(numbers[k % len(numbers)])
+        elif kind == "gain":
+            session.set_law(session.lanes[0], session.lanes[0].law.with_gain("k_rep", k / 5))
+        elif kind == "limits":
+            session.set_limits(Limits(max_speed=k / 5))
+        elif kind == "paint":
+            session.paint((point,), 0.7, lowers=k % 2 == 0, stroke=k)
+        elif kind == "past":
+            session.look_at(session.end * k / 10)
+        elif kind == "restart":
+            session.restart(seed=k)
+        else:
+            (session.undo if kind == "undo" else session.redo)()
+    stepped(session, k)
+
+
+def again(session: Session) -> Session:
+    """Return a session made of what a file of it holds, at the same moment, with nothing else known."""
+    text = dumped(session_json(session.document, session.head, session.step_now, {"theme": "dark"}))
+    path = Path("again.robocov")
+    from robocov_app.viewer.session.file import session_of
+
+    saved = session_of(json.loads(text), str(path))
+    assert saved.view == {"theme": "dark"}
+    return Session.opened(saved)
+
+
+@given(touches, st.sampled_from([(RAPF,), (LLOYD, RAPF), (ATLAS,)]), st.booleans())
+@settings(max_examples=40)
+def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
+    """Through undo, branches, restarts and contacts; with memory, and obstacles that move."""
+    environment = HALL
+    if moving:
+        door = CircleObstacle((3.4, 2.0), 0.2, "cart", ObstaclePath(((3.4, 2.0), (3.4, 3.0)), 0.4))
+        environment = replace(HALL, obstacles=(*HALL.obstacles, door))
+    session = stepped(begun(*laws, environment=environment, robots=4, start="spread"), 5)
+    for touch in story:
+        touched(session, *touch)
+    session.look_at(session.end)
+    twin = again(session)
+    assert twin.end == session.end and twin.events == session.events
+    for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    here = session.head, session.step_now
+    for branch in session.branches:
+        session.enter(branch.node)
+        twin.enter(twin.document.nodes[branch.node.number])
+        for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    session.enter(*here)
+
+
+def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -> None:
+    conditions = Conditions(
+        loss=0.2,
+        delay=0.1,
+        position_noise=0.02,
+        failures=(Failure(2, 0.5),),
+        joins=(Join(4, 0.8, (3.0, 3.0)),),
+        seed=3,
+    )
+    session = stepped(begun(RAPF, robots=4, conditions=conditions), 40)
+    session.edit(with_obstacle(HALL, CircleObstacle((2.0, 3.0), 0.3)), "circle drawn")
+    stepped(session, 40)
+    assert [event.text for event in session.events] == ["robot 2 failed", "circle drawn", "robot 4 joined"]
+    path = tmp_path / "story.robocov"
+    save_session(path, session.document, session.head, session.step_now, {})
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from robocov_app.viewer.session.file import load_session\n"
+        "from robocov_app.viewer.session.session import Session\n"
+        "session = Session.opened(load_session(Path(sys.argv[1])))\n"
+        "sys.stdout.write(session.lanes[0].simulation.positions.tobytes().hex())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.endswith(session.lanes[0].simulation.positions.tobytes().hex())
+
+
+def test_branches_are_a_tree_that_can_be_walked() -> None:
+    session = stepped(begun(RAPF), 10)
+    session.fail_robot(1)
+    with_curves(session, 20)
+    failed = session.head
+    assert session.undo() == "robot 1 failed" and session.time == 10 / 60
+    session.add_robot((3.0, 3.0))
+    with_curves(session, 30)
+    assert [branch.words for branch in session.branches] == ["robot 1 failed", "robot 4 joined"]
+    (ghost,) = session.ghosts
+    assert ghost.node == failed.number and ghost.time[-1] == pytest.approx(29 / 60)
+    session.enter(session.document.nodes[ghost.node])
+    assert session.numbers == (2, 3) and session.time == 30 / 60
+    assert session.lanes[0].curve.last_time == pytest.approx(29 / 60), "its curve is there again"
+    assert [ghost.node for ghost in session.ghosts] == [2]
+    session.look_at(5 / 60)
+    session.set_law(session.lanes[0], LLOYD)
+    assert len(session.branches) == 3, "nothing is lost by a touch in the past"
+
+
+def test_a_long_way_back_is_made_in_slices_and_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SLICE", 0.0)
+    session = stepped(begun(RAPF), 400)
+    session.fail_robot(1)
+    stepped(session, 5)
+    for node in session.document.nodes:
+        node.kept = []
+    session.history = session.history.until(0)
+    before = session.time
+    session.clock.budget = 0.008
+    session.enter(session.document.nodes[0], 390)
+    assert session.remaking and session.time == before
+    session.give_up_remaking()
+    assert not session.remaking and session.time == before and session.numbers == (2, 3)
+    session.enter(session.document.nodes[0], 390)
+    while session.remaking:
+        session.advance(1 / 60)
+    assert session.time == pytest.approx(390 / 60) and session.numbers == (1, 2, 3)
+
+
+def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
+    rooms = load_map("rooms")
+    session = stepped(begun(RAPF, environment=rooms, robots=6), 30)
+    session.playing = True
+    for k in range(60):
+        session.grab(2, (3.0 + 0.01 * k, 2.0))
+        session.advance(1 / 60)
+    session.release()
+    path = tmp_path / "story.robocov"
+    save_session(path, session.document, session.head, session.step_now, {})
+    assert path.stat().st_size < 3000
+    content = json.loads(path.read_text())
+    assert content["maps"][0]["bundled"] == "rooms" and content["format"] == "robocov-session"
+    import jsonschema
+
+    jsonschema.Draft202012Validator(session_schema()).validate(content)
+    (tmp_path / "changed.robocov").write_text(path.read_text().replace(content["maps"][0]["digest"], "0"))
+    with pytest.raises(
+        MapError, match=r'maps\[0\]\.digest: "0", but that of the map as it is now was wanted'
+    ):
+        load_session(tmp_path / "changed.robocov")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (("head",), 9, "head: 9, but the number of a touch, 0 to 1 was wanted"),
+        (("step",), 999, "step: 999, but a step of the head, 10 to 30 was wanted"),
+        (("touches", 1, "parent"), 1, "touches[1].parent: 1, but null for the first"),
+        (("touches", 1, "at"), 999, "touches[1].at: 999, but a step of touch 0, 0 to 10 was wanted"),
+        (("touches", 1, "changes", 0, "robot"), "two", 'touches[1].changes[0].robot: "two", but'),
+        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0]"),
+        (
+            ("touches", 0, "changes", 0, "scenario", "robots"),
+            0,
+            "touches[0].changes[0].scenario.robots: 0, but",
+        ),
+        (("touches", 0, "changes", 0, "scenario", "map"), 7, "scenario.map: 7, but the number of a map"),
+        (("maps", 0, "boundary"), [], "maps[0]: boundary: "),
+        (("version",), 2, "version: 2, but 1 was wanted; it was written by a newer robocov"),
+        (("nonsense",), 1, "nonsense: unknown key"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, place, value, words) -> None:
+    session = stepped(begun(RAPF), 10)
+    session.fail_robot(1)
+    stepped(session, 20)
+    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    at = content
+    for key in place[:-1]:
+        at = at[key]
+    at[place[-1]] = value
+    path = tmp_path / "story.robocov"
+    path.write_text(json.dumps(content))
+    with pytest.raises(MapError) as caught:
+        load_session(path)
+    assert words in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_controller_of_ones_own_is_never_run_because_a_file_says_so(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "import robocov as rc\nfrom dataclasses import dataclass\n\n@dataclass(frozen=True)\n"
+        "class Mine(rc.Lloyd):\n    label = 'Mine'\n"
+    )
+    name = f"{mine}:Mine"
+    session = stepped(begun(Law(name)), 5)
+    path = tmp_path / "story.robocov"
+    save_session(path, session.document, session.head, session.step_now, {})
+    with pytest.raises(InputError, match=f"open the session with --controller .*{mine.name}:Mine"):
+        load_session(path)
+    assert Session.opened(load_session(path, [name])).end == session.end
