@@ -20,18 +20,19 @@ if TYPE_CHECKING:
 
     from robocov_app.bench.measure import Row
 
-PARTS = ("step", "maps", "cost", "learning", "sweep", "render", "window", "start")
-
-TITLES = {
-    "step": "A step of RAPF on campus",
-    "maps": "The exact coverage cost on maps",
-    "cost": "The exact coverage cost in a unit square with random obstacles",
-    "learning": "Learning environments on rooms, with the exact cost in the reward of each step",
-    "sweep": "A sweep of short runs on three maps, processor time",
-    "render": "Pictures of 1280 x 720",
-    "window": "The window of 1280 x 720 on rooms, in use",
-    "start": "Until a command begins",
-}
+PARTS = {
+    # part: title, module, its function
+    "step": ("A step of RAPF on campus", "step", "cases"),
+    "maps": ("The exact coverage cost on maps", "cost", "map_cases"),
+    "cost": ("The exact coverage cost in a unit square with random obstacles", "cost", "cases"),
+    "learning": (
+        "Learning environments on rooms, with the exact cost in the reward of each step", "learning", "cases"
+    ),
+    "sweep": ("A sweep of short runs on three maps, processor time", "processes", "cases"),
+    "render": ("Pictures of 1280 x 720", "render", "cases"),
+    "window": ("The window of 1280 x 720 on rooms, in use", "window", "cases"),
+    "start": ("Until a command begins", "processes", "start_cases"),
+}  # fmt: skip
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -72,16 +73,20 @@ def command(options: Arguments) -> int | None:
         from robocov_app.figures.runs import check_figure_path
 
         check_figure_path(options.plot)
-    parts: tuple[str, ...] = PARTS if options.part == "all" else (options.part,)
+    parts = tuple(PARTS) if options.part == "all" else (options.part,)
     if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
         parts = tuple(part for part in parts if part != "learning")
-    modules = [importlib.import_module(f"robocov_app.bench.{part}") for part in parts]
+    modules = [importlib.import_module(f"robocov_app.bench.{PARTS[part][1]}") for part in parts]
     if "cost" in parts and not modules[parts.index("cost")].has_yardstick():
         missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
         if options.part == "cost":
             raise ParameterError(missing)
         print(f"robocov: {missing}", file=sys.stderr)
-    cases = [case for module in modules for case in module.cases(quick=options.quick)]
+    cases = [
+        case
+        for part, module in zip(parts, modules, strict=True)
+        for case in getattr(module, PARTS[part][2])(quick=options.quick)
+    ]
     rows: list[Row] = []
     stopped = False
     try:
@@ -124,7 +129,9 @@ def print_tables(rows: Sequence[Row]) -> None:
 
     out = console()
     for part, group in groupby(rows, key=lambda row: row.part):
-        table = Table(box=None, pad_edge=False, header_style="bold", title_justify="left", title=TITLES[part])
+        table = Table(
+            box=None, pad_edge=False, header_style="bold", title_justify="left", title=PARTS[part][0]
+        )
         table.add_column("")
         table.add_column("")
         for title in ("time", "yardstick", "ratio", "before", "goal"):

@@ -12,7 +12,7 @@ import pytest
 from called import complaint
 from matplotlib.figure import Figure
 
-from robocov_app.bench import cost, learning, maps, plot, render, start, step, sweep, window
+from robocov_app.bench import cost, learning, plot, processes, render, step, window
 from robocov_app.bench.measure import InTurn, Row
 from robocov_app.cli import main
 from robocov_app.commands import bench
@@ -90,13 +90,13 @@ def small(monkeypatch):
     """Make every part a matter of a second or two."""
     monkeypatch.setattr(step, "GOALS", {6: (None, 16.0)})
     monkeypatch.setattr(step, "TOGETHER", 2)
-    monkeypatch.setattr(maps, "BEFORE", {("rooms", 64, 6): 4.5})
+    monkeypatch.setattr(cost, "BEFORE", {("rooms", 64, 6): 4.5})
     monkeypatch.setattr(learning, "TOGETHER", 2)
-    monkeypatch.setattr(sweep, "MAPS", ("square",))
-    monkeypatch.setattr(sweep, "DURATION", 1.0)
+    monkeypatch.setattr(processes, "MAPS", ("square",))
+    monkeypatch.setattr(processes, "DURATION", 1.0)
     monkeypatch.setattr(step, "WARM_UP", 2)
     monkeypatch.setattr(cost, "random_map", lambda vertices: cost_map(vertices))
-    monkeypatch.setattr(start, "WORDS", {"import robocov": ("-c", "import robocov")})
+    monkeypatch.setattr(processes, "WORDS", {"import robocov": ("-c", "import robocov")})
     monkeypatch.setattr(render, "cases", lambda quick: [partial(render._frames, "rooms", 6, quick)])
     monkeypatch.setattr(window, "cases", lambda quick: [partial(window._used, 6, 0.5)])
 
@@ -163,7 +163,8 @@ def test_without_the_yardstick_the_way_to_it_is_said(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in complaint(capsys, "bench", "cost")
     small(monkeypatch)
-    for other in (step, render, window, start):
+    monkeypatch.setattr(processes, "start_cases", lambda quick: [])
+    for other in (step, render, window):
         monkeypatch.setattr(other, "cases", lambda quick: [])
     assert main(["bench", "all", "--quick", "--json"]) == 0
     said = capsys.readouterr()

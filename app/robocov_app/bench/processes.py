@@ -1,4 +1,4 @@
-"""A sweep of short runs by two workers, per run, against an interpreter that imports numpy."""
+"""Sweeps, per run, and the start of commands, against an interpreter that imports numpy."""
 
 from __future__ import annotations
 
@@ -43,3 +43,39 @@ def _rows(seeds: int) -> Iterator[Row]:
         *("sweep", f"a run of {DURATION:g} s", size, each, "import numpy", taken["numpy"] / 5),
         goal=BEFORE / 4, note=note, before=BEFORE,
     )  # fmt: skip
+
+
+# how long a command takes before it does anything
+
+EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "robocov --help": ("-m", "robocov_app", "--help"),
+    "robocov run --help": ("-m", "robocov_app", "run", "--help"),
+    "robocov maps": ("-m", "robocov_app", "maps"),
+    "import robocov": ("-c", "import robocov"),
+    "import robocov, all of it": ("-c", EVERYTHING),
+}
+"""What people do first, and the words of the interpreter for it."""
+
+GOALS = {"robocov --help": 2.0}
+
+NUMPY = "import numpy"
+
+
+def start_cases(*, quick: bool = False) -> list[Case]:
+    """Return the one case: all processes in turn."""
+    return [partial(_start_rows, quick)]
+
+
+def _start_rows(quick: bool) -> Iterator[Row]:
+    words = {NUMPY: ("-c", NUMPY), **WORDS}
+    taken = InTurn({name: partial(_started, *given) for name, given in words.items()}).rounds(
+        3 if quick else 15
+    )
+    for name in WORDS:
+        yield Row("start", name, {}, taken[name], NUMPY, taken[NUMPY], GOALS.get(name))
+
+
+def _started(*words: str) -> None:
+    subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=True)
