@@ -379,3 +379,17 @@ def test_a_double_click_that_drags_still_drags(tmp_path: Path) -> None:
         hands.click_at((4, 4))
         hands.drag_at((4, 4), (4.5, 4.5), (5, 4))  # at once
         assert hands.sketch.obstacles[0].geometry.bounds == (3.0, 2.0, 7.0, 6.0)
+
+
+def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
+    hands.select(0)
+    hands.key("ctrl+h")
+    hands.key("ctrl+tab")
+    hands.frames(2)
+    things = hands.window.panel.list
+    assert things is not None
+    rows = things.rows(200.0)
+    assert rows[-1].lines[0] == "boundary" and len(rows) == len(hands.shapes) + 1 + len(hands.sketch.starts)
+    (hidden,) = [row for row in rows if row.lines[1] == "hidden"]
+    things.take(hidden)
+    assert hands.desk.selection.items == {0} and things.chosen(hidden)

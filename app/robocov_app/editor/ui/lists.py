@@ -9,7 +9,8 @@ import numpy as np
 import pygame
 
 from robocov_app.editor.canvas.findings import draw_badge
-from robocov_app.editor.model.selection import Selection, Vertex, place_of, points_of
+from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.model.validation import Problem
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened
@@ -31,7 +32,7 @@ class Row(NamedTuple):
     top: float
     height: float
     lines: tuple[str, ...]
-    about: Vertex | Problem | int
+    about: Vertex | Problem | Selection | int
 
 
 class PanelList(ABC):
@@ -163,6 +164,51 @@ class VertexList(PanelList):
             screen.blit(words, words.get_rect(midright=(rect.left + round(right * scale), rect.centery)))
         unit = label("m", size, theme.faint)
         screen.blit(unit, unit.get_rect(midleft=(rect.left + round(232 * scale), rect.centery)))
+
+
+class ThingList(PanelList):
+    """All things of the map, the topmost first, also those that are locked or hidden; a click selects one."""
+
+    def key(self) -> object:
+        """Return the sketch: every edit makes another one."""
+        return id(self._desk.sketch)
+
+    def rows(self, wide: float) -> list[Row]:
+        """Return one line for each obstacle and start, and the boundary."""
+        sketch = self._desk.sketch
+        things: list[tuple[Owner, str]] = []
+        for item in reversed(sketch.obstacles):
+            marks = [item.group, "locked" if item.locked else "", "hidden" if item.hidden else ""]
+            things.append((item.key, " · ".join(filter(None, marks))))
+        things += [(name, "") for name, _ in sketch.starts]
+        things += [(BOUNDARY, "")] if sketch.boundary is not None else []
+        return [
+            Row(20.0 * k, 20.0, (numbered_name(sketch, owner), marks), Selection.of(owner))
+            for k, (owner, marks) in enumerate(things[:MOST_ROWS])
+        ]
+
+    def chosen(self, row: Row) -> bool:
+        """Return whether it is selected."""
+        return isinstance(row.about, Selection) and row.about.owners <= self._desk.selection.owners
+
+    def take(self, row: Row) -> None:
+        """Select it; with Shift it too."""
+        assert isinstance(row.about, Selection)
+        added = pygame.key.get_mods() & pygame.KMOD_SHIFT
+        before = self._desk.selection.without_vertices()
+        self._desk.select(before.toggled(row.about) if added else row.about)
+
+    def draw_row(
+        self, screen: pygame.Surface, row: Row, rect: pygame.Rect, theme: Theme, scale: float
+    ) -> None:
+        """Draw its name, and what is marked of it."""
+        size = round(11.5 * scale)
+        name, marks = row.lines
+        said = label(marks, size, theme.faint)
+        screen.blit(said, said.get_rect(midright=(rect.right - round(10 * scale), rect.centery)))
+        ink = theme.faint if "hidden" in marks else theme.ink
+        words = label(shortened(name, size, rect.width - said.get_width() - 24 * scale), size, ink)
+        screen.blit(words, words.get_rect(midleft=(rect.left + round(8 * scale), rect.centery)))
 
 
 class ProblemList(PanelList):

@@ -126,7 +126,7 @@ def object_kind(desk: Desk) -> str:
 
 
 OBJECT_HEIGHTS = {
-    "nothing": 150,
+    "nothing": 92,
     "vertex": ROW + 62,
     "vertices": 62,
     "several": 3 * ROW + 212,

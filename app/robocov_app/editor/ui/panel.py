@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from robocov_app.editor.ui.actions import all_actions
 from robocov_app.editor.ui.fields import FIELDS
-from robocov_app.editor.ui.lists import HistoryList, PanelList, ProblemList, VertexList
+from robocov_app.editor.ui.lists import HistoryList, PanelList, ProblemList, ThingList, VertexList
 from robocov_app.editor.ui.pages import (
     FACTS,
     OBJECT_HEIGHTS,
@@ -53,7 +53,7 @@ class Panel(Paged):
     def __init__(self, desk: Desk, do: Callable[[str], None]) -> None:
         super().__init__(desk, all_actions(), do)
         self.desk = desk
-        self.vertices, self.problems = VertexList(desk), ProblemList(desk)
+        self.vertices, self.things, self.problems = VertexList(desk), ThingList(desk), ProblemList(desk)
         self.history = HistoryList(desk)
 
     def wanted(self) -> object:
@@ -144,7 +144,9 @@ class Panel(Paged):
         """The list that is drawn on the open page."""
         if self.tab in ("problems", "history"):
             return self.problems if self.tab == "problems" else self.history
-        return self.vertices if self.tab == "object" and self.desk.handled else None
+        if self.tab == "object":
+            return self.vertices if self.desk.handled else self.things
+        return None
 
     def list_box(self) -> Box:
         """Return where it is."""
