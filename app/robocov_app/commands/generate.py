@@ -168,16 +168,8 @@ def _generated(options: Arguments, seed: int) -> Environment:
     from robocov.generator import generated_map
 
     try:
-        return generated_map(
-            seed,
-            kind=options.kind,
-            obstacles=options.obstacles,
-            area=options.area,
-            gap=options.gap,
-            side=options.side,
-            width=options.width,
-            height=options.height,
-        )
+        names = ("kind", "obstacles", "area", "gap", "side", "width", "height")
+        return generated_map(seed, **{name: getattr(options, name) for name in names})
     except ParameterError as error:
         # its messages begin with the name of the parameter
         of_seed = "" if options.count is None else f" (seed {seed})"

@@ -85,18 +85,8 @@ class Arguments:
 
     def film(self) -> RunOptions:
         """Return what `robocov run` would be told for such a film."""
-        return RunOptions(
-            frames=self.frames,
-            video=self.video,
-            fps=self.fps,
-            film_speed=self.film_speed,
-            theme=self.theme or "light",
-            colours=self.colours,
-            show=self.show,
-            hide=self.hide,
-            size=self.size,
-            json=self.json,
-        )
+        same = ("frames", "video", "fps", "film_speed", "colours", "show", "hide", "size", "json")
+        return RunOptions(theme=self.theme or "light", **{name: getattr(self, name) for name in same})
 
 
 def command(options: Arguments) -> int:

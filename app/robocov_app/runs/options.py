@@ -50,7 +50,7 @@ class ConditionOptions:
         """Return the conditions for a team, None where they are ideal; raises ParameterError."""
         if self == ConditionOptions():
             return None
-        from robocov.conditions import Conditions, Failure, Join, parsed_entry
+        from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 
         option = "--fail"
         try:
@@ -59,18 +59,8 @@ class ConditionOptions:
             joins = tuple(parsed_entry(Join, text) for text in self.join)
         except ParameterError as error:
             raise ParameterError(f"{option}: {error}") from None
-        conditions = Conditions(
-            loss=self.loss,
-            delay=self.delay,
-            message_rate=self.message_rate,
-            forget_after=self.forget_after,
-            position_noise=self.position_noise,
-            sensing_noise=self.sensing_noise,
-            failure_rate=self.failure_rate,
-            failures=failures,
-            joins=joins,
-            seed=seed,
-        )
+        limits = {name: getattr(self, name) for name in LIMITS}
+        conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
         conditions.check_team(robots)
         return None if conditions.ideal else conditions
 

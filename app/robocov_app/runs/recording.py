@@ -78,6 +78,14 @@ def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -
     return done
 
 
+def save_moving_picture(frames: Iterable[Frame], folder: Path | None, film: Path | None, fps: float) -> None:
+    """Write frames as PNGs into a folder, as a film, or both."""
+    if film is not None:
+        save_film(film, frames if folder is None else kept_frames(folder, frames), fps=fps)
+    elif folder is not None:
+        save_frames(folder, frames)
+
+
 def _even(frame: Frame) -> Frame:
     """Return the frame with its last row or column repeated where its size is odd."""
     height, width, _ = frame.shape
