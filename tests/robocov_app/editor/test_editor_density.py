@@ -194,7 +194,7 @@ def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
         assert hands.desk.tool.change is not None
         hands.key("escape")
         hands.release()
-        assert hands.sketch.density is None and not hands.desk.document.history.can_undo
+        assert hands.sketch.density is None and not hands.desk.document.history.past
 
 
 AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))

@@ -30,13 +30,13 @@ def test_undo_is_the_exact_inverse_of_whatever_was_done(data):
     for sketch, _ in reversed(was[:-1]):
         assert history.undo() is not None
         assert history.sketch == sketch
-    assert not history.can_undo
+    assert not history.past
     assert history.undo() is None
     assert history.future == tuple(reversed(words))
     for sketch, selection in was[1:]:
         assert history.redo() is not None
         assert (history.sketch, history.selection) == (sketch, selection)
-    assert not history.can_redo
+    assert not history.future
     assert history.past == words
 
 
@@ -102,10 +102,10 @@ def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone():
     history = drawn(2)
     history.undo()
     assert not history.do(Change(history.sketch, Selection.of(0), "nothing"))
-    assert history.can_redo
+    assert history.future
     assert history.selection == Selection.of(0)
     history.do(create.circle_drawn(history.sketch, (5.0, 5.0), 1.0))
-    assert not history.can_redo
+    assert not history.future
 
 
 def test_undo_has_no_limit():

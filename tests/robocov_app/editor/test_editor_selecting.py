@@ -63,7 +63,7 @@ def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
     assert hands.shapes[0].name == "box" and hands.desk.selection == Selection.of(0)
     hands.key("ctrl+z")
     assert hands.shapes[0] == SQUARE
-    assert not hands.desk.document.history.can_undo
+    assert not hands.desk.document.history.past
     hands.key("ctrl+y")
     assert hands.shapes[0].vertices[0] == (4, 2)
 

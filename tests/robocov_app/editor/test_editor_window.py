@@ -38,7 +38,7 @@ def test_every_button_does_what_its_action_does(hands: Hands) -> None:
     hands.select(0)
     hands.turn("object")
     hands.push("rotate:left")
-    assert hands.desk.document.history.can_undo
+    assert hands.desk.document.history.past
     hands.push("undo")
     assert hands.shapes[0] == BOX
     hands.push("help")
@@ -258,7 +258,7 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.key("ctrl+k")
     hands.type("mirror left")
     hands.key("return")
-    assert hands.desk.document.history.can_undo
+    assert hands.desk.document.history.past
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")

@@ -27,7 +27,7 @@ from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import free_name
 from robocov_app.editor.edits.vertices import with_places
 from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenths
-from robocov_app.editor.model.selection import Change, Selection, place_of
+from robocov_app.editor.model.selection import Change, Selection, place_of, ring_points
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
@@ -316,19 +316,12 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float 
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     """Return the bounding box of something; None where it is nowhere."""
-    held: object = None
-    if owner == BOUNDARY:
-        points = np.array(sketch.boundary or (), dtype=float).reshape(-1, 2)
-    elif isinstance(owner, str):
-        held = sketch.start(owner)
-        points = np.array(getattr(held, "positions", ()), dtype=float).reshape(-1, 2)
-    else:
+    points = np.array([point for ring in ring_points(sketch, owner) for point in ring]).reshape(-1, 2)
+    if isinstance(owner, int) and owner != BOUNDARY:
         item = sketch.item(owner)
-        held, points = item.shape, np.array(shapely.bounds(item.geometry)).reshape(2, 2)
-    if isinstance(held, CircleObstacle | DiscStart):
         # a typed size is that of the circle, not of the polygon that stands for it
-        (x, y), r = held.center, held.radius
-        return x - r, y - r, x + r, y + r
+        if not isinstance(item.shape, CircleObstacle):
+            points = shapely.bounds(item.geometry).reshape(2, 2)
     if not len(points) or not np.isfinite(points).all():
         return None
     (low_x, low_y), (high_x, high_y) = points.min(axis=0).tolist(), points.max(axis=0).tolist()

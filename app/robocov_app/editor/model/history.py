@@ -85,16 +85,6 @@ class History:
         self.sketch = new(self.sketch)
 
     @property
-    def can_undo(self) -> bool:
-        """Whether there is something to take back."""
-        return bool(self._done)
-
-    @property
-    def can_redo(self) -> bool:
-        """Whether there is something to do again."""
-        return bool(self._undone)
-
-    @property
     def past(self) -> tuple[str, ...]:
         """What can be taken back, in words, the newest first."""
         return tuple(step.after.words for step in reversed(self._done))

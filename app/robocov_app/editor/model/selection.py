@@ -74,21 +74,13 @@ class Selection:
 
     def plus(self, other: Selection) -> Selection:
         """Return both together."""
-        return Selection(
-            self.items | other.items,
-            self.vertices | other.vertices,
-            self.starts | other.starts,
-            self.boundary or other.boundary,
-        )
+        items, starts = self.items | other.items, self.starts | other.starts
+        return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
 
     def toggled(self, other: Selection) -> Selection:
         """Return the selection after a click with Shift: what is in both goes, the rest of `other` comes."""
-        return Selection(
-            self.items ^ other.items,
-            self.vertices ^ other.vertices,
-            self.starts ^ other.starts,
-            self.boundary != other.boundary,
-        )
+        items, starts = self.items ^ other.items, self.starts ^ other.starts
+        return Selection(items, self.vertices ^ other.vertices, starts, self.boundary != other.boundary)
 
     def within(self, sketch: Sketch) -> Selection:
         """Return what of the selection there is in a sketch, as after undoing."""

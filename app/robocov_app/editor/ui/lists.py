@@ -263,7 +263,7 @@ class HistoryList(PanelList):
     def key(self) -> object:
         """Return what there is now: every edit makes another sketch."""
         history = self._desk.document.history
-        return history, id(history.sketch), history.can_redo
+        return history, id(history.sketch), bool(history.future)
 
     def rows(self, wide: float) -> list[Row]:
         """Return a line for each edit, about how many are to be undone to be there."""

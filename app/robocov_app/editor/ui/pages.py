@@ -286,7 +286,7 @@ def problems_page(widgets: Widgets, top: float) -> None:
     """Buttons above the list of problems, which is drawn, not written into widgets."""
 
     def build(_: float) -> None:
-        does = (("Next", "problem:next"), ("Repair", "repair"), ("Clip", "clip"), ("Try it", "try"))
+        does = (("Next", "problem:next"), ("Repair", "repair"), ("Clip", "clip"), ("Mend", "problem:fix"))
         for (x, width), (text, action) in zip(columns(4), does, strict=True):
             widgets.does(text, widgets.rect(x, 2, width, 26), action)
 
