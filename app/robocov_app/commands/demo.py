@@ -169,7 +169,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
     """Render frames of the window without a display."""
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
-    from robocov_app.runs.recording import kept_frames, save_film, save_frames
+    from robocov_app.runs.recording import save_moving_picture
     from robocov_app.terminal.interruption import INTERRUPTED, Interruption
     from robocov_app.terminal.progress import progress
     from robocov_app.viewer.film import pixels
@@ -198,12 +198,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
                     yield pixels(window.screen)
                     update(done + 1)
 
-            if options.video is not None:
-                shown = frames() if out is None else kept_frames(out, frames())
-                save_film(options.video, shown, fps=HEADLESS_FPS)
-            else:
-                assert out is not None
-                save_frames(out, frames())
+            save_moving_picture(frames(), out, options.video, HEADLESS_FPS)
     for target in (options.out, options.video):
         if target is not None:
             print(f"saved {target}")

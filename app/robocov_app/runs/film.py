@@ -27,7 +27,7 @@ from robocov_app.render.spacing import columns_for
 from robocov_app.render.theme import Colour, theme_named
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
-from robocov_app.runs.recording import Frame, kept_frames, save_film, save_frames
+from robocov_app.runs.recording import Frame, save_moving_picture
 from robocov_app.runs.run import Run
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
@@ -340,10 +340,6 @@ def write_moving(
             if stop.requested:
                 return
 
-    pictures = film.parent / "frames"
+    pictures = film.parent / "frames" if options.frames else None
     with progress("film" if options.video else "frames", total, quiet=options.json) as update:
-        if not options.video:
-            save_frames(pictures, told())
-        else:
-            shown = kept_frames(pictures, told()) if options.frames else told()
-            save_film(film, shown, fps=options.fps)
+        save_moving_picture(told(), pictures, film if options.video else None, options.fps)
