@@ -52,11 +52,9 @@ _LONGEST_NAME = 100
 _LONGEST_TEXT = 10_000
 _MOST_PLACES = 20
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
-_MAP_PLACE = re.compile(
-    r"obstacles\[(\d+)\](?:\.(vertices|points|holes|path\.points)\[(\d+)\])?(?:\[(\d+)\])?(?:\[\d\])?"
-    r"|starts(?:\.(\w+)|\[\"([^\"]*)\"\])(?:\.positions\[(\d+)\])?(?:\[\d\])?"
-    r"|boundary\[(\d+)\](?:\[\d\])?"
-)
+_MAP_PLACE = re.compile(r"\b(obstacles|starts|boundary|density)((?:\[\d+\]|\.\w+|\[\"[^\"]*\"\])+)")
+_STEP = re.compile(r"\[(\d+)\]|\.(\w+)|\[\"([^\"]*)\"\]")
+_NOUNS = {"vertices": "corner", "points": "point", "positions": "place", "holes": "hole", "areas": "area"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,22 +112,23 @@ def in_words(message: str, sketch: Sketch) -> str:
     """
 
     def named(match: re.Match[str]) -> str:
-        number, rings, index, inner, name, quoted, position, corner = match.groups()
-        if corner is not None:
-            return f"boundary, corner {int(corner) + 1}"
-        if number is None:
-            start = f"start “{name if name is not None else quoted}”"
-            return start if position is None else f"{start}, place {int(position) + 1}"
-        if int(number) >= len(sketch.obstacles):
-            return match[0]
-        what = numbered_name(sketch, sketch.obstacles[int(number)].key)
-        if rings is None:
-            return what
-        if rings == "holes":
-            hole = f"{what}, hole {int(index) + 1}"
-            return hole if inner is None else f"{hole}, corner {int(inner) + 1}"
-        kind = {"vertices": "corner", "points": "point", "path.points": "way point"}[rings]
-        return f"{what}, {kind} {int(index) + 1}"
+        words, noun = [match[1]], "corner"
+        steps = _STEP.findall(match[2])
+        if match[1] == "obstacles":
+            if not steps[0][0] or int(steps[0][0]) >= len(sketch.obstacles):
+                return match[0]
+            words = [numbered_name(sketch, sketch.obstacles[int(steps.pop(0)[0])].key)]
+        elif match[1] == "starts":
+            words = [f"start “{''.join(steps.pop(0))}”"]
+        for number, name, key in steps:
+            if not number:
+                noun = _NOUNS.get(name or key, name or key)
+                words.append(noun)
+            elif noun:
+                numbered = f"{noun} {int(number) + 1}"
+                words = [*words[:-1], numbered] if words[-1] == noun else [*words, numbered]
+                noun = "corner" if noun == "hole" else ""
+        return ", ".join(words)
 
     return _MAP_PLACE.sub(named, message.removeprefix("map: "))
 
