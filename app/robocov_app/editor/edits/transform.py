@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-import shapely
 
 from robocov.arrays import Array
 from robocov.environment import (
@@ -316,16 +315,13 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float 
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     """Return the bounding box of something; None where it is nowhere."""
-    points = np.array([point for ring in ring_points(sketch, owner) for point in ring]).reshape(-1, 2)
     if isinstance(owner, int) and owner != BOUNDARY:
         item = sketch.item(owner)
         # a typed size is that of the circle, not of the polygon that stands for it
         if not isinstance(item.shape, CircleObstacle):
-            points = shapely.bounds(item.geometry).reshape(2, 2)
-    if not len(points) or not np.isfinite(points).all():
-        return None
-    (low_x, low_y), (high_x, high_y) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return low_x, low_y, high_x, high_y
+            return None if item.geometry.is_empty else item.geometry.bounds
+    points = [point for ring in ring_points(sketch, owner) for point in ring]
+    return _around((*point, *point) for point in points) if points else None
 
 
 def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:

@@ -39,6 +39,7 @@ class Targets:
         dragged = list(without)
         vertices = {each for each in dragged if isinstance(each, Vertex)}
         owners = {each for each in dragged if not isinstance(each, Vertex)}
+        owners |= {item.key for item in sketch.obstacles if item.hidden}
         touched = {(vertex.of, vertex.ring) for vertex in vertices}
         rims, centres = list(more), list[Point]()
         walls, circles = list[BaseGeometry](), list[BaseGeometry]()

@@ -208,7 +208,7 @@ def cancel(desk: Desk) -> None:
 def select_next(desk: Desk, by: int) -> None:
     """Select the next obstacle, start or boundary, in the order of the map."""
     order: list[Owner] = [
-        *(item.key for item in desk.sketch.obstacles),
+        *(item.key for item in desk.sketch.obstacles if not item.hidden),
         *(name for name, _ in desk.sketch.starts),
     ]
     if desk.sketch.boundary is not None:
