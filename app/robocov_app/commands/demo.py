@@ -110,13 +110,21 @@ def command(options: Arguments) -> int:
     from robocov_app.render.picture import checked_layers
     from robocov_app.viewer.opening import Opening
     from robocov_app.viewer.screen import show_compiling
+    from robocov_app.viewer.session.file import SUFFIX, load_session
+    from robocov_app.viewer.session.session import Session
 
     if not options.headless:
         on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
-    session = session_of(options)
+    file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
+    if options.map.endswith(SUFFIX):
+        file = Path(options.map)
+        saved = load_session(file, laws)
+        session, name = Session.opened(saved), str(saved.view.get("map") or "")
+    else:
+        session = session_of(options)
     opening = Opening(
         session,
-        options.map,
+        name,
         options.folder,
         theme=options.theme,
         size=window_size(options.size),
@@ -124,8 +132,9 @@ def command(options: Arguments) -> int:
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
         headless=options.headless,
-        laws=(*controller_kinds(), *options.controllers),
+        laws=laws,
         lattice=options.lattice,
+        file=file,
     )
     if options.headless:
         return rendered(opening, options)

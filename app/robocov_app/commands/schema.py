@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import Literal
 
-from robocov.mapfile import map_schema
+import tyro
 
 
 @dataclass
 class Arguments:
-    """Print the JSON Schema of map files, for completion and checks in editors.
+    """Print the JSON Schema of map files, or of session files, for completion and checks in editors.
 
     Example: robocov schema > robocov-map.schema.json
     """
+
+    of: tyro.conf.Positional[Literal["map", "session"]] = "map"
+    """What kind of files."""
 
     json: bool = False
     """Accepted for the sake of uniformity: the answer is JSON anyway."""
@@ -21,4 +25,8 @@ class Arguments:
 
 def command(options: Arguments) -> None:
     """Print the schema."""
-    print(json.dumps(map_schema(), indent=1))
+    if options.of == "map":
+        from robocov.mapfile import map_schema as schema
+    else:
+        from robocov_app.viewer.session.file import session_schema as schema
+    print(json.dumps(schema(), indent=1))

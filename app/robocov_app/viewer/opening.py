@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
+from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.viewer.actions import KEY_REPEAT
 from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings, load_settings, save_settings, settings_file
 
 if TYPE_CHECKING:
@@ -105,11 +107,12 @@ class Opening:
         headless: bool = False,
         laws: tuple[str, ...] = (),
         lattice: int = LATTICE,
+        file: Path | None = None,
     ) -> None:
         self.session, self.map_name, self.folder = session, map_name, folder
         self.theme, self.size, self.scale = theme, size, scale
         self.also, self.without = also, without
-        self.headless, self.laws, self.lattice = headless, laws, lattice
+        self.headless, self.laws, self.lattice, self.file = headless, laws, lattice, file
 
     @contextmanager
     def window(self) -> Iterator[Window]:
@@ -127,11 +130,14 @@ class Opening:
                 settings, trouble = load_settings(file)
                 window = self._opened(settings)
                 window.desk.say(trouble)
+                if not self.headless and (left := recoverable(autosave_folder())):
+                    window.desk.say(f"{left[0].words}: Ctrl K, “recover” opens it")
                 keeper = window.keeper
                 try:
                     yield window
                     save_settings(settings_of(window, settings, self.scale), file)
                 finally:
+                    window.desk.workspace.close()
                     window.desk.costs.close()
         finally:
             # the window is gone; what is still being saved is waited for
@@ -158,7 +164,8 @@ class Opening:
             self.session.clock.budget = float("inf")
         costs: Costs = Costs(self.lattice, direct=True) if self.headless else Costs(self.lattice)
         try:
-            desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws)
+            kept_in = None if self.headless else autosave_folder()
+            desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file)
             desk.theme = self.theme or settings.theme
             desk.fade = settings.fade
             window = Window(desk, size, scale, patient=self.headless)

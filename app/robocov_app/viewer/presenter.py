@@ -13,11 +13,13 @@ from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
 from robocov_app.viewer.tools import Hand, Wall, toolbox
 from robocov_app.viewer.typed import command
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
+    from typing import Any
 
     from robocov.controllers.gains import Value
     from robocov_app.viewer.costs import Costs
@@ -46,6 +48,10 @@ class Desk:
         What the user calls the map: a bundled name or a path.
     laws : names of controllers
         To choose from beside the built-in ones: installed ones, and those of the user's files.
+    kept_in : Path or None
+        Folder in which work that is not saved is kept aside.
+    file : Path or None
+        Of the session.
 
     Attributes
     ----------
@@ -68,6 +74,8 @@ class Desk:
         folder: Path,
         map_name: str = "",
         laws: Iterable[str] = (),
+        kept_in: Path | None = None,
+        file: Path | None = None,
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
         self.map_name = map_name
@@ -86,6 +94,8 @@ class Desk:
         self.now = 0.0
         self.cursor: Point | None = None
         self._mapped: object = None
+        self._kept_in = kept_in
+        self.workspace = Workspace(session, kept_in, file)
         self._doing: dict[str, Callable[[], None]] = self._what_to_do()
         self.look_at_map()
 
@@ -213,6 +223,10 @@ class Desk:
             "fade": self.switch_fade,
             "panel": self.switch_panel,
             "save:map": self.save_map,
+            "save:session": self.save_session,
+            "recover": self.recover,
+            "branch:previous": lambda: self.enter_branch(-1),
+            "branch:next": lambda: self.enter_branch(1),
         }
 
     def pause(self) -> None:
@@ -389,6 +403,51 @@ class Desk:
         save_map(self.session.environment, target)
         self.map_name = str(target)
         self.say(f"map saved: {target}")
+
+    @property
+    def view(self) -> dict[str, object]:
+        """What is shown, and how, for the session's file."""
+        return {"shown": sorted(self.shown), "theme": self.theme, "map": self.map_name}
+
+    def save_session(self) -> None:
+        """Write the session to its file, or to a new one."""
+        self.say(f"session saved: {self.workspace.save(self.folder, self.view)}")
+
+    def open_session(self, path: Path) -> None:
+        """Go on with a session from its file; what was not saved of this one stays aside."""
+        self._take(*opened(path, self.laws, self._kept_in))
+        self.say(f"session opened: {path}")
+
+    def recover(self) -> None:
+        """Go on with the newest session that was left behind."""
+        found = recoverable(self._kept_in)
+        if not found:
+            self.say("nothing was left behind")
+            return
+        self._take(*recovered(found[0], self.laws, self._kept_in))
+        self.say(f"recovered: {found[0].words}")
+
+    def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
+        self.workspace.close()
+        self.workspace, before = workspace, self.session
+        self.session = workspace.session
+        self.session.clock.budget = before.clock.budget
+        self.session.serial = before.serial + 1
+        self.map_name = str(view.get("map") or self.session.environment.name)
+        if isinstance(shown := view.get("shown"), list):
+            self.shown = set(map(str, shown))
+        self.hand.selected = None
+        self.version += 1
+        self.look_at_map()
+
+    def enter_branch(self, by: int) -> None:
+        """Go to the end of the next branch, or of the one before."""
+        session = self.session
+        branches = session.branches
+        now = next((k for k, each in enumerate(branches) if each.node is session.head), -1)
+        branch = branches[(now + by) % len(branches)]
+        session.enter(branch.node)
+        self.say(f"branch {branches.index(branch) + 1} of {len(branches)}: {branch.words}")
 
     def set_parameter(self, name: str, value: Value) -> None:
         """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocov.errors import InputError, ParameterError, unknown_name
@@ -12,7 +13,19 @@ from robocov_app.viewer.session.scenario import Law
 if TYPE_CHECKING:
     from robocov_app.viewer.presenter import Desk
 
-COMMAND_WORDS = ("robots", "seed", "start", "map", "speed", "controller", "time", "robot")
+COMMAND_WORDS = (
+    "robots",
+    "seed",
+    "start",
+    "map",
+    "speed",
+    "controller",
+    "time",
+    "robot",
+    "open",
+    "save",
+    "branch",
+)
 """What can be typed besides gains and limits."""
 
 
@@ -55,6 +68,14 @@ def command(desk: Desk, text: str) -> None:
         if rest not in desk.laws:
             desk.laws.append(rest)
         desk.set_law(desk.active, rest)
+    elif word == "open":
+        desk.open_session(Path(rest))
+    elif word == "save":
+        desk.say(
+            f"session saved: {desk.workspace.save(desk.folder, desk.view, Path(rest) if rest else None)}"
+        )
+    elif word == "branch":
+        desk.session.enter(desk.session.document.branch(rest).node)
     elif word == "time":
         desk.look_at(_positive(word, rest))
     elif word == "robot":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ from robocov_app.viewer.report_page import ReportPage
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
+from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, draw_status, facts
 from robocov_app.viewer.tour import Tour
 
@@ -164,6 +166,7 @@ class Window:
     def _pass_time(self, seconds: float) -> None:
         desk, session = self.desk, self.desk.session
         desk.pass_time(seconds)
+        desk.workspace.keep(desk.view)
         for words, trouble in self.keeper.poll():
             desk.say(words, trouble=trouble)
         if self.tour is not None:
@@ -388,6 +391,13 @@ class Window:
             self.closed = True
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self.screen = pygame.display.get_surface() or self.screen
+        elif event.type == pygame.DROPFILE:
+            path = Path(event.file)
+            self.desk.attempt(
+                lambda: (
+                    self.desk.open_session(path) if path.suffix == SUFFIX else self.desk.open_map(str(path))
+                )
+            )
         elif event.type == pygame.KEYDOWN:
             self.keyboard.press(event)
         elif event.type == pygame.TEXTINPUT and self.palette.open:

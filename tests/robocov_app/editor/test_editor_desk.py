@@ -69,7 +69,7 @@ def test_the_same_things_have_the_same_keys_as_in_the_demo() -> None:
         *("tool:polygon", "tool:wall", "tool:circle", "wider", "narrower", "more", "fewer"),
     }
     assert {name: ours[name] for name in same} == {name: theirs[name] for name in same}
-    assert ours["save"] == theirs["save:map"] and ours["tool:measure"] == theirs["tool:ruler"]
+    assert ours["save"] == theirs["save:session"] and ours["tool:measure"] == theirs["tool:ruler"]
     assert ours["show:grid"] == theirs["layer:grid"] and ours["tool:select"] == theirs["tool:hand"]
 
 

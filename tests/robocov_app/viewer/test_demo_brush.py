@@ -183,7 +183,7 @@ def test_in_the_window(tmp_path):
         assert {lane.circumstances.environment for lane in driver.session.lanes} == {
             driver.session.environment
         }
-        driver.key("ctrl+s")
+        driver.key("ctrl+shift+s")
         assert load_map(driver.desk.map_name) == driver.session.environment
         driver.key("ctrl+z", 2)
         assert driver.session.environment.density is None

@@ -102,8 +102,8 @@ def test_gains_can_be_typed(text: str) -> None:
     assert desk.lane.law.value("k_rep") == 0.5
 
 
-def test_what_can_be_typed_is_done() -> None:
-    desk = desk_of()
+def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
+    desk = desk_of(folder=tmp_path)
     desk.command("robots 4")
     desk.command("seed 7")
     desk.command("start far")
@@ -121,9 +121,14 @@ def test_what_can_be_typed_is_done() -> None:
     assert desk.session.time == pytest.approx(0.5)
     desk.command("robot 3")
     assert desk.selected == 3
+    desk.command("branch 1")
+    desk.command(f"save {tmp_path / 'story.robocov'}")
+    desk.command(f"open {tmp_path / 'story.robocov'}")
+    assert desk.message.startswith("session opened: ")
     desk.command("map square")
     assert desk.map_name == "square"
-    assert {"robots", "seed", "start", "controller", "speed", "time", "robot", "map"} == set(COMMAND_WORDS)
+    words = "robots seed start controller speed time robot map open save branch"
+    assert set(words.split()) == set(COMMAND_WORDS)
 
 
 def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Path) -> None:

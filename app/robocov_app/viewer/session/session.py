@@ -197,9 +197,14 @@ class Session:
         """The step of the present."""
         return self._run.step
 
+    @property
+    def can_be_made_again(self) -> bool:
+        """Whether the document is all that there is: no record that nothing repeats."""
+        return self.recorded_until is None or self.repeatable
+
     def require_document(self) -> None:
         """Make sure that everything can be made again; ParameterError says why it cannot."""
-        if self.recorded_until is not None and not self.repeatable:
+        if not self.can_be_made_again:
             raise ParameterError("this began with a recorded run, which cannot be made again")
         for lane in self.lanes:
             lane.law.made()

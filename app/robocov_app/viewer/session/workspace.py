@@ -1,0 +1,117 @@
+"""What is saved of the session that is open, and what is kept aside of it: no work is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from datetime import datetime
+from pathlib import Path
+from time import monotonic
+from typing import Any, NamedTuple
+
+from robocov_app.terminal.output import free_name
+from robocov_app.toolkit import autosave
+from robocov_app.viewer.session.file import SUFFIX, load_session, save_session, session_json, session_of
+from robocov_app.viewer.session.session import Session
+
+KIND = "robocov-session-draft"
+
+_PAUSE = 0.9
+"""Seconds between two copies of a session that goes on."""
+
+
+class Recovered(NamedTuple):
+    """A session that a window left behind."""
+
+    folder: Path
+    path: Path | None
+    when: datetime
+    touches: int
+
+    @property
+    def words(self) -> str:
+        """What to offer."""
+        where = "never saved" if self.path is None else f"not saved to {self.path.name}"
+        touches = "1 touch" if self.touches == 1 else f"{self.touches} touches"
+        return f"a session of {self.when:%H:%M}, {touches}, {where}"
+
+
+class Workspace:
+    """The file of the session that is open.
+
+    Attributes
+    ----------
+    session : Session
+    path : Path or None
+        Its file; None if it never had one.
+    """
+
+    def __init__(
+        self, session: Session, folder: Path | None, path: Path | None = None, resumed: Path | None = None
+    ) -> None:
+        self.session, self.path = session, path
+        self._saved = -1 if resumed is not None else session.revision
+        self._kept: tuple[int, int] | None = None
+        self._when = -_PAUSE
+        self._autosaver = autosave.Autosaver(folder, KIND, path, resumed)
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether there are touches that are in no file."""
+        return self.session.revision != self._saved
+
+    def keep(self, view: Mapping[str, Any]) -> None:
+        """Keep a copy aside where something has happened since the last; to be called in every frame."""
+        state = self.session.revision, self.session.step_now
+        if not self.unsaved or state == self._kept or monotonic() - self._when < _PAUSE:
+            return
+        if not self.session.can_be_made_again:
+            return
+        self._kept, self._when = state, monotonic()
+        content = session_json(self.session.document, self.session.head, self.session.step_now, view)
+        self._autosaver.keep(lambda: {"session": content})
+
+    def save(self, folder: Path, view: Mapping[str, Any], path: Path | None = None) -> Path:
+        """Write the session to a file, by default its own, or a new one in a folder; return it.
+
+        OutputError when it cannot be written; ParameterError where its past is a record that nothing repeats.
+        """
+        session = self.session
+        session.require_document()
+        target = path or self.path or free_name(folder, session.environment.name.lower() or "session", SUFFIX)
+        save_session(target, session.document, session.head, session.step_now, view)
+        self.path, self._saved = target, session.revision
+        self._autosaver.settle(target)
+        return target
+
+    def close(self) -> None:
+        """End; what is not saved stays aside, and is offered at the next start."""
+        self._autosaver.close(discard=not self.unsaved)
+
+
+def opened(
+    path: Path, controllers: Collection[str], folder: Path | None
+) -> tuple[Workspace, Mapping[str, Any]]:
+    """Return a session from its file, and what is shown of it; MapError, InputError as `load_session`."""
+    saved = load_session(path, controllers)
+    return Workspace(Session.opened(saved), folder, path), saved.view
+
+
+def recoverable(folder: Path | None) -> tuple[Recovered, ...]:
+    """Return the sessions that windows left behind which live no more, the newest first."""
+
+    def read(record: autosave.Record) -> Recovered | None:
+        content = record.content.get("session")
+        if content is None:
+            return None
+        return Recovered(record.folder, record.path, record.when, len(content["touches"]) - 1)
+
+    return autosave.recoverable(folder, KIND, read)
+
+
+def recovered(
+    work: Recovered, controllers: Collection[str], folder: Path | None
+) -> tuple[Workspace, Mapping[str, Any]]:
+    """Return a session that was left behind, to go on with."""
+    record = autosave.read_record(work.folder, KIND)
+    saved = session_of(record.content["session"], str(work.folder), controllers)
+    return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view

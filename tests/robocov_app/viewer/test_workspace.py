@@ -1,0 +1,93 @@
+"""The file of a session, what is kept aside of it, and a start that offers it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from driven_window import opened
+from touched_run import begun, desk_of, positions_of, stepped
+
+from robocov.errors import MapError
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.workspace import Workspace, recoverable, recovered
+
+
+def kept(workspace: Workspace) -> None:
+    """Keep a copy now, and end without a word, as kill -9 does."""
+    workspace._when = -1e9
+    workspace.keep({"theme": "light"})
+    assert workspace._autosaver.flush()
+    workspace._autosaver._lock.close()
+
+
+def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
+    session = begun()
+    workspace = Workspace(session, tmp_path)
+    workspace.keep({})
+    assert not workspace.unsaved
+    stepped(session, 20).fail_robot(2)
+    stepped(session, 10)
+    kept(workspace)
+    (found,) = recoverable(tmp_path)
+    assert "1 touch, " in found.words and found.words.endswith("never saved")
+    again, view = recovered(found, (), tmp_path)
+    assert view == {"theme": "light"} and again.unsaved
+    assert again.session.numbers == (1, 3) and again.session.end == session.end
+    for mine, theirs in zip(positions_of(again.session), positions_of(session), strict=True):
+        assert (mine == theirs).all()
+    again.save(tmp_path, {}, tmp_path / "story.robocov")
+    assert not again.unsaved
+    again.close()
+    assert recoverable(tmp_path) == ()
+
+
+def test_a_session_that_was_saved_and_closed_leaves_nothing(tmp_path: Path) -> None:
+    session = stepped(begun(), 5)
+    workspace = Workspace(session, tmp_path / "kept")
+    session.fail_robot(1)
+    path = workspace.save(tmp_path, {})
+    assert path == tmp_path / "hall-1.robocov" and not workspace.unsaved
+    session.fail_robot(2)
+    assert workspace.unsaved and workspace.save(tmp_path, {}) == path
+    workspace.close()
+    assert recoverable(tmp_path / "kept") == ()
+
+
+def test_ctrl_q_with_work_that_is_not_saved_keeps_it(tmp_path: Path) -> None:
+    session = stepped(begun(), 5)
+    workspace = Workspace(session, tmp_path)
+    session.fail_robot(1)
+    workspace.keep({})
+    workspace.close()
+    assert len(recoverable(tmp_path)) == 1
+
+
+def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        stepped(driver.session, 10).fail_robot(2)
+        stepped(driver.session, 10)
+        driver.key("ctrl+z")
+        assert driver.desk.message.startswith("undone: robot 2 failed; back at 0.2 s")
+        driver.session.fail_robot(1)
+        driver.key("ctrl+s")
+        (path,) = tmp_path.glob("*.robocov")
+        assert str(path) in driver.desk.message
+        driver.key("alt+left")
+        assert driver.desk.message == "branch 1 of 2: robot 2 failed" and driver.session.numbers == (1, 3)
+        driver.key("alt+right")
+        assert driver.session.numbers == (2, 3)
+        driver.desk.command(f"open {path}")
+        driver.frames(2)
+        assert driver.desk.session.numbers == (2, 3) and len(driver.desk.session.branches) == 2
+        driver.desk.command("branch 1")
+        assert driver.desk.session.numbers == (1, 3)
+
+
+def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
+    desk: Desk = desk_of(folder=tmp_path)
+    (tmp_path / "no.robocov").write_text("{}")
+    before = desk.session
+    with pytest.raises(MapError, match="format: missing"):
+        desk.open_session(tmp_path / "no.robocov")
+    assert desk.session is before
