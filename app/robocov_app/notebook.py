@@ -112,8 +112,8 @@ def plot_result(
     """
     from robocov.robots import Team
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
-    from robocov_app.render.field import Field, FieldLattice
-    from robocov_app.render.phi import mean_words
+    from robocov_app.render.density import mean_words
+    from robocov_app.render.distance_field import Field, FieldLattice
     from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
 
     _checked(axes)

@@ -14,7 +14,7 @@ from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
-from robocov_app.render.density_summary import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, weighed_lines
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import embedded_map
 

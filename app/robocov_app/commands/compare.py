@@ -87,7 +87,7 @@ def command(options: Arguments) -> int:
 
 def print_table(runs: dict[str, Run]) -> None:
     """Print the comparison for people."""
-    from robocov_app.render.density_summary import weighed_lines
+    from robocov_app.render.density import weighed_lines
     from robocov_app.runs.compare import rows_of
     from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 

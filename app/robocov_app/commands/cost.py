@@ -14,7 +14,7 @@ from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, shown
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
-from robocov_app.render.density_summary import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, weighed_lines
 from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
 from robocov_app.terminal.output import finite
 
@@ -76,7 +76,7 @@ def command(options: Arguments) -> None:
                 arrays["times"] = timed.times
             np.savez(file, **arrays)
     if options.plot is not None:
-        from robocov_app.render.phi import mean_words
+        from robocov_app.render.density import mean_words
 
         mean = f"{mean_words(environment)} {result.mean_distance:.3f} m"
         if timed is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.render.density_summary import density_kind
+from robocov_app.render.density import density_kind
 from robocov_app.terminal.tables import BOLD, print_table
 
 

@@ -16,7 +16,7 @@ from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.render.density_summary import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, weighed_lines
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.terminal.output import finite, require_fresh
 from robocov_app.terminal.progress import late_progress
@@ -98,7 +98,7 @@ def command(options: Arguments) -> None:
         with written(options.positions) as part:
             part.write_text(f"[{rows}]\n", encoding="utf-8")
     if options.plot is not None:
-        from robocov_app.render.phi import mean_words
+        from robocov_app.render.density import mean_words
 
         cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
         mean = f"{mean_words(environment)} {best.mean_distance:.3f} m"

@@ -111,7 +111,7 @@ def remade(options: Arguments) -> int:
 
 def print_summary(run: Run) -> None:
     """Print what is worth knowing of a run."""
-    from robocov_app.render.density_summary import weighed_lines
+    from robocov_app.render.density import weighed_lines
 
     summary, record = run.summary, run.record
     settled = summary["settled_at_s"]

@@ -8,9 +8,9 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov_app.figures.page import tone
-from robocov_app.render.aims import CENTROID, GOAL, are_centroids
-from robocov_app.render.phi import density_words, shading
-from robocov_app.render.spacing import fitted_radii, line_crowding, mark_size
+from robocov_app.render.density import density_words, shading
+from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
+from robocov_app.render.scene import CENTROID, GOAL, are_centroids
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
 if TYPE_CHECKING:

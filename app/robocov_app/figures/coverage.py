@@ -12,8 +12,8 @@ from robocov_app.figures.arena import draw_map, draw_robots, map_handles, robot_
 from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, draw_curves, end_label
 from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
 from robocov_app.figures.runs import plot_cost
-from robocov_app.render.phi import cost_words, density_words, mean_words
-from robocov_app.render.shading import levels, palette, round_limit, strength, ticks
+from robocov_app.render.density import cost_words, density_words, mean_words
+from robocov_app.render.distance_field import levels, palette, round_limit, strength, ticks
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robocov.record import Record
     from robocov.robots import Team
     from robocov_app.figures.curves import Curve
-    from robocov_app.render.field import Field
+    from robocov_app.render.distance_field import Field
 
 _FINE = 2
 """Dots of a map's picture for each pixel of the page."""

@@ -10,7 +10,7 @@ import numpy as np
 from robocov.errors import ParameterError
 from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.page import HEADING, TEXT, Page, plain_style
-from robocov_app.render.spacing import columns_for
+from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 if TYPE_CHECKING:

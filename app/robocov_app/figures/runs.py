@@ -17,9 +17,8 @@ from robocov_app.figures.figure_files import check_figure_path as check_figure_p
 from robocov_app.figures.figure_files import figure_kind as figure_kind
 from robocov_app.figures.figure_files import save_figure as save_figure
 from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, plain_style
-from robocov_app.render.legends import united
-from robocov_app.render.phi import cost_words, mean_words
-from robocov_app.render.spacing import columns_for
+from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 if TYPE_CHECKING:

@@ -1,111 +1,126 @@
-"""The density φ as a soft shading: the more a place counts, the stronger the colour."""
+"""The density in colours and in words, and the words for costs that it weighs."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
-import pygame
+from numpy.typing import NDArray
 
-from robocov_app.render.layers import Layer, LegendEntry
-from robocov_app.render.phi import colours, density_words, parts
+from robocov.arrays import Array
+from robocov.density import Density, Gaussians
+from robocov.environment import Environment
+from robocov_app.render.theme import Theme
 
-if TYPE_CHECKING:
-    from robocov.arrays import Array, IntArray
-    from robocov.density import Density
-    from robocov_app.render.canvas import Canvas
-    from robocov_app.render.scene import Scene
-
-_DOTS = 60_000
-"""On a surface the density is looked at in at most about so many places; between them it is interpolated."""
+_SAMPLES = 96
+"""Places along the longer side of a map at which the density is looked at for its range."""
 
 
-class DensityShading(Layer):
-    """How much each place counts, where not all count the same; distances, in colours too, hide it."""
-
-    name = "density"
-    title = "Density φ"
-    static = True
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        density = scene.environment.density
-        hidden = scene.field is not None and "distances" in canvas.shown
-        if density is not None and not density.uniform and not hidden:
-            draw_shading(canvas, density, scene.environment.region.vertices)
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        words = density_words(scene.environment)
-        return [density_entry(words)] if words else []
+Bounds: TypeAlias = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y in metres."""
 
 
-def density_entry(words: str) -> LegendEntry:
-    """Return the legend's entry."""
+def shading(density: Density, bounds: Bounds, x: Array, y: Array, theme: Theme) -> NDArray[np.uint8]:
+    """Return the shading of the places at (w,) x and (h,) y in metres as RGBA, (h, w, 4).
 
-    def glyph(canvas: Canvas, x: float, y: float) -> None:
-        wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
-        strip = np.broadcast_to(colours(np.linspace(0.0, 1.0, wide), canvas.theme)[None], (high, wide, 4))
-        page = pygame.image.frombytes(np.ascontiguousarray(strip).tobytes(), (wide, high), "RGBA")
-        canvas.surface.blit(page, (round(x - wide / 2), round(y - high / 2)))
-
-    return LegendEntry(words, glyph)
-
-
-def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
-    """Draw the shading within a ring, (k, 2) m, over what is there, premultiplied or opaque.
-
-    Where it is drawn in parts, as the clip says, these are parts of the same picture.
+    No colour is the least that there is within the bounds, the full one the most.
     """
-    (low_x, low_y), (high_x, high_y) = ring.min(axis=0).tolist(), ring.max(axis=0).tolist()
-    ends = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    (left, top), (right, bottom) = np.clip(ends, -30000, 30000).astype(int).tolist()
-    box = pygame.Rect(left - 1, top - 1, right - left + 3, bottom - top + 3).clip(canvas.surface.get_clip())
-    if not box.width or not box.height:
+    return colours(parts(density, bounds, x, y), theme)
+
+
+def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
+    """Return how far the density at (w,) x and (h,) y, m, is from the least to the most, (h, w), 0 to 1."""
+    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+    low, high = value_range(density, bounds)
+    value = density.value(points).reshape(len(y), len(x))
+    return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
+
+
+def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
+    """Return the colours, RGBA (..., 4), of parts of the way from the least density to the most."""
+    picture = np.empty((*way.shape, 4), dtype=np.uint8)
+    picture[..., :3] = theme.density
+    picture[..., 3] = np.rint(255.0 * theme.density_strength * way)
+    return picture
+
+
+def density_range(environment: Environment) -> tuple[float, float]:
+    """Return the least and the largest value that the density has in the region."""
+    if environment.density is None:
+        return 1.0, 1.0
+    return value_range(environment.density, environment.region.bounds)
+
+
+@lru_cache(maxsize=16)
+def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
+    """Return the least and the largest value of a density within bounds."""
+    low_x, low_y, high_x, high_y = bounds
+    step = max(high_x - low_x, high_y - low_y) / _SAMPLES
+    x, y = (np.arange(low + 0.5 * step, high, step) for low, high in ((low_x, high_x), (low_y, high_y)))
+    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+    points = np.concatenate([points, _inside(density, bounds)])
+    value = density.value(points)
+    return float(value.min()), float(value.max())
+
+
+def _inside(density: Density, bounds: Bounds) -> Array:
+    """Return the centres of Gaussians that are within the bounds: between samples a narrow one is missed."""
+    if not isinstance(density, Gaussians) or not density.peaks:
+        return np.empty((0, 2))
+    centers = np.array([peak.center for peak in density.peaks])
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    return np.asarray(centers[((low <= centers) & (centers <= high)).all(axis=1)])
+
+
+def density_words(environment: Environment) -> str:
+    """Return the words of the legend, empty where every place counts the same."""
+    if environment.density is None or environment.density.uniform:
+        return ""
+    return range_words(density_range(environment))
+
+
+def range_words(span: tuple[float, float]) -> str:
+    """Return the words of the legend for a range of values.
+
+    >>> range_words((0.25, 10.0))
+    'density φ, 0.25 to 10'
+    """
+    low, high = span
+    return f"density φ, {low:.3g} to {high:.3g}"
+
+
+def mean_words(environment: Environment) -> str:
+    """Return what the mean distance to the nearest robot is called, whether weighed or not."""
+    return "mean distance by φ" if density_words(environment) else "mean distance"
+
+
+def cost_words(what: str, mean_distance: float, mean_time: float | None = None) -> str:
+    """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
+
+    What is not finite is left out: a team of which no robot works covers nothing.
+
+    >>> cost_words("mean distance", 1.25), cost_words("mean distance by φ", 1.25, 3.0)
+    ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
+    """
+    known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
+    return ", ".join(
+        f"{words} {value:.3f} {unit}"
+        for words, value, unit in known
+        if value is not None and np.isfinite(value)
+    )
+
+
+def density_kind(environment: Environment) -> str | None:
+    """Return the kind of a map's density, as its file calls it; None where there is none."""
+    return None if environment.density is None else environment.density.kind
+
+
+def weighed_lines(environment: Environment) -> Iterator[str]:
+    """Yield the line that says by what the figures above it are weighed; none where nothing weighs them."""
+    density = environment.density
+    if density is None or density.uniform:
         return
-    wide, high = canvas.surface.get_size()
-    step = max(1, math.ceil(math.sqrt(wide * high / _DOTS)))
-    columns, rows = _Dots.over(box.left, box.width, step), _Dots.over(box.top, box.height, step)
-    x = canvas.camera.to_world(np.column_stack([columns.at, np.zeros(len(columns.at))]))[:, 0]
-    y = canvas.camera.to_world(np.column_stack([np.zeros(len(rows.at)), rows.at]))[:, 1]
-    coarse = 255.0 * parts(density, (low_x, low_y, high_x, high_y), x, y)
-    fine = rows.between(columns.between(coarse.T).T)
-    table = colours(np.arange(256) / 255.0, canvas.theme).astype(np.uint16)
-    table[:, :3] = table[:, :3] * table[:, 3:] // 255
-    pixels = table.astype(np.uint8)[np.rint(fine).astype(np.uint8)]
-    page = pygame.image.frombytes(pixels.tobytes(), box.size, "RGBA")
-    corners = canvas.camera.to_pixels(ring) - np.array(box.topleft)
-    mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
-    pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(np.clip(corners, -3e4, 3e4)).tolist())
-    page.blit(mask, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
-    canvas.surface.blit(page, box.topleft, special_flags=pygame.BLEND_PREMULTIPLIED)
-
-
-class _Dots(NamedTuple):
-    """Where the density is looked at along one axis, and how the pixels between are made of that.
-
-    Attributes
-    ----------
-    at : (d,) px
-        Middles of the dots; they are the same whichever pixels are wanted.
-    first : (p,)
-        The dot before each pixel's middle.
-    part : (p, 1)
-        How far it is on the way to the next.
-    """
-
-    at: Array
-    first: IntArray
-    part: Array
-
-    @classmethod
-    def over(cls, begin: int, count: int, step: int) -> _Dots:
-        """Return the dots, `step` pixels apart, for `count` pixels."""
-        place = (begin + np.arange(count) + 0.5) / step - 0.5
-        first = np.floor(place).astype(np.intp)
-        dots = np.arange(first[0], first[-1] + 2)
-        return cls((dots + 0.5) * step, first - first[0], (place - first)[:, None])
-
-    def between(self, values: Array) -> Array:
-        """Return (p, k) values at the pixels from (d, k) at the dots."""
-        before = values[self.first]
-        return np.asarray(before + self.part * (values[self.first + 1] - before))
+    low, high = density_range(environment)
+    yield f"weighed by φ    {density.kind}, {low:.3g} to {high:.3g}"

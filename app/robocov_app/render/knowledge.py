@@ -1,4 +1,4 @@
-"""Layers of who knows what: ray scans, sensed against true obstacles, the way from the cursor."""
+"""Layers of what robots know: ray scans, sensed obstacle points, the discovered map, the cursor's path."""
 
 from __future__ import annotations
 
@@ -9,13 +9,58 @@ import pygame
 import shapely
 
 from robocov.arrays import Array
+from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.clipping import FAR, bounded, clipped_polygon, clipped_segment
-from robocov_app.render.discovered import discovered_map, draw_discovered
+from robocov_app.render.canvas import FAR, Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
 from robocov_app.render.layers import Layer, LegendEntry, drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
+
+_OPACITY = {UNKNOWN: 0.28, PRESUMED: 0.45, WALL: 0.85}
+"""Of the colours of cells; free ones are clear."""
+
+
+def discovered_map(scene: Scene) -> DiscoveredMap | None:
+    """Return the map of the robot that is asked about, None where its controller remembers none."""
+    if scene.snapshot is None or scene.selected is None:
+        return None
+    maps = getattr(scene.snapshot.decision.memory, "maps", ())
+    known = maps[scene.selected] if scene.selected < len(maps) else None
+    return known if isinstance(known, DiscoveredMap) else None
+
+
+def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
+    """Draw what is in view of a discovered map: unknown cells veiled, walls as what is sensed of them.
+
+    Cells outside the region are left clear.
+    """
+    raster = known.raster
+    view = canvas.surface.get_clip()
+    corners = np.array([view.topleft, view.bottomright], dtype=float)
+    row, column = raster.cells(canvas.camera.to_world(corners))
+    first, last = (int(row.min()), int(column.min())), (int(row.max()) + 1, int(column.max()) + 1)
+    state = known.state[first[0] : last[0], first[1] : last[1]]
+    outside = raster.outside[first[0] : last[0], first[1] : last[1]]
+    pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
+    theme = canvas.theme
+    for value, colour in (
+        (UNKNOWN, theme.obstacle),
+        (PRESUMED, theme.forces["repulsion_obstacle"]),
+        (WALL, theme.forces["repulsion_obstacle"]),
+    ):
+        pixels[(state == value) & ~outside] = premultiplied(colour, _OPACITY[value])
+    x, y = raster.origin
+    low = np.array([x + first[1] * raster.cell, y + first[0] * raster.cell])
+    high = np.array([x + last[1] * raster.cell, y + last[0] * raster.cell])
+    (left, bottom), (right, top) = canvas.camera.to_pixels(np.array([low, high])).round().astype(int).tolist()
+    if right <= left or bottom <= top:
+        return
+    # the lowest row comes first, in a picture the highest
+    upright = np.ascontiguousarray(pixels[::-1])
+    picture = pygame.image.frombuffer(upright.tobytes(), (state.shape[1], state.shape[0]), "RGBA")
+    scaled = pygame.transform.scale(picture, (right - left, bottom - top))
+    canvas.surface.blit(scaled, (left, top), special_flags=pygame.BLEND_PREMULTIPLIED)
+
 
 _FINE = 2
 """Scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer."""
@@ -31,11 +76,6 @@ _DOT = 2.1
 
 _HIT = 1.5
 """Radius of the end of a ray in pixels at scale 1."""
-
-
-def _premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
-    red, green, blue = (round(c * alpha) for c in colour)
-    return red, green, blue, round(255 * alpha)
 
 
 def _dots(canvas: Canvas, centers: Array, radius: float, colour: Colour) -> None:
@@ -78,12 +118,12 @@ class RayScan(Layer):
         fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
         for _, ends in fine:
             for ring in clipped_polygon(ends):
-                pygame.draw.polygon(large, _premultiplied(colour, 0.11), np.rint(ring).tolist())
+                pygame.draw.polygon(large, premultiplied(colour, 0.11), np.rint(ring).tolist())
         for place, ends in fine:
             self._rays(large, place, ends, canvas)
         for _, ends in fine:
             for ring in clipped_polygon(ends):
-                pygame.draw.lines(large, _premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
+                pygame.draw.lines(large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
         picture = pygame.transform.smoothscale(large, box.size)
         canvas.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
         _dots(canvas, np.concatenate([self._hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
@@ -100,7 +140,7 @@ class RayScan(Layer):
         begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
         shown = length > begin + _FINE
         first = place + along[shown] * (begin[shown] / length[shown])[:, None]
-        colour = _premultiplied(canvas.theme.final, 0.3)
+        colour = premultiplied(canvas.theme.final, 0.3)
         width = max(1, round(0.5 * canvas.scale * _FINE))
         lines = np.hstack([first, ends[shown]])
         near = bool(np.abs(lines).max(initial=0.0) <= FAR)

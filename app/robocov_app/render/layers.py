@@ -19,9 +19,9 @@ import shapely
 from robocov.arrays import Array
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera, round_length
-from robocov_app.render.canvas import Canvas, Sprite
+from robocov_app.render.canvas import Canvas, Sprite, premultiplied
+from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import Scene
-from robocov_app.render.spacing import fitted_radii, mark_size
 from robocov_app.render.theme import Colour, mix
 
 READABLE = 9.0
@@ -168,7 +168,7 @@ class Grid(Layer):
         step = grid_step(canvas.camera.zoom, canvas.scale)
         low_x, low_y, high_x, high_y = scene.environment.region.bounds
         seen_x, seen_y, end_x, end_y = canvas.camera.visible()
-        colour = _premultiplied(canvas.theme.grid, 0.5)
+        colour = premultiplied(canvas.theme.grid, 0.5)
         width = canvas.width(canvas.theme.line)
         clip = canvas.surface.get_clip()
         region = scene.environment.region.polygon
@@ -345,8 +345,3 @@ def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
 def rounded(pixels: Any) -> Any:
     """Return sizes in steps of half a pixel, so that few sprites are made."""
     return np.round(pixels * 2) / 2
-
-
-def _premultiplied(colour: tuple[int, int, int], alpha: float) -> tuple[int, int, int, int]:
-    red, green, blue = (round(c * alpha) for c in colour)
-    return red, green, blue, round(255 * alpha)

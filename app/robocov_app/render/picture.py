@@ -10,13 +10,7 @@ import pygame
 from numpy.typing import NDArray
 
 from robocov.errors import ParameterError, unknown_name
-from robocov_app.render.aim_marks import Centroids, Goals
-from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.coverage import ColourBar, Distances, GeodesicCells, bar_room
-from robocov_app.render.density import DensityShading
-from robocov_app.render.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
-from robocov_app.render.furniture import (
+from robocov_app.render.annotations import (
     LEGEND_ROW,
     MARGIN,
     STRIP,
@@ -26,6 +20,10 @@ from robocov_app.render.furniture import (
     Status,
     legend_rows,
 )
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
+from robocov_app.render.heatmaps import ColourBar, DensityShading, Distances, GeodesicCells, bar_room
 from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
 from robocov_app.render.layers import (
     Boundary,
@@ -37,7 +35,7 @@ from robocov_app.render.layers import (
     Robots,
     Starts,
 )
-from robocov_app.render.marks import Failed, Selection
+from robocov_app.render.marks import Centroids, Failed, Goals, Selection
 from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
 

@@ -1,24 +1,98 @@
-"""The scene: all that a picture shows of one moment of a run."""
+"""The scene: everything that a picture shows of one moment of a run, from a simulation or a record."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.record import Record
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+from robocov_app.render.distance_field import Field, Fields
 
-if TYPE_CHECKING:
-    from robocov_app.render.field import Field
-    from robocov_app.render.sensed import Sensed
+SAME = 0.05
+"""Metres within which a goal is the centroid: a record's goals are those of a moment before its end."""
+
+CENTROID, GOAL = "cell centroid", "goal"
+
+
+def are_centroids(goals: Array, centroids: Array) -> bool:
+    """Whether all goals that there are, (n, 2) m with nan for none, are the centroids, (n, 2) m."""
+    known = np.isfinite(goals).all(axis=1)
+    return bool((np.hypot(*(goals - centroids)[known].T) <= SAME).all())
+
+
+CELL = 0.05
+"""Points that a robot senses within the same square of so many metres count once."""
+
+MOST = 20_000
+"""More are not remembered."""
+
+
+class Sensed:
+    """A growing set of points, each with its robot and the time when it was sensed first."""
+
+    def __init__(self) -> None:
+        self._points = np.empty((256, 2))
+        self._times = np.empty(256)
+        self._robots = np.empty(256, dtype=np.intp)
+        self._known: set[tuple[int, int, int]] = set()
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, time: float, numbers: Sequence[int], points: Array) -> None:
+        """Add what robots of these numbers sense now, (n, 2) m, nan for nothing."""
+        if self._count + len(numbers) > MOST:
+            return
+        cells = np.floor(points / CELL)
+        for number, cell, point in zip(numbers, cells.tolist(), points.tolist(), strict=True):
+            if cell[0] != cell[0]:  # nan
+                continue
+            key = number, int(cell[0]), int(cell[1])
+            if key not in self._known:
+                self._known.add(key)
+                self._append(time, number, point)
+
+    def until(self, time: float) -> tuple[Array, IntArray]:
+        """Return the points that were known at a time, (k, 2) m in order, and the numbers of the robots."""
+        count = int(np.searchsorted(self._times[: self._count], time + 1e-6, side="right"))
+        return self._points[:count], self._robots[:count]
+
+    def copy(self) -> Sensed:
+        """Return a set of its own with the same points."""
+        twin = Sensed()
+        twin._points, twin._times = self._points.copy(), self._times.copy()
+        twin._robots = self._robots.copy()
+        twin._known, twin._count = set(self._known), self._count
+        return twin
+
+    def cut(self, time: float) -> None:
+        """Forget what was sensed after a time."""
+        count = len(self.until(time)[0])
+        for k in range(count, self._count):
+            x, y = np.floor(self._points[k] / CELL).tolist()
+            self._known.discard((int(self._robots[k]), int(x), int(y)))
+        self._count = count
+
+    def _append(self, time: float, number: int, point: list[float]) -> None:
+        if self._count == len(self._points):
+            self._points = np.concatenate([self._points, np.empty_like(self._points)])
+            self._times = np.concatenate([self._times, np.empty_like(self._times)])
+            self._robots = np.concatenate([self._robots, np.empty_like(self._robots)])
+        self._points[self._count] = point
+        self._times[self._count], self._robots[self._count] = time, number
+        self._count += 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +227,83 @@ class Scene:
             field_limit,
             cell_owners=owners,
         )
+
+
+def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
+    """Return the scene of the moment number `row` of a record, with the trail up to there.
+
+    Robots that have failed are marked as such, those that have not joined yet are left out.
+
+    Parameters
+    ----------
+    record : Record
+    row : int
+    cost : str
+        What is said of the cost.
+    fields : Fields or None
+        What is known of the distances to the nearest robot, where they are shown.
+    """
+    environment = record.environment.at(float(record.time[row]))
+    snapshot, team = record.snapshot(row), record.team
+    starts, trail = record.positions[0], record.positions[: row + 1]
+    more: dict[str, Any] = {}
+    if snapshot.working is not None:
+        rows = np.flatnonzero(snapshot.working)
+        failed = np.flatnonzero(record.present[row] & ~record.working[row]).tolist()
+        more = {
+            "numbers": tuple((rows + 1).tolist()),
+            "failed": {robot + 1: tuple(snapshot.positions[robot].tolist()) for robot in failed},
+        }
+        if not len(rows):
+            return Scene(environment, team, label=record.label, cost=cost, **more)
+        snapshot, team = snapshot_of(snapshot, rows), team[rows]
+        began = np.argmax(record.present, axis=0)
+        starts = record.positions[began, np.arange(len(began))][rows]
+        # before it joins, a robot has no trail
+        trail = np.where(record.present[: row + 1, rows, None], trail[:, rows], starts)
+    scene = Scene.of(
+        environment,
+        team,
+        snapshot,
+        starts=starts,
+        trail=trail,
+        trail_time=record.time[: row + 1],
+        label=record.label,
+        cost=cost,
+        field=None if fields is None else fields.at(snapshot.positions, snapshot.time),
+        field_limit=1.0 if fields is None else fields.limit,
+    )
+    return replace(scene, **more) if more else scene
+
+
+def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
+    """Return a moment as if only the robots of some rows were there; the cells are still those of all."""
+    seen, decision = snapshot.seen, snapshot.decision
+    number = np.full(len(seen.positions), -1, dtype=np.intp)
+    number[rows] = np.arange(len(rows))
+    robot, neighbour = seen.neighbours.pairs()
+    kept = (number[robot] >= 0) & (number[neighbour] >= 0)
+    neighbours = Neighbours(len(rows))
+    if not seen.neighbours.complete:
+        ranges = None if seen.neighbours.ranges is None else seen.neighbours.ranges[rows]
+        neighbours = Neighbours.of_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
+    return Snapshot(
+        replace(
+            seen,
+            positions=seen.positions[rows],
+            velocities=seen.velocities[rows],
+            neighbours=neighbours,
+            obstacle_points=seen.obstacle_points[rows],
+            max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
+            scans=None,
+            reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
+            report_ages=None if seen.report_ages is None else seen.report_ages[kept],
+        ),
+        replace(
+            decision,
+            forces=decision.forces[rows],
+            goals=None if decision.goals is None else decision.goals[rows],
+            terms={name: term[rows] for name, term in decision.terms.items()},
+        ),
+        None if snapshot.truth is None else snapshot.truth[rows],
+    )

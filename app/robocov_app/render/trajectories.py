@@ -8,11 +8,10 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array, IntArray
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.clipping import bounded
+from robocov_app.render.canvas import Canvas, bounded, premultiplied
 from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
-from robocov_app.render.spacing import line_crowding
 from robocov_app.render.sprites import Sketch
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
 
@@ -204,7 +203,7 @@ class Trajectories(Layer):
         for first, last in pairwise(edges):
             # slowly at first: what is half forgotten can still be followed
             part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
-            shades = {colour: _see_through(colour, part) for colour in set(colours)}
+            shades = {colour: premultiplied(colour, part) for colour in set(colours)}
             paths = points[first : last + 1]
             moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
             gone = np.isnan(paths).any(axis=(0, 2)).tolist()
@@ -287,12 +286,6 @@ def _stroke(
     if width > 2.5 * _FADE_FINE:  # lines have straight ends: fill the corners' notches
         for point in path:
             pygame.draw.circle(surface, colour, point, width / 2)
-
-
-def _see_through(colour: Colour, part: float) -> tuple[int, int, int, int]:
-    """Return a premultiplied colour."""
-    red, green, blue = (round(c * part) for c in colour)
-    return red, green, blue, round(255 * part)
 
 
 def _near(point: list[float], other: list[float]) -> bool:

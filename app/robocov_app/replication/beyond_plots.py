@@ -13,7 +13,7 @@ from robocov_app.figures.curves import CurveStyle, curve_styles
 from robocov_app.figures.heights import plot_heights
 from robocov_app.figures.page import SMALL, TITLE, plain_style
 from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_paired
-from robocov_app.render.legends import united
+from robocov_app.render.layout import united
 from robocov_app.render.theme import Theme, theme_named
 from robocov_app.replication.beyond_plan import OURS
 from robocov_app.replication.beyond_studies import TARGETS, TEAMS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robocov_app.render.phi import shading
+from robocov_app.render.density import shading
 from robocov_app.render.theme import DARK, LIGHT, mix
 
 if TYPE_CHECKING:

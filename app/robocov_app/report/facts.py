@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import counted
-from robocov_app.render.phi import density_words
+from robocov_app.render.density import density_words
 from robocov_app.report.groups import gain_text, setting_label, variants
 from robocov_app.report.pairs import MOST_SAID
 from robocov_app.sweep.study import UNITS, parameter_text

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov_app.render.phi import density_words
-from robocov_app.render.spacing import fitted_radii, mark_size
+from robocov_app.render.density import density_words
+from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path, lives

@@ -15,15 +15,13 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, shown
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.render.field import Fields
-from robocov_app.render.furniture import LEGEND_ROW, MARGIN, STRIP, legend_picture
+from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
+from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.distance_field import Fields, round_limit
 from robocov_app.render.layers import Layer, LegendEntry
-from robocov_app.render.legends import united
-from robocov_app.render.phi import cost_words, mean_words
+from robocov_app.render.layout import columns_for, united
 from robocov_app.render.picture import Painter, checked_layers, pane_layers, scale_for, standard_layers
-from robocov_app.render.record_scene import record_scene
-from robocov_app.render.shading import round_limit
-from robocov_app.render.spacing import columns_for
+from robocov_app.render.scene import record_scene
 from robocov_app.render.theme import Colour, theme_named
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions

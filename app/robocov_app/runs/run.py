@@ -143,7 +143,7 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     The others are on the same map, but for robots that failed at other places.
     """
     from robocov_app.figures.coverage import Moment
-    from robocov_app.render.field import Field, FieldLattice
+    from robocov_app.render.distance_field import Field, FieldLattice
 
     drawn, moments = runs[0].record.environment, []
     cost = cost_for_pictures(drawn, cost)

@@ -10,15 +10,15 @@ import numpy as np
 import pygame
 
 from robocov_app.render import sprites
+from robocov_app.render.annotations import Status, legend_rows, legend_strip
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.furniture import Status, legend_rows, legend_strip
+from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.distance_field import round_limit
 from robocov_app.render.layers import LegendEntry, drawn_radii
-from robocov_app.render.legends import united
-from robocov_app.render.phi import cost_words, mean_words
+from robocov_app.render.layout import united
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.shading import round_limit
 from robocov_app.render.theme import mix, robot_hues
 from robocov_app.render.trajectories import Trajectories
 from robocov_app.viewer.overlays import tag

@@ -11,7 +11,7 @@ import pygame
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.phi import density_words
+from robocov_app.render.density import density_words
 from robocov_app.render.theme import mix
 from robocov_app.viewer.layout import inside
 from robocov_app.viewer.overlays import tag

@@ -13,7 +13,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
-from robocov_app.render.field import Field, FieldLattice
+from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 LATTICE = 128  # sites along a side

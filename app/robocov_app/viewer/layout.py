@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import floor
 from typing import NamedTuple, TypeAlias
 
-from robocov_app.render.spacing import columns_for
+from robocov_app.render.layout import columns_for
 
 Box: TypeAlias = tuple[int, int, int, int]
 """Left, top, width and height in pixels."""

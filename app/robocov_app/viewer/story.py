@@ -283,7 +283,7 @@ def story_frames(
 
 def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
     """Return what a frame shows of a pane."""
-    from robocov_app.render.phi import cost_words, mean_words
+    from robocov_app.render.density import cost_words, mean_words
     from robocov_app.render.scene import Scene
 
     setup, snapshot = pane.circumstances, pane.simulation.snapshot

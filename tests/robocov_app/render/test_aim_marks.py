@@ -9,8 +9,7 @@ from drawn_run import SQUARE, explained
 
 from robocov.observation import Decision, Snapshot
 from robocov.voronoi import partition
-from robocov_app.render.aims import SAME, are_centroids
-from robocov_app.render.scene import Scene
+from robocov_app.render.scene import SAME, Scene, are_centroids
 from robocov_app.render.theme import LIGHT
 
 CENTROIDS = partition(TWO, SQUARE.region).centroid

@@ -7,10 +7,9 @@ from drawn_run import HALL, ROOMS, run_of, scene_of
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
-from robocov_app.render.coverage import Distances, GeodesicCells
-from robocov_app.render.field import Field, FieldLattice, Fields
+from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, Fields, palette
+from robocov_app.render.heatmaps import Distances, GeodesicCells
 from robocov_app.render.picture import Painter, checked_layers
-from robocov_app.render.shading import FARTHEST, palette
 from robocov_app.render.theme import DARK, LIGHT
 
 SIZE = (800, 520)

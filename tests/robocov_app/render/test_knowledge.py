@@ -13,7 +13,7 @@ from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
 from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
 from robocov_app.render.picture import Painter
-from robocov_app.render.sensed import Sensed
+from robocov_app.render.scene import Sensed
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
-from robocov_app.render.phi import density_range
+from robocov_app.render.density import density_range
 from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.map_edits import CELLS, LEAST, MOST, painted_raster

@@ -12,7 +12,7 @@ from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
-from robocov_app.render.field import Field
+from robocov_app.render.distance_field import Field
 from robocov_app.toolkit.worker import DirectWorker
 from robocov_app.viewer import costs as module
 from robocov_app.viewer.costs import Costs, CostService

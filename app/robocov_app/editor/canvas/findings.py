@@ -11,8 +11,7 @@ import shapely
 
 from robocov_app.editor.tools.tool import length_words
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.clipping import bounded
+from robocov_app.render.canvas import Canvas, bounded
 from robocov_app.render.layers import LegendEntry
 from robocov_app.render.theme import mix
 from robocov_app.viewer.overlays import tag

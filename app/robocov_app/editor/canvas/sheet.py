@@ -12,10 +12,9 @@ import shapely
 from robocov_app.editor.canvas.drawn_rings import Outlines
 from robocov_app.editor.canvas.picture import Underlaid
 from robocov_app.render.camera import round_length
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.clipping import FAR
-from robocov_app.render.density import draw_shading
+from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.fonts import shortened
+from robocov_app.render.heatmaps import draw_shading
 from robocov_app.render.theme import LIGHT, mix, robot_hues
 
 if TYPE_CHECKING:

@@ -9,9 +9,7 @@ import pygame
 
 from robocov_app.editor.canvas.findings import legend_entries
 from robocov_app.editor.canvas.sheet import beyond
-from robocov_app.render.density import density_entry
-from robocov_app.render.fonts import shortened
-from robocov_app.render.furniture import (
+from robocov_app.render.annotations import (
     EDGE,
     LEGEND_ROW,
     STRIP,
@@ -20,7 +18,9 @@ from robocov_app.render.furniture import (
     legend_rows,
     legend_strip,
 )
-from robocov_app.render.phi import range_words, value_range
+from robocov_app.render.density import range_words, value_range
+from robocov_app.render.fonts import shortened
+from robocov_app.render.heatmaps import density_entry
 
 if TYPE_CHECKING:
     from robocov_app.editor.ui.desk import Desk

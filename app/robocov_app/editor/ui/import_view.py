@@ -12,7 +12,7 @@ import shapely
 from robocov_app.importers.report import square_metres
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.spacing import columns_for
+from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, mix
 from robocov_app.viewer.overlays import card, dim, wrapped
 

@@ -11,7 +11,7 @@ from robocov.controllers import remembers
 from robocov.errors import StartError
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
-from robocov_app.render.sensed import Sensed
+from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Circumstances, State
 from robocov_app.viewer.session.trail import Trail

@@ -22,7 +22,7 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.observation import Snapshot
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
-from robocov_app.render.sensed import Sensed
+from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session.changes import (
     Change,
     Drag,

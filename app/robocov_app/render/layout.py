@@ -1,6 +1,9 @@
-"""How large marks may be drawn where many stand close together, and how panels share a page."""
+"""Sizes of marks in a crowd, panels on a page, and one legend for several pictures."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -98,3 +101,26 @@ def columns_for(count: int, aspect: float, size: tuple[float, float], around: fl
         return width * count / (rows * columns)  # a gap in the last row looks like something missing
 
     return max(range(1, count + 1), key=lambda columns: (round(worth(columns), 6), columns))
+
+
+T = TypeVar("T")
+
+
+def united(legends: Iterable[Sequence[T]], key: Callable[[T], Hashable]) -> list[T]:
+    """Return the entries of all legends, each once.
+
+    They stand in the first one's order; what only a later one has follows what precedes it there.
+    """
+    found: list[T] = []
+    for legend in legends:
+        keys = [key(entry) for entry in found]
+        place = 0
+        for entry in legend:
+            name = key(entry)
+            if name in keys:
+                place = keys.index(name) + 1
+            else:
+                found.insert(place, entry)
+                keys.insert(place, name)
+                place += 1
+    return found

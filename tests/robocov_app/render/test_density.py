@@ -6,7 +6,7 @@ from density_cases import GAUSSIANS, POLYGONS
 
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import Environment
-from robocov_app.render.phi import colours, density_range, density_words, mean_words, shading, value_range
+from robocov_app.render.density import colours, density_range, density_words, mean_words, shading, value_range
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 BOUNDS = (0.0, 0.0, 8.0, 8.0)

@@ -13,7 +13,7 @@ from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
 from robocov_app.figures.arena import draw_map, map_handles, ticks_in_metres
-from robocov_app.render.field import Field, FieldLattice
+from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import DARK, LIGHT

@@ -1,10 +1,21 @@
+"""Sizes in a crowd, panels on a page, one legend for several pictures."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from robocov_app.render.spacing import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
+from robocov_app.render.layout import (
+    columns_for,
+    fitted_radii,
+    line_crowding,
+    mark_size,
+    nearest_distance,
+    united,
+)
 
 points = arrays(np.float64, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(0, 100, width=32))
 
@@ -49,3 +60,26 @@ def test_lines_become_thinner_with_many_but_not_invisible():
 )
 def test_panels_are_as_large_as_can_be(count, aspect, columns):
     assert columns_for(count, aspect, (1920, 1080)) == columns
+
+
+ENTRIES = st.lists(st.integers(0, 8), unique=True)
+
+
+def both(*legends: str) -> str:
+    return "".join(united([list(legend) for legend in legends], str))
+
+
+def test_what_only_a_later_one_has_stands_where_it_stands_there() -> None:
+    assert both("abe", "abcde") == "abcde"
+    assert both("abcde", "ace") == "abcde"
+    assert both("bc", "abd") == "abdc"
+    assert both("", "ab", "ab") == "ab"
+
+
+@given(st.lists(ENTRIES, max_size=4))
+def test_each_entry_stands_once_and_the_first_legend_keeps_its_order(legends: list[list[int]]) -> None:
+    found = united(legends, lambda entry: entry)
+    assert len(found) == len(set(found))
+    assert set(found) == {entry for legend in legends for entry in legend}
+    if legends:
+        assert [entry for entry in found if entry in legends[0]] == legends[0]
