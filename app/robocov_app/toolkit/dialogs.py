@@ -1,0 +1,366 @@
+"""Dialogs over a window: questions with answers, lists to choose from by typing, files.
+
+    dialogs = Dialogs()
+    dialogs.ask(Question("Save?", "It was edited.", [Answer("Save", save), Answer("Discard", leave)]))
+    dialogs.ask(Choice("Go to", lambda text: [Option(name, "robot") for name in names], go_to))
+    dialogs.ask(file_choice("Open a map", folder, open_map, endings=(".json",)))
+    if dialogs.take(event): ...          # all events of mouse and keyboard, while one is open
+    dialogs.draw(screen, theme, scale)
+
+`accept` of a choice may raise a RobocovError: it is told in the dialog, which keeps what was typed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import pygame
+
+from robocov.errors import RobocovError
+from robocov_app.render.fonts import label
+from robocov_app.render.theme import Theme
+from robocov_app.toolkit.input import key_of, wheel_notches
+from robocov_app.toolkit.overlay import card, dim, wrapped
+from robocov_app.toolkit.text_edit import TextEdit
+from robocov_app.toolkit.ui import TEXT, Ui
+
+ROWS = 9
+"""Lines of a list that are in sight."""
+
+_MOST_LINES = 14
+_MARGIN = 20.0
+
+
+class Dialog(Protocol):
+    """Something that is asked, in a card over the window."""
+
+    width: float
+    done: bool
+
+    def page(self, ui: Ui) -> None:
+        """Show it."""
+
+    def key(self, name: str, ui: Ui) -> bool:
+        """Take a key; return whether it meant something."""
+
+    def wheel(self, notches: float) -> None:
+        """Take a turn of the wheel."""
+
+    def cancelled(self) -> None:
+        """Take note that it was given up."""
+
+
+@dataclass
+class Answer:
+    """What can be answered: its words, what that does, and a key besides those of the focus."""
+
+    text: str
+    call: Callable[[], object] = lambda: None
+    key: str = ""
+
+
+@dataclass
+class Question:
+    """A question with answers as buttons; the first is chosen by Enter, `on_cancel` done by Escape."""
+
+    title: str
+    words: str
+    answers: Sequence[Answer]
+    on_cancel: Callable[[], object] = lambda: None
+    width: float = 560.0
+    chosen: int = 0
+    done: bool = False
+
+    def page(self, ui: Ui) -> None:
+        """Show title, words and buttons."""
+        ui.words(self.title, size=16, bold=True)
+        ui.space(6)
+        size = ui.px(TEXT + 1)
+        lines = [
+            line for part in self.words.split("\n") for line in wrapped(part, size, ui.px(ui.wide)) or [""]
+        ]
+        for line in lines[:_MOST_LINES]:
+            ui.words(line, size=TEXT + 1)
+        if len(lines) > _MOST_LINES:
+            ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, faint=True)
+        ui.space(12)
+        widths = [
+            label(each.text, ui.px(TEXT), (0, 0, 0), True).get_width() / ui.scale + 36
+            for each in self.answers
+        ]
+        room = ui.wide - sum(widths) - 8 * len(widths)
+        ui.row(max(room, 1.0), *widths, height=30, gap=8, below=0)
+        ui.cell()
+        for k, answer in enumerate(self.answers):
+            if ui.button(answer.text, key=f"answer:{k}", chosen=k == self.chosen):
+                self._give(answer)
+
+    def _give(self, answer: Answer) -> None:
+        self.done = True
+        answer.call()
+
+    def key(self, name: str, ui: Ui) -> bool:
+        """Choose by arrows and Tab, answer by Enter or an answer's own key."""
+        by = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}.get(name, 0)
+        self.chosen = (self.chosen + by) % len(self.answers)
+        own = next((each for each in self.answers if each.key == name), None)
+        if name in ("return", "enter"):
+            own = self.answers[self.chosen]
+        if own is not None:
+            self._give(own)
+        return True
+
+    def wheel(self, notches: float) -> None:
+        """Do nothing."""
+
+    def cancelled(self) -> None:
+        """Do what Escape does."""
+        self.on_cancel()
+
+
+@dataclass(frozen=True)
+class Option:
+    """A line to choose: its words, what stands at its right end, what completion makes of it."""
+
+    text: str
+    aside: str = ""
+    fills: str = ""
+    why: str = ""
+    value: object = None
+
+
+@dataclass
+class Choice:
+    """A list that typing narrows down.
+
+    Attributes
+    ----------
+    options : callable
+        Returns the lines for what is typed.
+    accept : callable
+        Called with what is typed and the chosen line, None where there is none; an error it raises is
+        told below the field, and nothing typed is lost. What it returns is typed in place, if it is a text.
+    ghost, hint : str
+        In the empty field, and at the foot.
+    """
+
+    title: str
+    options: Callable[[str], Sequence[Option]]
+    accept: Callable[[str, Option | None], object]
+    ghost: str = ""
+    hint: str = "↑ ↓ choose · Enter does it · Esc closes"
+    none: str = "nothing of that name"
+    text: str = ""
+    width: float = 620.0
+    chosen: int = 0
+    top: int = 0
+    trouble: str = ""
+    done: bool = False
+    _moved: bool = field(default=False, repr=False)
+
+    def page(self, ui: Ui) -> None:
+        """Show the field and the lines below it."""
+        if self.title:
+            ui.words(self.title, faint=True, bold=True)
+        if ui.edit is None or ui.focus != "text":
+            ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
+        ui.row(height=32, below=8)
+        ui.text_entry("text", self.text, ghost=self.ghost)
+        assert ui.edit is not None
+        if ui.edit.text != self.text:
+            self.text, self.chosen, self.top, self.trouble = ui.edit.text, 0, 0, ""
+        if self.trouble:
+            ui.words(self.trouble, bold=True)
+        found = list(self.options(self.text))
+        self.chosen = min(self.chosen, max(len(found) - 1, 0))
+        ui.row(height=26, below=1)
+        if not found:
+            ui.label(self.none, style="unit")
+        for k, each in list(enumerate(found))[self.top : self.top + ROWS]:
+            if ui.option(each.text, each.aside, key=f"option:{k}", chosen=k == self.chosen, why=each.why):
+                self._accept(each, ui)
+        ui.row(height=22, below=0)
+        more = f"{len(found)} in all · " if len(found) > ROWS else ""
+        ui.label(more + self.hint, style="unit", at="center")
+
+    def _accept(self, option: Option | None, ui: Ui) -> None:
+        try:
+            filled = self.accept(self.text, option)
+        except RobocovError as error:
+            self.trouble = str(error)
+            return
+        if isinstance(filled, str):
+            self._fill(filled, ui)
+        else:
+            self.done = True
+
+    def _fill(self, text: str, ui: Ui) -> None:
+        self.text, self.chosen, self.top, self.trouble = text, 0, 0, ""
+        ui.edit = TextEdit(text, len(text), len(text))
+
+    def key(self, name: str, ui: Ui) -> bool:
+        """Choose by arrows, complete by Tab, accept by Enter; other keys edit the text."""
+        found = list(self.options(self.text))
+        option = found[self.chosen] if self.chosen < len(found) else None
+        by = {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0)
+        if by:
+            self.wheel(-by)
+            self.chosen = min(max(self.chosen, 0), max(len(found) - 1, 0))
+            self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
+        elif name == "tab":
+            if option is not None:
+                self._fill(option.fills or option.text, ui)
+        elif name in ("return", "enter"):
+            self._accept(option, ui)
+        else:
+            return False
+        return True
+
+    def wheel(self, notches: float) -> None:
+        """Move through the list."""
+        self.chosen = max(self.chosen - round(notches), 0)
+        self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
+
+    def cancelled(self) -> None:
+        """Do nothing."""
+
+
+def file_choice(
+    title: str,
+    folder: Path,
+    accept: Callable[[Path], object],
+    *,
+    endings: Sequence[str] = (),
+    recent: Sequence[Path] = (),
+    saves: bool = False,
+    text: str = "",
+) -> Choice:
+    """Return a choice of a file; folders are walked into, and what is typed is a path from `folder`."""
+
+    def split(typed: str) -> tuple[Path, str]:
+        before, slash, begun = typed.rpartition("/")
+        return folder / Path(before + slash).expanduser(), begun
+
+    def options(typed: str) -> list[Option]:
+        place, begun = split(typed)
+        try:
+            there = sorted(place.iterdir(), key=lambda each: (not each.is_dir(), each.name.lower()))
+        except OSError:
+            return []
+        prefix = typed[: len(typed) - len(begun)]
+        found = [Option(str(each), "recent", str(each), value=each) for each in recent if not typed]
+        for each in there:
+            hidden = each.name.startswith(".") and not begun.startswith(".")
+            fits = begun.lower() in each.name.lower()
+            if hidden or not fits or not (each.is_dir() or not endings or each.suffix.lower() in endings):
+                continue
+            slash = "/" if each.is_dir() else ""
+            found.append(
+                Option(each.name + slash, "folder" if slash else "", prefix + each.name + slash, value=each)
+            )
+        return found
+
+    def chosen(typed: str, option: Option | None) -> object:
+        if saves and typed.strip() and not typed.endswith("/"):
+            accept(folder / Path(typed.strip()).expanduser())
+        elif option is not None and option.text.endswith("/"):
+            return option.fills
+        elif option is not None and isinstance(option.value, Path):
+            accept(option.value)
+        elif typed.strip():
+            accept(folder / Path(typed.strip()).expanduser())
+        return None
+
+    none = "Enter saves it there" if saves else "nothing of that name"
+    hint = "↑ ↓ choose · Tab completes · Enter accepts · Esc closes"
+    return Choice(title, options, chosen, f"a path from {folder.absolute()}", hint, none, text)
+
+
+class Dialogs:
+    """Shows what is asked, one thing at a time, and takes the answers."""
+
+    def __init__(self) -> None:
+        self.asked: Dialog | None = None
+        self._ui: Ui | None = None
+        self._high = 0.0
+        self._swallow = ""
+
+    @property
+    def open(self) -> bool:
+        """Whether something is asked."""
+        return self.asked is not None
+
+    def ask(self, dialog: Dialog, opened_by: str = "") -> None:
+        """Ask something; the letter of the key that opened it is not meant for it."""
+        self.asked, self._ui, self._swallow = dialog, None, opened_by
+
+    def close(self) -> None:
+        """Give up what is asked."""
+        asked, self.asked = self.asked, None
+        if asked is not None:
+            asked.cancelled()
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Take an event; return whether something is asked, which takes all of mouse and keyboard."""
+        asked, ui = self.asked, self._ui
+        if asked is None:
+            return False
+        if ui is None:
+            return True
+        ui.stale = True
+        if event.type == pygame.TEXTINPUT and self._swallow:
+            swallowed, self._swallow = self._swallow, ""
+            if event.text == swallowed:
+                return True
+        if event.type == pygame.KEYDOWN:
+            self._key(asked, ui, event)
+        elif event.type == pygame.MOUSEWHEEL:
+            asked.wheel(wheel_notches(event))
+        elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):
+            if isinstance(asked, Choice):
+                self.close()
+        else:
+            ui.take(event)
+        if asked.done and self.asked is asked:
+            self.asked = None
+        return event.type not in (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
+
+    def _key(self, asked: Dialog, ui: Ui, event: pygame.event.Event) -> None:
+        name, self._swallow = key_of(event), ""
+        composing = ui.edit is not None and bool(ui.edit.composed)
+        if name == "escape" and not composing:
+            self.close()
+        elif composing or not asked.key(name, ui):
+            ui.take(event)
+
+    def draw(self, screen: pygame.Surface, theme: Theme, scale: float) -> None:
+        """Draw what is asked over everything else."""
+        asked = self.asked
+        if asked is None:
+            return
+        if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
+
+            def page(ui: Ui) -> None:
+                ui.inset(_MARGIN, _MARGIN - 4, _MARGIN)
+                asked.page(ui)
+                ui.end_row()
+                self._high = ui.y + _MARGIN - 4
+
+            self._ui, self._high = Ui(page, theme, scale), 0.0
+            self._ui.background = None
+        ui = self._ui
+        dim(screen, theme)
+        wide = min(asked.width * scale, screen.get_width() - 24 * scale)
+        for _ in range(2):  # its height is known after it has run
+            high = min(round(self._high * scale) or 100, screen.get_height())
+            ui.box = pygame.Rect(0, 0, round(wide), high)
+            top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
+            ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
+            ui._run(None, None)
+        card(screen, ui.box, theme, scale)
+        ui.stale = True
+        ui.draw(screen)
+        ui.draw_over(screen)

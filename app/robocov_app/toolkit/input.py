@@ -1,0 +1,59 @@
+"""Names of keys, and the state of the mouse that every window keeps."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import pygame
+
+KEY_REPEAT = (350, 40)
+"""Milliseconds after which a key that is held down is pressed again, the first time and from then on."""
+
+DOUBLE = 0.35
+"""Seconds between the two clicks of a double click, at most."""
+
+SLIP = 5.0
+"""Pixels that a click may move."""
+
+WHEEL = 1.15
+"""Magnification of one notch of the wheel."""
+
+OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+"""Types of events that the mouse makes."""
+
+
+def key_of(event: pygame.event.Event) -> str:
+    """Return the name of a pressed key with its modifiers, as in ``ctrl+shift+z``."""
+    name = pygame.key.name(event.key)
+    if name.startswith("[") and name.endswith("]") and len(name) > 2:
+        name = name[1:-1]  # of the key pad
+    parts = []
+    if event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META):
+        parts.append("ctrl")
+    if event.mod & pygame.KMOD_ALT:
+        parts.append("alt")
+    if event.mod & pygame.KMOD_SHIFT:
+        parts.append("shift")
+    return "+".join([*parts, name])
+
+
+def key_words(key: str) -> str:
+    """Return a key as people write it.
+
+    >>> [key_words(key) for key in ("ctrl+shift+z", "page down", "f1", "space", "`", "left")]
+    ['Ctrl Shift Z', 'Page down', 'F1', 'Space', '`', '←']
+    """
+    arrows = {"left": "←", "right": "→", "up": "↑", "down": "↓", "return": "Enter"}
+    parts = [*key[:-1].split("+")[:-1], "+"] if key.endswith("++") or key == "+" else key.split("+")
+    return " ".join(arrows.get(part, part[:1].upper() + part[1:]) for part in parts)
+
+
+def wheel_notches(event: pygame.event.Event) -> float:
+    """Return by how many notches the wheel was turned; touch pads turn it by parts of one."""
+    return float(min(max(getattr(event, "precise_y", event.y) or event.y, -5.0), 5.0))
+
+
+def show_cursor(shape: int) -> None:
+    """Give the mouse's cursor one of the system's shapes."""
+    with suppress(pygame.error):  # not every display has cursors
+        pygame.mouse.set_cursor(shape)

@@ -1,0 +1,112 @@
+"""What lies over a window for a while: cards, tags, messages, a veil."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import pygame
+
+from robocov_app.render.camera import Camera
+from robocov_app.render.fonts import label, text_width
+from robocov_app.render.surface_cache import kept
+from robocov_app.render.theme import LIGHT, Colour, Theme, mix
+
+FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+"""For strokes and words that are placed in pixels alone."""
+
+_FINE = 4
+
+
+@kept(4_000_000)
+def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, width: int) -> pygame.Surface:
+    large = pygame.Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
+    box = large.get_rect()
+    pygame.draw.rect(large, edge, box, border_radius=radius * _FINE)
+    inner = box.inflate(-2 * width * _FINE, -2 * width * _FINE)
+    pygame.draw.rect(large, fill, inner, border_radius=max(radius - width, 0) * _FINE)
+    return pygame.transform.smoothscale(large.premul_alpha(), size)
+
+
+def rounded(
+    screen: pygame.Surface, box: pygame.Rect, fill: Colour, edge: Colour, radius: int, width: int = 1
+) -> None:
+    """Draw a box with smooth round corners."""
+    if box.width > 0 and box.height > 0:
+        picture = _rounded(box.size, fill, edge, min(radius, min(box.size) // 2), width)
+        screen.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def on_accent(theme: Theme) -> Colour:
+    """Return the colour of words on the accent's."""
+    return (255, 255, 255) if theme is LIGHT else theme.background
+
+
+def field_colour(theme: Theme) -> Colour:
+    """Return the fill of what can be pressed, typed into or dragged."""
+    return theme.background if theme is LIGHT else mix(theme.panel, theme.background, 0.8)
+
+
+def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]:
+    """Break text into lines of at most `width` pixels; a word that is wider is broken too."""
+    lines: list[str] = []
+    for word in text.split():
+        if lines and text_width(f"{lines[-1]} {word}", size, bold) <= width:
+            lines[-1] += f" {word}"
+            continue
+        lines.append("")
+        for letter in word:
+            if lines[-1] and text_width(lines[-1] + letter, size, bold) > width:
+                lines.append("")
+            lines[-1] += letter
+    return lines
+
+
+def card(screen: pygame.Surface, box: pygame.Rect, theme: Theme, scale: float) -> None:
+    """Draw a card with a soft edge."""
+    edge = mix(theme.panel, theme.ink, 0.28)
+    rounded(screen, box, theme.panel, edge, round(8 * scale), max(1, round(scale)))
+
+
+def dim(screen: pygame.Surface, theme: Theme) -> None:
+    """Let everything so far step back."""
+    veil = pygame.Surface(screen.get_size(), pygame.SRCALPHA, 32)
+    veil.fill((*theme.background, 150))
+    screen.blit(veil, (0, 0))
+
+
+def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
+    """Write words on a small card that begins at a pixel, and stays on the surface."""
+    size = round(theme.text * scale)
+    box = pygame.Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
+    box.midleft = round(at[0] - 6 * scale), round(at[1])
+    box.clamp_ip(screen.get_rect())
+    rounded(screen, box, theme.background, mix(theme.background, theme.ink, 0.3), round(4 * scale))
+    picture = label(words, size, theme.ink)
+    screen.blit(picture, picture.get_rect(center=box.center))
+
+
+class Saying(Protocol):
+    """Who tells something for a while."""
+
+    message: str
+    trouble: bool
+
+
+def draw_message(
+    screen: pygame.Surface, said: Saying, arena: tuple[int, int, int, int], theme: Theme, scale: float
+) -> None:
+    """Show what was said last, at the foot of a box."""
+    if not said.message:
+        return
+    size = round(12.5 * scale)
+    left, top, width, height = arena
+    lines = wrapped(said.message, size, min(width - 80 * scale, 620 * scale))
+    wide = max(text_width(line, size) for line in lines) + 28 * scale
+    box = pygame.Rect(0, 0, round(wide), round((len(lines) * 18 + 14) * scale))
+    box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
+    fill = mix(theme.panel, theme.trajectory, 0.14) if said.trouble else theme.panel
+    edge = theme.trajectory if said.trouble else mix(theme.panel, theme.ink, 0.3)
+    rounded(screen, box, fill, edge, round(8 * scale), max(1, round(scale)))
+    for k, line in enumerate(lines):
+        picture = label(line, size, theme.ink)
+        screen.blit(picture, picture.get_rect(center=(box.centerx, round(box.top + (16 + 18 * k) * scale))))

@@ -1,0 +1,125 @@
+"""The text of a one-line field: caret, selection, clipboard, undo, and what an input method composes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from robocov_app.toolkit import clipboard
+
+_State = tuple[str, int, int]
+
+
+@dataclass
+class TextEdit:
+    """A line of text that is being edited.
+
+    Attributes
+    ----------
+    caret, anchor : int
+        What is between them is selected.
+    composed : str
+        Shown at the caret while an input method is still at it; not part of the text yet.
+    """
+
+    text: str = ""
+    caret: int = 0
+    anchor: int = 0
+    composed: str = ""
+    _undo: list[_State] = field(default_factory=list)
+    _redo: list[_State] = field(default_factory=list)
+    _typing: bool = False
+
+    @classmethod
+    def of(cls, text: str) -> TextEdit:
+        """Return an edit of a text, all of it selected."""
+        return cls(text, len(text), 0)
+
+    @property
+    def selection(self) -> tuple[int, int]:
+        """Ends of what is selected, in order."""
+        return min(self.caret, self.anchor), max(self.caret, self.anchor)
+
+    def place(self, caret: int, *, extend: bool = False) -> None:
+        """Move the caret; what it passes is selected where it extends the selection."""
+        self.caret = min(max(caret, 0), len(self.text))
+        if not extend:
+            self.anchor = self.caret
+        self._typing = False
+
+    def select_word(self, at: int) -> None:
+        """Select the word around a place."""
+        for word in re.finditer(r"[\w.]+|\s+|[^\w.\s]+", self.text):
+            if word.start() <= at <= word.end():
+                self.anchor, self.caret = word.span()
+
+    def type(self, text: str) -> None:
+        """Replace what is selected by a text; line ends become blanks."""
+        text = " ".join(text.splitlines())
+        if text:
+            self._replace(*self.selection, text, typing=len(text) == 1)
+        self.composed = ""
+
+    def _replace(self, start: int, end: int, text: str, *, typing: bool = False) -> None:
+        if not (typing and self._typing and start == end):  # letters in a row are undone together
+            self._undo.append((self.text, self.caret, self.anchor))
+        self._redo.clear()
+        self._typing = typing
+        self.text = self.text[:start] + text + self.text[end:]
+        self.caret = self.anchor = start + len(text)
+
+    def _word(self, by: int) -> int:
+        """Return the next end of a word to the left or to the right."""
+        if by < 0:
+            before = re.search(r"\S+\s*$", self.text[: self.caret])
+            return before.start() if before else 0
+        after = re.match(r"\s*\S+", self.text[self.caret :])
+        return self.caret + after.end() if after else len(self.text)
+
+    def key(self, name: str) -> bool:
+        """Take a key by its name, as ``ctrl+z``; return whether it means something here."""
+        extend = "shift+" in name
+        key = name.replace("shift+", "") if name != "ctrl+shift+z" else name
+        start, end = self.selection
+        moves = {
+            "left": start if start != end and not extend else self.caret - 1,
+            "right": end if start != end and not extend else self.caret + 1,
+            "ctrl+left": self._word(-1),
+            "ctrl+right": self._word(1),
+            "home": 0,
+            "end": len(self.text),
+        }
+        erased = {
+            "backspace": (self.caret - 1, self.caret),
+            "delete": (self.caret, self.caret + 1),
+            "ctrl+backspace": (self._word(-1), self.caret),
+            "ctrl+delete": (self.caret, self._word(1)),
+        }
+        if key in moves:
+            self.place(moves[key], extend=extend)
+        elif key in erased:
+            low, high = (start, end) if start != end else erased[key]
+            if 0 <= low < high <= len(self.text):
+                self._replace(low, high, "")
+        elif key == "ctrl+a":
+            self.anchor, self.caret = 0, len(self.text)
+        elif key in ("ctrl+c", "ctrl+x"):
+            if start != end:
+                clipboard.put(self.text[start:end])
+                if key == "ctrl+x":
+                    self._replace(start, end, "")
+        elif key == "ctrl+v":
+            self.type(clipboard.get())
+        elif key == "ctrl+z":
+            self._swap(self._undo, self._redo)
+        elif key in ("ctrl+y", "ctrl+shift+z"):
+            self._swap(self._redo, self._undo)
+        else:
+            return False
+        return True
+
+    def _swap(self, source: list[_State], target: list[_State]) -> None:
+        if source:
+            target.append((self.text, self.caret, self.anchor))
+            self.text, self.caret, self.anchor = source.pop()
+        self._typing = False

@@ -1,0 +1,908 @@
+"""Immediate-mode widgets: a page is a function that shows and edits each value in one place.
+
+A page runs once for every event and once for every drawing; a widget returns what the user did to it in
+this run: a button True, others the new value, None where nothing happened::
+
+    def page(ui: Ui) -> None:
+        ui.header("RUN")
+        ui.row(0, 0, 80)  # widths at scale 1 of the cells of the rows to come; 0 shares what is left
+        if ui.button("Pause", key="pause", why="" if running else "nothing runs"):
+            pause()
+        if (robots := ui.text_entry("robots", str(count))) is not None:  # after Enter
+            set_count(robots)
+        if (fade := ui.check("Fading", now=fades)) is not None:
+            set_fading(fade)
+        with ui.scroll("gains"):  # what is left of the box
+            for gain in gains:
+                ui.row(100, 0)
+                ui.label(gain.name, tip=gain.meaning)
+                if (place := ui.slider(gain.name, gain.place(), 0.0, 1.0)) is not None:
+                    set_gain(gain.at(place))
+
+    panel = Ui(page, theme, scale)
+    panel.box = pygame.Rect(960, 0, 320, 720)
+    panel.take(event)    # True where the event was meant for a widget
+    panel.draw(screen)   # then, over all else: panel.draw_over(screen)
+
+Keys of widgets are unique within a page. Lengths are pixels at scale 1. Where `why` is given a widget is
+disabled, and says so in its tool tip. Tab and Shift Tab move the focus once a widget has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+
+import pygame
+
+from robocov_app.render.fonts import label, shortened, text_width
+from robocov_app.render.theme import LIGHT, Colour, Theme, mix
+from robocov_app.toolkit.input import DOUBLE, key_of, wheel_notches
+from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
+from robocov_app.toolkit.text_edit import TextEdit
+
+TEXT = 12.0
+"""Size of a widget's text."""
+
+SMALL = 11.0
+"""Size of the text of small buttons, headings and units."""
+
+BAR = 10.0
+"""Width of a scroll bar."""
+
+LONGEST_LIST = 268.0
+"""Greatest height of an open list."""
+
+LIST_ROW = 24.0
+TIP_AFTER = 0.6
+"""Seconds for which the mouse rests before a tool tip appears."""
+
+_KNOB = 12.0
+_NOTCH = 40.0
+_ENTER = ("return", "enter")
+
+
+@dataclass
+class Shown:
+    """One widget as it was shown last: what tests and tool tips look at."""
+
+    kind: str
+    key: str
+    rect: pygame.Rect
+    text: str = ""
+    value: object = None
+    tip: str = ""
+    enabled: bool = True
+
+
+@dataclass
+class _List:
+    """An open list: what it offers, and where."""
+
+    options: list[str]
+    rect: pygame.Rect
+    row: int
+    chosen: int
+    top: float = 0.0
+    picked: str | None = None
+
+    @property
+    def beyond(self) -> float:
+        return max(len(self.options) * self.row + 2 - self.rect.height, 0)
+
+    def item(self, k: int) -> pygame.Rect:
+        """Return where the option of a number is, which may be outside of the list."""
+        y = self.rect.top + 1 + k * self.row - round(self.top)
+        return pygame.Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
+
+    def at(self, pixel: tuple[int, int]) -> int | None:
+        if not self.rect.collidepoint(pixel):
+            return None
+        k = int((pixel[1] - self.rect.top - 1 + self.top) // self.row)
+        return k if 0 <= k < len(self.options) else None
+
+    def show(self, k: int) -> None:
+        """Choose an option, and scroll it into sight."""
+        self.chosen = min(max(k, 0), len(self.options) - 1)
+        low, high = self.chosen * self.row, (self.chosen + 1) * self.row + 2 - self.rect.height
+        self.top = min(max(self.top, high, 0.0), low)
+
+
+class Ui:
+    """Runs a page in a box of the window.
+
+    Attributes
+    ----------
+    box : pygame.Rect
+        Where the page is, px.
+    stale : bool
+        Whether what was drawn is not what there is any more; otherwise `draw` copies its last picture.
+    shown : dict of ``kind:key`` to Shown
+        The widgets of the last run.
+    """
+
+    def __init__(self, page: Callable[[Ui], None], theme: Theme, scale: float = 1.0) -> None:
+        self.page, self.theme, self.scale = page, theme, scale
+        self.box = pygame.Rect(0, 0, 1, 1)
+        self.background: Colour | None = theme.panel
+        self.stale = True
+        self.at = (-1, -1)
+        self.focus: str | None = None
+        self.active: str | None = None
+        self.edit: TextEdit | None = None
+        self.shown: dict[str, Shown] = {}
+        self.open_list: _List | None = None
+        self._open_key = ""
+        self._event: pygame.event.Event | None = None
+        self._surface: pygame.Surface | None = None
+        self._picture: pygame.Surface | None = None
+        self._folded: set[str] = set()
+        self._scrolled: dict[str, float] = {}
+        self._heights: dict[str, float] = {}
+        self._hot = ""
+        self._rested = perf_counter()
+        self._tipped = False
+        self._clicked = (-1.0, "")
+        self._order: list[str] = []
+        self._again = False
+        self._grabbed = 0.0
+        self._begin()
+
+    # runs
+
+    def _begin(self) -> None:
+        self.x, self.y, self.wide = 0.0, 0.0, self.box.width / self.scale
+        self._clip = self.box
+        self._cells: list[tuple[float, float]] = []
+        self._next, self._height, self._below = 0, 26.0, 6.0
+        self._order = []
+        self.shown = {}
+
+    def _run(self, event: pygame.event.Event | None, surface: pygame.Surface | None) -> None:
+        self._event, self._surface = event, surface
+        self._begin()
+        self.page(self)
+        self.end_row()
+        self._event = self._surface = None
+        if self.focus not in self._order:  # its widget is gone
+            self.focus = self.edit = None
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Give an event to the widgets; return whether it was meant for one of them."""
+        kind = event.type
+        if kind in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
+            self.at = event.pos
+        held = self.active
+        if kind == pygame.MOUSEMOTION:
+            return self._moved(event)
+        if kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
+            return self.box.collidepoint(event.pos)
+        if kind in (pygame.MOUSEBUTTONDOWN, pygame.KEYDOWN):
+            self._rested, self._tipped = perf_counter(), False
+        if self.open_list is not None and self._list_takes(event):
+            return True
+        if kind == pygame.KEYDOWN and not self._key_is_ours(key_of(event)):
+            return False
+        if kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
+            return self._letters(event)
+        if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
+            return False
+        if kind == pygame.MOUSEBUTTONDOWN:
+            self._leave_unless(event.pos)
+        self.stale = True
+        self._run(event, None)
+        if kind == pygame.MOUSEBUTTONUP:
+            self.active = None
+        return held is not None or kind == pygame.KEYDOWN or self.box.collidepoint(self.at)
+
+    def _moved(self, event: pygame.event.Event) -> bool:
+        if self.open_list is not None and (k := self.open_list.at(event.pos)) is not None:
+            self.open_list.chosen = k
+        if self.active is not None:
+            self.stale = True
+            self._run(event, None)
+            return True
+        under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
+        if under != self._hot:
+            self._hot, self._rested, self._tipped, self.stale = under, perf_counter(), False, True
+        return self.box.collidepoint(event.pos)
+
+    def _under(self) -> Iterator[Shown]:
+        if self.open_list is None and self.box.collidepoint(self.at):
+            yield from (each for each in self.shown.values() if each.rect.collidepoint(self.at))
+
+    def _leave_unless(self, pixel: tuple[int, int]) -> None:
+        """Give the focus up when something else than its widget is pressed."""
+        there = next((each for each in self.shown.values() if each.key == self.focus), None)
+        if self.focus is not None and (there is None or not there.rect.collidepoint(pixel)):
+            self.stop_typing()
+
+    def _key_is_ours(self, name: str) -> bool:
+        if self.focus is None:
+            return False
+        if name in ("tab", "shift+tab"):
+            self.move_focus(-1 if "shift" in name else 1)
+            self.stale = True
+            return True
+        if name == "escape":
+            self.stop_typing()
+            return True
+        if self.edit is not None:
+            return not (len(name) in (2, 3) and name[0] == "f" and name[1:].isdigit())
+        return name in (*_ENTER, "space", "left", "right", "up", "down")
+
+    def _letters(self, event: pygame.event.Event) -> bool:
+        if self.edit is None:
+            return False
+        if event.type == pygame.TEXTEDITING:
+            self.edit.composed = event.text
+        else:
+            self.edit.type(event.text)
+        self.stale = True
+        return True
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw the page, anew where something is different."""
+        if self.stale or self._picture is None or self._picture.get_size() != self.box.size:
+            self.stale = False
+            for _ in range(3):  # what a page needs of height is known after it has run
+                self._again = False
+                if self.background is not None:
+                    screen.fill(self.background, self.box)
+                self._run(None, screen)
+                if not self._again:
+                    break
+            if self.background is not None:
+                self._picture = screen.subsurface(self.box.clip(screen.get_rect())).copy()
+            return
+        screen.blit(self._picture, self.box)
+
+    @property
+    def due(self) -> float | None:
+        """Seconds until a tool tip appears, None where none will."""
+        shown = self._tip_of()
+        return max(self._rested + TIP_AFTER - perf_counter(), 0.0) if shown and not self._tipped else None
+
+    def _tip_of(self) -> Shown | None:
+        return next((each for each in self._under() if each.tip), None) if self.active is None else None
+
+    def draw_over(self, screen: pygame.Surface) -> None:
+        """Draw what hangs over other things: the open list, the tool tip."""
+        if self.open_list is not None:
+            self._draw_list(screen, self.open_list)
+        tipped = self._tip_of()
+        if tipped is not None and perf_counter() - self._rested >= TIP_AFTER:
+            self._tipped = True
+            self._draw_tip(screen, tipped)
+
+    def _draw_tip(self, screen: pygame.Surface, tipped: Shown) -> None:
+        size, theme = self.px(SMALL), self.theme
+        lines = wrapped(tipped.tip, size, self.px(240))
+        high = self.px(SMALL + 5)
+        box = pygame.Rect(0, 0, max(text_width(line, size) for line in lines) + self.px(14), 0)
+        box.height = high * len(lines) + self.px(9)
+        box.topleft = self.at[0], tipped.rect.bottom + self.px(5)
+        if box.bottom > screen.get_height():
+            box.bottom = tipped.rect.top - self.px(5)
+        box.clamp_ip(screen.get_rect())
+        fill = mix(theme.panel, theme.ink, 0.92 if theme is LIGHT else 0.2)
+        rounded(screen, box, fill, mix(theme.panel, theme.ink, 0.24), self.px(4))
+        for k, line in enumerate(lines):
+            picture = label(line, size, (245, 247, 250))
+            screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
+
+    # focus
+
+    @property
+    def typing(self) -> bool:
+        """Whether letters go into a field."""
+        return self.edit is not None
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether a list is open, which may hang over other things."""
+        return self.open_list is not None
+
+    @property
+    def busy(self) -> bool:
+        """Whether somebody holds a widget, types or chooses."""
+        return self.active is not None or self.typing or self.unfolded
+
+    def stop_typing(self) -> None:
+        """Take the keys away from all widgets, and close the open list."""
+        self.focus = self.edit = self.open_list = None
+        self.stale = True
+
+    def move_focus(self, by: int) -> None:
+        """Give the focus to the next widget; a field is edited at once."""
+        order = self._order
+        if not order:
+            return
+        k = order.index(self.focus) + by if self.focus in order else (0 if by > 0 else -1)
+        self.set_focus(order[k % len(order)])
+
+    def set_focus(self, key: str) -> None:
+        """Give the focus to a widget."""
+        self.focus, self.open_list, self.stale = key, None, True
+        entry = self.shown.get(f"entry:{key}")
+        self.edit = TextEdit.of(entry.text) if entry is not None else None
+
+    # layout
+
+    def px(self, length: float) -> int:
+        """Return a length in pixels."""
+        return round(length * self.scale)
+
+    def inset(self, left: float, top: float, right: float = 0.0) -> None:
+        """Leave some room free at the sides and above what is to come."""
+        self.end_row()
+        self.x, self.y, self.wide = self.x + left, self.y + top, self.wide - left - right
+
+    def row(self, *widths: float, height: float = 26.0, gap: float = 6.0, below: float = 6.0) -> None:
+        """Lay the next widgets side by side, again and again; a width of 0 shares what is left."""
+        self.end_row()
+        widths = widths or (0.0,)
+        free = self.wide - sum(widths) - gap * (len(widths) - 1)
+        share = free / max(widths.count(0), 1)
+        self._cells, x = [], self.x
+        for width in widths:
+            self._cells.append((x, width or share))
+            x += (width or share) + gap
+        self._height, self._below = height, below
+
+    def end_row(self) -> None:
+        """Go on below the row that was begun."""
+        if self._next:
+            self.y += self._height + self._below
+        self._next = 0
+
+    def space(self, height: float) -> None:
+        """Leave some height free."""
+        self.end_row()
+        self.y += height
+
+    def cell(self) -> pygame.Rect:
+        """Take the next cell, px."""
+        if not self._cells:
+            self.row()
+        if self._next == len(self._cells):
+            self.end_row()
+        x, width = self._cells[self._next]
+        self._next += 1
+        left, top = self.box.left + self.px(x), self.box.top + self.px(self.y)
+        return pygame.Rect(left, top, self.px(width), self.px(self._height))
+
+    @property
+    def rest(self) -> pygame.Rect:
+        """What is left of the box below the last row, px."""
+        top = self.box.top + self.px(self.y + (self._height + self._below if self._next else 0.0))
+        left = self.box.left + self.px(self.x)
+        return pygame.Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
+
+    @contextmanager
+    def scroll(self, key: str, height: float | None = None, margin: float = 12.0) -> Iterator[None]:
+        """Scroll what is within, where it needs more height than there is; `margin` is right of the bar."""
+        self.end_row()
+        room = self.rest.height / self.scale if height is None else height
+        before = self.x, self.y, self.wide, self._clip
+        rect = pygame.Rect(self.box.left, self.rest.top, self.box.width, self.px(room))
+        needed = self._heights.get(key, 0.0)
+        beyond = max(needed - room, 0.0)
+        top = self._scrolled[key] = min(max(self._scrolled.get(key, 0.0), 0.0), beyond)
+        if beyond:
+            top = self._bar(key, rect, needed, top)
+            self.wide -= max(BAR + 4 - margin, 0.0)
+        self._clip = self._clip.clip(rect)
+        if self._surface is not None:
+            self._surface.set_clip(self._clip)
+        self.y -= top
+        began, self._cells = self.y, []
+        yield
+        self.end_row()
+        ended = self.y - began
+        if abs(ended - needed) > 0.5:
+            self._heights[key], self._again = ended, True
+        self.x, self.y, self.wide, self._clip = before
+        self.y += room
+        if self._surface is not None:
+            self._surface.set_clip(None)
+
+    def scroll_to(self, key: str, top: float = 0.0) -> None:
+        """Scroll a region to a height."""
+        self._scrolled[key], self.stale = top, True
+
+    def _bar(self, key: str, rect: pygame.Rect, needed: float, top: float) -> float:
+        """Show a scroll bar, and take wheel and drags for it; return how far it is scrolled."""
+        room = rect.height / self.scale
+        event, name = self._event, f"bar:{key}"
+        track = pygame.Rect(rect.right - self.px(BAR + 1), rect.top, self.px(BAR), rect.height)
+        knob = pygame.Rect(0, 0, track.width, max(round(track.height * room / needed), self.px(20)))
+        free = max(track.height - knob.height, 1)
+        knob.topleft = track.left, track.top + round(free * top / (needed - room))
+        if event is not None and event.type == pygame.MOUSEWHEEL and rect.collidepoint(self.at):
+            top -= wheel_notches(event) * _NOTCH
+            self._event = None
+        elif self._pressed(track):
+            self.active, self._event = name, None
+            inside = knob.collidepoint(self.at)
+            self._grabbed = self.at[1] - knob.top if inside else knob.height / 2
+            if not inside:
+                top = (self.at[1] - self._grabbed - track.top) / free * (needed - room)
+        elif self.active == name and event is not None and event.type == pygame.MOUSEMOTION:
+            top = (self.at[1] - self._grabbed - track.top) / free * (needed - room)
+        top = self._scrolled[key] = min(max(top, 0.0), needed - room)
+        self.shown[name] = Shown("bar", key, knob, value=top)
+        if self._surface is not None:
+            strength = 0.55 if self.active == name else 0.45 if self._hovers(track) else 0.3
+            fill = mix(self.theme.panel, self.theme.ink, strength)
+            rounded(self._surface, knob.inflate(-self.px(4), -self.px(2)), fill, fill, self.px(BAR / 2))
+        return top
+
+    # what widgets share
+
+    def _visible(self, rect: pygame.Rect) -> bool:
+        return bool(rect.colliderect(self._clip))
+
+    def _hovers(self, rect: pygame.Rect) -> bool:
+        free = self.open_list is None and self.active is None
+        return free and rect.collidepoint(self.at) and self._clip.collidepoint(self.at)
+
+    def _pressed(self, rect: pygame.Rect) -> bool:
+        event = self._event
+        return event is not None and event.type == pygame.MOUSEBUTTONDOWN and self._hovers(rect)
+
+    def _noted(
+        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str, why: str
+    ) -> None:
+        tip = f"{tip}: {why}" if tip and why else tip or why
+        self.shown[f"{kind}:{key}"] = Shown(kind, key, rect.clip(self._clip), text, value, tip, not why)
+
+    def _clicks(self, key: str, rect: pygame.Rect, why: str) -> bool:
+        """Return whether a widget was clicked in this run, or pressed by a key."""
+        if why:
+            return False
+        self._order.append(key)
+        event = self._event
+        if self._pressed(rect):
+            self.active, self._event = key, None
+        elif event is not None and event.type == pygame.MOUSEBUTTONUP and self.active == key:
+            self._event = self.active = None
+            return rect.collidepoint(self.at) and self._clip.collidepoint(self.at)
+        elif event is not None and event.type == pygame.KEYDOWN and self.focus == key:
+            if key_of(event) not in (*_ENTER, "space"):
+                return False
+            self._event = None
+            return True
+        return False
+
+    def _face(self, rect: pygame.Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
+        """Draw the box of something to press; return the colour of what is on it."""
+        theme = self.theme
+        field, line = field_colour(theme), mix(theme.panel, theme.ink, 0.24)
+        hovered, held = self._hovers(rect), self.active == key and rect.collidepoint(self.at)
+        ink = theme.ink
+        if why:
+            fill, edge, ink = (
+                theme.panel,
+                mix(theme.panel, theme.ink, 0.14),
+                mix(theme.panel, theme.ink, 0.45),
+            )
+        elif chosen:
+            fill = mix(theme.final, theme.ink, 0.25 if held else 0.15 if hovered else 0.0)
+            edge, ink = fill, on_accent(theme)
+        else:
+            fill = mix(field, theme.final, 0.28 if held else 0.14 if hovered else 0.0)
+            edge = theme.final if held or hovered else line
+        if self._surface is not None:
+            rounded(self._surface, rect, fill, edge, self.px(4), max(1, self.px(0.75)))
+            if self.focus == key:
+                self._ring(rect)
+        return ink
+
+    def _ring(self, rect: pygame.Rect) -> None:
+        if self._surface is not None:
+            width = max(2, self.px(1.5))
+            pygame.draw.rect(self._surface, self.theme.final, rect, width, border_radius=self.px(4))
+
+    def _write(
+        self,
+        text: str,
+        rect: pygame.Rect,
+        colour: Colour,
+        size: float,
+        *,
+        bold: bool = False,
+        at: str = "left",
+    ) -> None:
+        if self._surface is not None and text and self._visible(rect):
+            words = shortened(text, self.px(size), rect.width, bold)
+            picture = label(words, self.px(size), colour, bold)
+            side = "center" if at == "center" else f"mid{at}"
+            self._surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
+
+    # widgets
+
+    def header(self, text: str) -> None:
+        """Write a heading."""
+        self.row(height=18, below=2)
+        self.label(text, style="header")
+        self.row()
+
+    def label(self, text: str, *, key: str = "", style: str = "", tip: str = "", at: str = "left") -> None:
+        """Write a word; `style` is ``header``, ``unit`` or ``bold``, `at` is ``center`` or ``right``."""
+        rect = self.cell()
+        self._noted("label", key or text, rect, text, None, tip, "")
+        faint, bold = style in ("header", "unit"), style in ("header", "bold")
+        colour = self.theme.faint if faint else self.theme.ink
+        self._write(text, rect, colour, SMALL if faint else TEXT, bold=bold, at=at)
+
+    def words(self, text: str, *, size: float = TEXT, faint: bool = False, bold: bool = False) -> None:
+        """Write a paragraph over the whole width, in as many lines as it needs."""
+        colour = self.theme.faint if faint else self.theme.ink
+        self.row(height=size + 4, below=1)
+        for line in wrapped(text, self.px(size), self.px(self.wide), bold):
+            self._write(line, self.cell(), colour, size, bold=bold)
+        self.row()
+
+    def button(
+        self,
+        text: str,
+        *,
+        key: str = "",
+        tip: str = "",
+        why: str = "",
+        chosen: bool = False,
+        small: bool = False,
+    ) -> bool:
+        """Show a button; return whether it was pressed."""
+        key, rect = key or text, self.cell()
+        self._noted("button", key, rect, text, chosen, tip, why)
+        clicked = self._clicks(key, rect, why)
+        if self._surface is not None and self._visible(rect):
+            ink = self._face(rect, key, why, chosen=chosen)
+            size = SMALL if small else TEXT
+            self._write(text, rect.inflate(-self.px(6), 0), ink, size, bold=chosen and not small, at="center")
+        return clicked
+
+    def option(
+        self, text: str, aside: str = "", *, key: str = "", chosen: bool = False, why: str = ""
+    ) -> bool:
+        """Show a line of a list, with words at its right end; return whether it was clicked."""
+        key, rect = key or text, self.cell()
+        self._noted("option", key, rect, text, chosen, "", why)
+        clicked = self._clicks(key, rect, why)
+        if self._surface is not None and self._visible(rect):
+            if chosen or self._hovers(rect):
+                strength = 0.2 if chosen else 0.08
+                fill = mix(self.theme.panel, self.theme.final, strength)
+                rounded(self._surface, rect, fill, fill, self.px(4))
+            inner = rect.inflate(-self.px(16), 0)
+            self._write(aside, inner, self.theme.faint, SMALL, at="right")
+            inner.width -= text_width(aside, self.px(SMALL)) + self.px(12) if aside else 0
+            faint = mix(self.theme.panel, self.theme.ink, 0.45)
+            self._write(text, inner, faint if why else self.theme.ink, TEXT)
+        return clicked
+
+    def tabs(self, key: str, names: Sequence[str], now: str, *widths: float) -> str | None:
+        """Show buttons side by side of which one is chosen; return another one that was."""
+        self.row(*(widths or [0.0] * len(names)), below=8)
+        found = None
+        for name in names:
+            title = name[:1].upper() + name[1:]
+            if self.button(title, key=f"{key}:{name}", chosen=name == now, small=True) and name != now:
+                found = name
+        self.row()
+        return found
+
+    def section(self, title: str, *, key: str = "", folded: bool = False) -> bool:
+        """Show a heading that folds what belongs to it; return whether that is to be shown."""
+        key = f"section:{key or title}"
+        if folded and key not in self._heights:
+            self._folded.add(key)
+        self._heights[key] = 0.0
+        self.row(height=20, below=4)
+        rect = self.cell()
+        if self._clicks(key, rect, ""):
+            self._folded ^= {key}
+            self.stale = True
+        is_open = key not in self._folded
+        self._noted("section", key, rect, title, is_open, "", "")
+        if self._hovers(rect) and self._surface is not None:
+            fill = mix(self.theme.panel, self.theme.ink, 0.06)
+            rounded(self._surface, rect, fill, fill, self.px(4))
+        self._write(f"{'▾' if is_open else '▸'} {title}", rect, self.theme.faint, SMALL, bold=True)
+        if self.focus == key:
+            self._ring(rect)
+        self.row()
+        return is_open
+
+    def check(self, text: str, *, now: bool, key: str = "", tip: str = "", why: str = "") -> bool | None:
+        """Show a check box and its words; return its new state once it was clicked."""
+        key, rect = key or text, self.cell()
+        self._noted("check", key, rect, text, now, tip, why)
+        clicked = self._clicks(key, rect, why)
+        if self._surface is not None and self._visible(rect):
+            box = pygame.Rect(0, 0, self.px(16), self.px(16))
+            box.midleft = rect.midleft
+            theme, hovered = self.theme, self._hovers(rect) and not why
+            field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
+            on = mix(theme.panel, theme.ink, 0.35) if why else theme.final
+            edge = on if now or hovered else mix(theme.panel, theme.ink, 0.35)
+            rounded(self._surface, box, on if now else field, edge, self.px(3), max(1, self.px(0.75)))
+            if now:
+                self._tick(box)
+            words = rect.move(self.px(23), 0)
+            words.width -= self.px(23)
+            self._write(text, words, mix(theme.panel, theme.ink, 0.45) if why else theme.ink, TEXT)
+            if self.focus == key:
+                self._ring(rect)
+        return (not now) if clicked else None
+
+    def _tick(self, box: pygame.Rect) -> None:
+        assert self._surface is not None
+        side = box.width
+        points = [(0.22, 0.52), (0.42, 0.72), (0.78, 0.28)]
+        large = pygame.Surface((side * 4, side * 4), pygame.SRCALPHA, 32)
+        corners = [(x * side * 4, y * side * 4) for x, y in points]
+        for start, end in pairwise(corners):
+            pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side * 0.5)))
+        picture = pygame.transform.smoothscale(large.premul_alpha(), box.size)
+        self._surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def slider(
+        self,
+        key: str,
+        now: float,
+        low: float,
+        high: float,
+        *,
+        step: float = 0.0,
+        tip: str = "",
+        why: str = "",
+    ) -> float | None:
+        """Show a slider; return where it was moved to. Arrows move it by `step`, or a fiftieth."""
+        rect = self.cell()
+        track = pygame.Rect(rect.left, 0, rect.width, self.px(14))
+        track.centery = rect.centery
+        knob_wide = self.px(_KNOB)
+        free = max(track.width - knob_wide, 1)
+        span = max(high - low, 1e-300)
+        value: float | None = None
+        event = self._event
+        if not why:
+            self._order.append(key)
+            place = track.left + free * min(max((now - low) / span, 0.0), 1.0)
+            if self._pressed(track):
+                self.active, self._event = key, None
+                on_knob = place <= self.at[0] <= place + knob_wide
+                self._grabbed = self.at[0] - place if on_knob else knob_wide / 2
+                value = None if on_knob else low + span * (self.at[0] - self._grabbed - track.left) / free
+            elif self.active == key and event is not None and event.type == pygame.MOUSEMOTION:
+                value = low + span * (self.at[0] - self._grabbed - track.left) / free
+            elif self.focus == key and event is not None and event.type == pygame.KEYDOWN:
+                by = {"left": -1, "down": -1, "right": 1, "up": 1}.get(key_of(event), 0)
+                value = now + by * (step or span / 50) if by else None
+        if value is not None:
+            value = min(max(value, low), high)
+            if step:
+                value = min(max(low + round((value - low) / step) * step, low), high)
+            value = value if value != now else None
+        part = min(max(((now if value is None else value) - low) / span, 0.0), 1.0)
+        self._noted("slider", key, track, "", now if value is None else value, tip, why)
+        if self._surface is not None and self._visible(rect):
+            self._draw_slider(key, track, part, why)
+        return value
+
+    def _draw_slider(self, key: str, track: pygame.Rect, part: float, why: str) -> None:
+        assert self._surface is not None
+        theme, groove = self.theme, track.inflate(0, -self.px(8))
+        quiet = mix(theme.panel, theme.ink, 0.18)
+        rounded(self._surface, groove, quiet, quiet, groove.height // 2)
+        filled = groove.copy()
+        filled.width = max(round(part * (track.width - self.px(_KNOB))) + self.px(_KNOB / 2), groove.height)
+        accent = mix(theme.panel, theme.ink, 0.35) if why else theme.final
+        pale = mix(theme.panel, accent, 0.6)
+        rounded(self._surface, filled, pale, pale, groove.height // 2)
+        strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
+        fill = mix(accent, theme.ink, strength)
+        knob = pygame.Rect(0, 0, self.px(_KNOB), self.px(14))
+        knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
+        rounded(self._surface, knob, fill, fill, self.px(5))
+        if self.focus == key:
+            self._ring(track)
+
+    def text_entry(
+        self, key: str, text: str, *, ghost: str = "", tip: str = "", why: str = "", live: bool = False
+    ) -> str | None:
+        """Show a field; return its text after Enter, with `live` after each letter."""
+        rect, event = self.cell(), self._event
+        given: str | None = None
+        if not why:
+            self._order.append(key)
+        if not why and self._pressed(rect):
+            self._event = None
+            self._press_field(key, text, rect)
+        edit = self.edit if self.focus == key else None
+        if edit is not None and event is not None:
+            if event.type == pygame.MOUSEMOTION and self.active == key:
+                edit.place(self._caret_at(edit, rect), extend=True)
+            elif event.type == pygame.KEYDOWN:
+                self._event = None
+                if key_of(event) in _ENTER and not edit.composed:
+                    given = edit.text
+                    self.stop_typing()
+                    edit = None
+                elif not edit.composed:
+                    edit.key(key_of(event))
+        if live and edit is not None and edit.text != text:
+            given = edit.text
+        shown = edit.text if edit is not None else text
+        self._noted("entry", key, rect, shown, text, tip, why)
+        if self._surface is not None and self._visible(rect):
+            self._draw_field(rect, edit, shown, ghost, why)
+        return given
+
+    def _press_field(self, key: str, text: str, rect: pygame.Rect) -> None:
+        now = perf_counter()
+        double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
+        self._clicked = now, key
+        if self.focus != key or self.edit is None:
+            self.focus, self.edit = key, TextEdit.of(text)
+            return
+        self.active = key
+        self.edit.place(self._caret_at(self.edit, rect))
+        if double:
+            self.edit.select_word(self.edit.caret)
+
+    def _caret_at(self, edit: TextEdit, rect: pygame.Rect) -> int:
+        """Return the gap between letters that is nearest to the mouse."""
+        size = self.px(TEXT)
+        x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
+        widths = [text_width(edit.text[:k], size) for k in range(len(edit.text) + 1)]
+        return min(range(len(widths)), key=lambda k: abs(widths[k] - x))
+
+    def _shifted(self, edit: TextEdit, rect: pygame.Rect) -> int:
+        """Return by how much a long text stands further left, so that its caret is in sight."""
+        before = text_width(edit.text[: edit.caret] + edit.composed, self.px(TEXT))
+        return max(before - (rect.width - self.px(14)), 0)
+
+    def _draw_field(self, rect: pygame.Rect, edit: TextEdit | None, text: str, ghost: str, why: str) -> None:
+        screen, theme, size = self._surface, self.theme, self.px(TEXT)
+        assert screen is not None
+        line = mix(theme.panel, theme.ink, 0.14 if why else 0.24)
+        edge = theme.final if edit is not None or (self._hovers(rect) and not why) else line
+        width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
+        rounded(screen, rect, theme.panel if why else field_colour(theme), edge, self.px(4), width)
+        inner = rect.inflate(-self.px(12), -self.px(4))
+        if edit is None:
+            faint = mix(theme.panel, theme.ink, 0.45) if why else theme.ink
+            self._write(text or ghost, inner, faint if text else theme.faint, TEXT)
+            return
+        clip = screen.get_clip()
+        screen.set_clip(inner.inflate(self.px(4), 0).clip(clip))
+        left = inner.left - self._shifted(edit, rect)
+        whole = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
+        low, high = (text_width(edit.text[:k], size) for k in edit.selection)
+        tall = pygame.Rect(left + low, 0, high - low, self.px(17))
+        tall.centery = rect.centery
+        if low != high:
+            screen.fill(mix(field_colour(theme), theme.final, 0.35), tall)
+        picture = label(whole or ghost, size, theme.ink if whole else theme.faint)
+        screen.blit(picture, picture.get_rect(midleft=(left, rect.centery)))
+        x = left + text_width(edit.text[: edit.caret], size)
+        if edit.composed:
+            wide = text_width(edit.composed, size)
+            screen.fill(theme.ink, (x, tall.bottom - 1, wide, max(1, self.px(1))))
+            pygame.key.set_text_input_rect(pygame.Rect(x, rect.top, wide, rect.height))
+            x += wide
+        screen.fill(theme.ink, (x, tall.top, max(1, self.px(1)), tall.height))
+        screen.set_clip(clip)
+
+    # lists that drop down
+
+    def dropdown(
+        self, key: str, options: Sequence[str], now: str, *, tip: str = "", why: str = ""
+    ) -> str | None:
+        """Show a menu that drops down; return what was chosen of it, if that is another."""
+        rect, event = self.cell(), self._event
+        picked: str | None = None
+        if self._open_key == key and self.open_list is not None:
+            picked = self.open_list.picked
+            if picked is not None:
+                self.open_list = None
+        arrow = event is not None and event.type == pygame.KEYDOWN and self.focus == key
+        opened = self._clicks(key, rect, why) or (arrow and event is not None and key_of(event) == "down")
+        if opened and picked is None:
+            self._event = None
+            self._unfold(key, rect, list(options), now)
+        self._noted("menu", key, rect, now, now, tip, why)
+        if self._surface is not None and self._visible(rect):
+            ink = self._face(rect, key, why)
+            words = rect.inflate(-self.px(18), 0)
+            words.width -= self.px(12)
+            self._write(now, words, ink, TEXT)
+            middle, side = (rect.right - self.px(13), rect.centery + self.px(1)), self.px(4)
+            corners = [(middle[0] - side, middle[1] - side // 2), (middle[0] + side, middle[1] - side // 2)]
+            pygame.draw.polygon(self._surface, ink, [*corners, (middle[0], middle[1] + side // 2 + 1)])
+        return picked if picked != now else None
+
+    def _unfold(self, key: str, rect: pygame.Rect, options: list[str], now: str) -> None:
+        row = self.px(LIST_ROW)
+        high = min(len(options) * row + 2, self.px(LONGEST_LIST))
+        below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
+        place = pygame.Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
+        if below < high and above > below:
+            place.bottom = rect.top - self.px(2)
+        wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
+        place.width = min(max(wide, rect.width), self.box.width - self.px(16))
+        place.right = min(place.right, self.box.right - self.px(8))
+        self.open_list, self._open_key = _List(options, place, row, 0), key
+        self.open_list.show(options.index(now) if now in options else 0)
+        self.focus, self.edit = key, None
+
+    def _list_takes(self, event: pygame.event.Event) -> bool:
+        """Give an event to the open list; it takes all presses, and keys but the function keys."""
+        found = self.open_list
+        assert found is not None
+        self.stale = True
+        if event.type == pygame.MOUSEBUTTONDOWN:
+            k = found.at(event.pos)
+            if k is None:
+                self.stop_typing()
+            else:
+                self._pick(found, k)
+        elif event.type == pygame.MOUSEWHEEL:
+            found.top = min(max(found.top - wheel_notches(event) * found.row, 0.0), found.beyond)
+        elif event.type == pygame.KEYDOWN:
+            name = key_of(event)
+            by = {"up": -1, "down": 1, "page up": -8, "page down": 8, "home": -9999, "end": 9999}.get(name, 0)
+            begun = [k for k, each in enumerate(found.options) if each.lower().startswith(name)]
+            if by:
+                found.show(found.chosen + by)
+            elif name in (*_ENTER, "space"):
+                self._pick(found, found.chosen)
+            elif len(name) == 1 and begun:
+                found.show(next((k for k in begun if k > found.chosen), begun[0]))
+            elif len(name) > 1 and name.startswith("f") and name[1:].isdigit():
+                return False
+            else:
+                self.stop_typing()
+        else:
+            return event.type in (pygame.MOUSEBUTTONUP, pygame.TEXTINPUT)
+        return True
+
+    def _pick(self, found: _List, k: int) -> None:
+        found.picked = found.options[k]
+        self.focus = None
+        self._run(None, None)
+        self.open_list = None
+
+    def _draw_list(self, screen: pygame.Surface, found: _List) -> None:
+        theme, field = self.theme, field_colour(self.theme)
+        edge = mix(theme.panel, theme.ink, 0.4)
+        rounded(screen, found.rect, field, edge, self.px(4))
+        inner = found.rect.inflate(-2, -2)
+        screen.set_clip(inner)
+        for k, option in enumerate(found.options):
+            item = found.item(k)
+            if not item.colliderect(inner):
+                continue
+            if k == found.chosen:
+                screen.fill(mix(field, theme.final, 0.25), item)
+            words = shortened(option, self.px(TEXT), item.width - self.px(24 if found.beyond else 14))
+            picture = label(words, self.px(TEXT), theme.ink)
+            screen.blit(picture, picture.get_rect(midleft=(item.left + self.px(8), item.centery)))
+        if found.beyond:
+            whole = inner.height + found.beyond
+            bar = pygame.Rect(0, 0, self.px(6), round(inner.height * inner.height / whole))
+            bar.topright = inner.right - self.px(2), inner.top + round(found.top * inner.height / whole)
+            fill = mix(theme.panel, theme.ink, 0.3)
+            rounded(screen, bar, fill, fill, self.px(3))
+        screen.set_clip(None)
+
+    def find(self, kind: str, key: str) -> Shown | None:
+        """Return a widget that is shown, None if there is none of that kind and key."""
+        return self.shown.get(f"{kind}:{key}")

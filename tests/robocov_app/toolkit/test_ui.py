@@ -1,0 +1,290 @@
+"""Widgets: what a page shows, and what hands do to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pygame
+import pytest
+
+from robocov.errors import InputError
+from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.command import Command, Commands, Takes
+from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, file_choice
+from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.palette import palette
+from robocov_app.toolkit.ui import Ui
+
+KEYS = {"return": pygame.K_RETURN, "tab": pygame.K_TAB, "escape": pygame.K_ESCAPE, "left": pygame.K_LEFT}
+KEYS |= {"up": pygame.K_UP, "down": pygame.K_DOWN, "backspace": pygame.K_BACKSPACE, "space": pygame.K_SPACE}
+MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT}
+
+
+def key(name: str) -> pygame.event.Event:
+    *held, last = name.split("+")
+    mod = sum(MODIFIERS[each] for each in held)
+    return pygame.event.Event(pygame.KEYDOWN, key=KEYS.get(last) or ord(last), mod=mod, unicode="")
+
+
+def letters(text: str) -> pygame.event.Event:
+    return pygame.event.Event(pygame.TEXTINPUT, text=text)
+
+
+@pytest.fixture
+def screen(monkeypatch: pytest.MonkeyPatch) -> Iterator[pygame.Surface]:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    pygame.display.init()
+    pygame.font.init()
+    yield pygame.display.set_mode((320, 300))
+    pygame.display.quit()
+
+
+class Page:
+    """One of each widget, and what they edit."""
+
+    def __init__(self, screen: pygame.Surface) -> None:
+        self.screen = screen
+        self.value, self.on, self.name, self.word, self.tab = 0.5, False, "8", "b", "one"
+        self.pressed = 0
+        self.ui = Ui(self.page, LIGHT)
+        self.ui.box = screen.get_rect()
+        self.draw()
+
+    def page(self, ui: Ui) -> None:
+        self.pressed += ui.button("Go", tip="goes")
+        self.pressed += ui.button("Stop", why="nothing goes")
+        self.value = ui.slider("value", self.value, 0.0, 1.0) or self.value
+        if (on := ui.check("On", now=self.on)) is not None:
+            self.on = on
+        self.name = ui.text_entry("name", self.name) or self.name
+        self.word = ui.dropdown("word", "abcdefghijklmnopqrstuvwxyz", self.word) or self.word
+        self.tab = ui.tabs("tab", ["one", "two"], self.tab) or self.tab
+        with ui.scroll("more"):
+            if ui.section("MORE"):
+                for k in range(20):
+                    ui.label(f"line {k}")
+
+    def draw(self) -> None:
+        self.ui.draw(self.screen)
+        self.ui.draw_over(self.screen)
+
+    def press(self, kind: str, name: str, at: float = 0.5) -> None:
+        found = self.ui.find(kind, name)
+        assert found is not None
+        self.at(found.rect.left + at * found.rect.width, found.rect.centery)
+
+    def at(self, x: float, y: float) -> None:
+        pos = round(x), round(y)
+        for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
+            self.ui.take(pygame.event.Event(kind, pos=pos, button=1))
+            self.draw()
+
+    def keys(self, *names: str) -> None:
+        for name in names:
+            self.ui.take(key(name))
+
+    def text(self) -> str:
+        found = self.ui.find("entry", "name")
+        assert found is not None
+        return found.text
+
+
+@pytest.fixture
+def page(screen: pygame.Surface) -> Page:
+    return Page(screen)
+
+
+def test_widgets_edit_what_they_show(page: Page) -> None:
+    page.press("button", "Go")
+    page.press("button", "Stop")  # disabled, with its reason as tip
+    assert page.pressed == 1 and page.ui.shown["button:Stop"].tip == "nothing goes"
+    page.press("slider", "value", 0.9)
+    assert 0.85 < page.value < 0.95
+    page.press("check", "On")
+    page.press("button", "tab:two")
+    assert page.on and page.tab == "two"
+
+
+def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> None:
+    page.press("entry", "name")
+    page.ui.take(letters("1"))
+    page.ui.take(letters("2"))
+    assert page.ui.typing and page.name == "8"
+    page.keys("ctrl+z")
+    page.draw()
+    assert page.text() == "8"  # letters that follow each other are undone together
+    page.keys("ctrl+y", "ctrl+a", "ctrl+c", "return")
+    assert page.name == "12" and not page.ui.typing and clipboard.get() == "12"
+    page.press("entry", "name")
+    page.keys("backspace", "escape")
+    page.draw()
+    assert page.name == "12" and page.text() == "12"
+
+
+def test_an_input_method_composes_before_it_types(page: Page) -> None:
+    page.press("entry", "name")
+    page.ui.take(pygame.event.Event(pygame.TEXTEDITING, text="にほ", start=0, length=2))
+    page.draw()
+    page.keys("return")
+    assert page.ui.typing and page.text() == "8"
+    page.ui.take(letters("日本"))
+    page.keys("return")
+    assert page.name == "日本"
+
+
+def test_lists_drop_down_over_what_is_below(page: Page) -> None:
+    page.press("menu", "word")
+    found = page.ui.open_list
+    assert found is not None
+    item = found.item(found.chosen + 1)
+    page.at(*item.center)
+    assert page.word == "c" and not page.ui.unfolded and page.tab == "one"
+    page.press("menu", "word")
+    page.keys("up", "return")
+    assert page.word == "b"
+    page.press("menu", "word")
+    page.press("button", "Go")  # closes the list, and no more
+    assert page.pressed == 0 and not page.ui.unfolded
+
+
+def test_tab_walks_and_keys_press(page: Page) -> None:
+    assert not page.ui.take(key("tab"))  # while nothing has the focus it means something else
+    page.press("entry", "name")
+    page.keys("shift+tab", "space")
+    assert page.on and not page.ui.typing
+    page.keys("shift+tab", "left")
+    assert page.value < 0.5
+    page.keys("shift+tab", "return")
+    assert page.pressed == 1
+    assert not page.ui.take(key("x")) and page.ui.take(key("escape")) and not page.ui.take(key("space"))
+
+
+def test_more_than_there_is_room_for_scrolls_and_folds(page: Page) -> None:
+    bar = page.ui.find("bar", "more")
+    assert bar is not None and bar.value == 0.0
+    page.ui.at = (50, 280)
+    page.ui.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=-1, precise_y=-1.0))
+    page.draw()
+    bar = page.ui.find("bar", "more")
+    assert bar is not None and bar.value == 40.0
+    page.ui.scroll_to("more")
+    page.draw()
+    page.press("section", "section:MORE")
+    assert page.ui.find("label", "line 0") is None and page.ui.find("bar", "more") is None
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.25])
+def test_what_is_drawn_once_is_copied(scale: float, screen: pygame.Surface) -> None:
+    page = Page(screen)
+    page.ui = Ui(page.page, DARK, scale)
+    page.ui.box = screen.get_rect()
+    page.draw()
+    first = pygame.surfarray.array3d(screen)
+    screen.fill("red")
+    page.draw()
+    assert (pygame.surfarray.array3d(screen) == first).all()
+
+
+# commands
+
+
+class Done:
+    """Commands, and what they did."""
+
+    def __init__(self) -> None:
+        self.done: list[object] = []
+        self.said: list[str] = []
+        self.commands = Commands(
+            [
+                Command("pause", "Play or pause", "Run", lambda: self.done.append("pause"), ("space",)),
+                Command("undo", "Undo", "Edit", lambda: None, ("ctrl+z",), when=lambda: "nothing to undo"),
+                Command("map", "Open a map", "Run", self._open, takes=Takes("name", options=self._maps)),
+            ],
+            self._attempt,
+        )
+
+    def _maps(self) -> list[str]:
+        return ["rooms", "office"]
+
+    def _open(self, name: object) -> str:
+        if name not in self._maps():
+            raise InputError(f"there is no map {name}")
+        self.done.append(name)
+        return f"{name} is open"
+
+    def _attempt(self, call: Any) -> None:
+        try:
+            call()
+        except InputError as error:
+            self.said.append(str(error))
+
+
+def test_keys_do_commands_once_and_tell_why_they_cannot_be_done() -> None:
+    its = Done()
+    assert its.commands.press(key("space"))
+    its.commands.press(key("space"))  # held down
+    its.commands.release(key("space"))
+    its.commands.press(key("ctrl+z"))
+    assert its.done == ["pause"] and its.said == ["nothing to undo"]
+    assert its.commands["undo"].tip == "Undo (Ctrl Z)"
+
+
+def test_the_palette_completes_and_keeps_what_was_wrong(screen: pygame.Surface) -> None:
+    its, dialogs, told = Done(), Dialogs(), []
+    dialogs.ask(palette(its.commands, "", told.append), opened_by="/")
+
+    def does(*events: pygame.event.Event) -> None:
+        for event in events:
+            dialogs.draw(screen, LIGHT, 1.0)
+            dialogs.take(event)
+
+    does(letters("/"), letters("open"), key("return"), letters("attic"), key("return"))
+    assert dialogs.open and its.done == []
+    assert dialogs.asked.text == "map attic" and dialogs.asked.trouble == "there is no map attic"
+    does(key("ctrl+backspace"), letters("of"), key("tab"), key("return"))
+    assert not dialogs.open and its.done == ["office"] and told == ["office is open"]
+    with pytest.raises(InputError, match="mao"):
+        its.commands.typed("mao office")
+
+
+def test_questions_are_answered_by_keys_and_clicks(screen: pygame.Surface) -> None:
+    given: list[str] = []
+    for events in ([key("return")], [key("tab"), key("return")], [key("d")], [key("escape")]):
+        dialogs = Dialogs()
+        answers = [
+            Answer("Save", lambda: given.append("s")),
+            Answer("Discard", lambda: given.append("d"), "d"),
+        ]
+        dialogs.ask(Question("Save first? " * 9, "It was edited.", answers, lambda: given.append("c"), 300))
+        for event in events:
+            dialogs.draw(screen, LIGHT, 1.0)
+            dialogs.take(event)
+        assert not dialogs.open
+    assert given == ["s", "d", "d", "c"]
+
+
+def test_files_are_found_in_folders(screen: pygame.Surface, tmp_path: Any) -> None:
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "a.json").touch()
+    (tmp_path / "maps" / "b.txt").touch()
+    chosen: list[object] = []
+    dialogs = Dialogs()
+    dialogs.ask(file_choice("Open", tmp_path, chosen.append, endings=(".json",)))
+    for event in (key("return"), key("return")):
+        dialogs.draw(screen, LIGHT, 1.0)
+        dialogs.take(event)
+    assert chosen == [tmp_path / "maps" / "a.json"] and not dialogs.open
+
+
+def test_a_menu_at_the_cursor_stays_in_the_window_and_passes_over_what_cannot_be_done(
+    screen: pygame.Surface,
+) -> None:
+    its = Done()
+    menu = Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.do)
+    menu.draw(screen, LIGHT, 1.0)
+    assert menu._ui is not None and screen.get_rect().contains(menu._ui.box)
+    menu.take(key("down"))
+    menu.take(key("return"))
+    assert its.done == ["pause"] and not menu.open
