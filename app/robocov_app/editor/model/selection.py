@@ -96,11 +96,9 @@ class Selection:
         return replace(self, vertices=frozenset())
 
     def with_groups(self, sketch: Sketch) -> Selection:
-        """Return the selection with all members of each group that one of its obstacles is in."""
+        """Return the selection with the members of all its groups, but for the locked and the hidden."""
         groups = {sketch.item(key).group for key in self.items} - {""}
-        if not groups:
-            return self
-        members = frozenset(item.key for item in sketch.obstacles if item.group in groups)
+        members = {i.key for i in sketch.obstacles if i.group in groups and not (i.locked or i.hidden)}
         return replace(self, items=self.items | members)
 
     def words(self, sketch: Sketch) -> str:

@@ -69,6 +69,10 @@ class DrawTool(Tool, ABC):
         """Return where the next point goes."""
         return constrained_point(event, self.origin)
 
+    def end_for(self, text: str) -> Point | None:
+        """Return where a drag from the first point ends for a typed size; None where that is no size."""
+        return None
+
     @property
     def busy(self) -> bool:
         return bool(self.points)
@@ -133,10 +137,13 @@ class DrawTool(Tool, ABC):
         return had
 
     def enter(self, context: ToolContext, text: str) -> None:
-        self.points.append(next_point_of(text, self.origin, self.at if self.points else None))
-        self.at = self.points[-1]
-        if len(self.points) == self.most:
+        end = self.end_for(text) if len(self.points) == 1 else None
+        if end is not None:
+            self.points = self.dragged(self.points[0], end)
             self.finish(context)
+        else:
+            self.points.append(next_point_of(text, self.origin, self.at if self.points else None))
+            self.at = self.points[-1]
 
     def preview(self, context: ToolContext) -> Preview | None:
         return self.shown(context, (*self.points, self.at)) if self.points else None
@@ -251,12 +258,8 @@ class BoundaryTool(DrawTool):
     def placed(self, event: PointerEvent) -> Point:
         return event.point if self._dragging else super().placed(event)
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        if len(self.points) == 1 and any(sign in text for sign in "x×*"):
-            self.points = self.dragged(self.points[0], self._far_corner(text))
-            self.finish(context)
-        else:
-            super().enter(context, text)
+    def end_for(self, text: str) -> Point | None:
+        return self._far_corner(text) if any(sign in text for sign in "x×*") else None
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
         if not self._dragging:
@@ -285,12 +288,8 @@ class RectangleTool(DrawTool):
         side = max(abs(dx), abs(dy))
         return x + copysign(side, dx), y + copysign(side, dy)
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        if self.points:
-            self.at = self._far_corner(text)
-            self.finish(context)
-        else:
-            super().enter(context, text)
+    def end_for(self, text: str) -> Point:
+        return self._far_corner(text)
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
@@ -315,12 +314,8 @@ class CircleTool(DrawTool):
     def placed(self, event: PointerEvent) -> Point:
         return event.point
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        if self.points:
-            self.at = self.points[0][0] + length_of(text), self.points[0][1]
-            self.finish(context)
-        else:
-            super().enter(context, text)
+    def end_for(self, text: str) -> Point:
+        return self.points[0][0] + length_of(text), self.points[0][1]
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
