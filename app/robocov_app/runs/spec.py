@@ -24,13 +24,26 @@ COST_RATE = 10.0  # samples of the coverage cost per simulated second
 class RunSpec:
     """One run: all that its result depends on; the only place that makes simulations and recorders of it.
 
-    `controller`: by name, or ``mine.py:MyController``. `gains`: those that differ from their defaults.
-    `source`: the file of a controller of one's own, where it may not be there. `start`: named start of the
-    map, its first by default; where `positions` are given, where they came from. `seed`: of the positions.
-    `positions`, `velocities`, (n, 2) m and m/s: given; by default drawn from the start, and at rest. `time`,
-    s: when it begins. `duration`, `dt`, s: dt is the control period. `conditions`: what goes wrong, and when
-    robots fail and join. `lattice`: sites along a side, of the coverage cost. `cost_hz`, Hz: samples of it;
-    0: at the first moment and the last. `record_hz`, Hz: moments of the record that are kept; None for all.
+    Attributes
+    ----------
+    controller : str
+        By name, or ``mine.py:MyController``.
+    gains : dict of name to value
+        Those that differ from their defaults.
+    source : Source or None
+        The file of a controller of one's own, where it may not be there.
+    start, seed : str, int, or None
+        Named start of the map, its first by default, and seed of the positions; or where these came from.
+    positions, velocities : (n, 2) m and m/s, or None
+        Given; by default drawn from the start, and at rest.
+    duration, dt : float, s
+        Of the run, and of a control period.
+    conditions : Conditions or None
+        What goes wrong, and when robots fail and join.
+    lattice : int
+        Sites along a side, of the coverage cost.
+    cost_hz, record_hz : float, Hz
+        Samples of the cost, 0 for the first and the last; moments of the record, None for all.
     """
 
     environment: Environment
@@ -42,7 +55,6 @@ class RunSpec:
     seed: int | None = 0
     positions: Array | None = None
     velocities: Array | None = None
-    time: float = 0.0
     duration: float = 60.0
     dt: float = DEFAULT_DT
     conditions: Conditions | None = None
@@ -77,8 +89,10 @@ class RunSpec:
         self.made_controller()
         _ = self.starts
 
-    def simulation(self, controller: Controller | None = None) -> Simulation:
-        """Return the run at its beginning, by default under the controller that it names."""
+    def simulation(
+        self, controller: Controller | None = None, *, steps: int = 0, resumed: bool = False
+    ) -> Simulation:
+        """Return the run at its beginning, or `resumed` after some steps; by default under its controller."""
         return Simulation(
             self.environment,
             controller or self.made_controller(),
@@ -86,7 +100,8 @@ class RunSpec:
             self.team,
             self.dt,
             velocities=self.velocities,
-            time=self.time,
+            steps=steps,
+            resumed=resumed,
             conditions=self.conditions,
         )
 

@@ -310,17 +310,14 @@ def serve(service: str) -> None:
 
 
 def started(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
-    """Start a process that serves; pipes lead to its standard input and from its standard output.
-
-    A module without a class is run as a program. Complaints go to `stderr`, by default to ours.
-    """
+    """Start a process that serves; pipes lead to its standard input and from its standard output."""
     # it is to import what this one does
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(name, "1")
     serving = f"from robocov_app.toolkit.worker import serve; serve({service!r})"
     # -P: what lies in the working folder is not meant
-    command = [sys.executable, "-P", *(("-c", serving) if ":" in service else ("-m", service))]
+    command = [sys.executable, "-P", "-c", serving]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, env=environment)
     if sys.platform == "linux":

@@ -12,6 +12,7 @@ from robocov.errors import StartError
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
 from robocov_app.render.scene import Sensed
+from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Circumstances, State
 from robocov_app.viewer.session.trail import Trail
@@ -175,19 +176,25 @@ class Lane:
         self.trail, self.starts = trail, starts
 
 
+def _spec(circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None) -> RunSpec:
+    law = circumstances.law
+    return RunSpec(
+        circumstances.solid,
+        law.name,
+        law.gains,
+        team=circumstances.team,
+        positions=positions,
+        velocities=velocities,
+        dt=dt,
+        conditions=circumstances.conditions,
+    )
+
+
 def begun(
     circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None = None
 ) -> Simulation:
     """Return a simulation that begins in these circumstances; StartError, ParameterError as `Simulation`."""
-    return Simulation(
-        circumstances.solid,
-        circumstances.law.made(),
-        positions,
-        circumstances.team,
-        dt,
-        velocities=velocities,
-        conditions=circumstances.conditions,
-    )
+    return _spec(circumstances, positions, dt, velocities).simulation(circumstances.law.made())
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
@@ -196,17 +203,8 @@ def resumed(state: State, dt: float, step: int) -> Simulation:
     Raises ParameterError when the controller cannot be had any more.
     """
     circumstances = state.circumstances
-    simulation = Simulation(
-        circumstances.solid,
-        circumstances.law.made(),
-        state.positions,
-        circumstances.team,
-        dt,
-        velocities=state.velocities,
-        steps=step,
-        resumed=True,
-        conditions=circumstances.conditions,
-    )
+    spec = _spec(circumstances, state.positions, dt, state.velocities)
+    simulation = spec.simulation(circumstances.law.made(), steps=step, resumed=True)
     if state.memory is not None or state.inbox is not None:
         memory = simulation.memory if state.memory is None else state.memory
         simulation = simulation.remembering(memory, state.inbox)
