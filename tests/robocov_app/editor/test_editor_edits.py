@@ -379,6 +379,17 @@ def test_bounds(sketch):
     assert transform.bounds_of(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
 
 
+def test_the_bounds_of_many_things_are_those_of_each():
+    shapes = [
+        CircleObstacle((k, 1.0), 0.3) if k % 3 else WallObstacle(((k, 2.0), (k, 3.0)), 0.2)
+        for k in range(150)
+    ]
+    sketch, keys = Sketch().added([*shapes, PolygonObstacle(())])
+    boxes = np.array([box for key in keys if (box := transform.box_of(sketch, key)) is not None])
+    expected = (*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0))
+    assert transform.bounds_of(sketch, Selection.of(*keys)) == expected
+
+
 # the plane
 
 

@@ -9,6 +9,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
+from robocov_app.editor.canvas import arena
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
@@ -393,3 +394,15 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     (hidden,) = [row for row in rows if row.lines[1] == "hidden"]
     things.take(hidden)
     assert hands.desk.selection.items == {0} and things.chosen(hidden)
+
+
+def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path, monkeypatch) -> None:
+    shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]
+    pictures = []
+    for many in (200, 10_000):
+        monkeypatch.setattr(arena, "MANY", many)
+        with opened_editor(tmp_path, sheet(*shapes)) as hands:
+            hands.key("ctrl+a")
+            hands.frames(2)
+            pictures.append(pygame.surfarray.array3d(hands.window.screen).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).max() < 8

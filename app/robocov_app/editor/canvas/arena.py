@@ -55,6 +55,9 @@ if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
     from robocov_app.viewer.layout import Layout
 
+MANY = 200
+"""Selected things from which on their outlines are drawn once, and then the picture of them."""
+
 REACH = 12.0
 """Pixels at scale 1 that a finger is wide."""
 
@@ -82,6 +85,7 @@ class Arena:
         self._hatching = Hatching()
         self._camera: Camera | None = None
         self._carried: tuple[Moving, Camera, pygame.Surface] | None = None
+        self._outlined: tuple[Sketch, object, pygame.Surface] | None = None
 
     # cameras
 
@@ -244,7 +248,8 @@ class Arena:
         if self.team is not None and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
-            self._draw_selection(canvas, now, pending.selection if pending is not None else desk.selection)
+            chosen = pending.selection if pending is not None else desk.selection
+            self._draw_selection(screen, view, canvas, now, chosen)
         if "impassable" in shown and desk.measurement is not None and desk.measurement.gap is not None:
             busy = desk.tool is not desk.selector or drag is not None
             tag_gap(canvas, desk.measurement.gap, desk.measurement.radius, self.at if busy else None)
@@ -320,7 +325,9 @@ class Arena:
                 at,
             )
 
-    def _draw_selection(self, canvas: Canvas, sketch: Sketch, selection: Selection) -> None:
+    def _draw_selection(
+        self, screen: pygame.Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
+    ) -> None:
         desk, theme = self.desk, self.theme
         selector = desk.selector
         selection = selection.within(sketch)
@@ -328,8 +335,18 @@ class Arena:
         hovered = selector.hovered if desk.tool is selector and not selector.busy and self.at else None
         if hovered is not None and hovered not in owners:
             self._draw_owner(canvas, sketch, hovered, mix(theme.background, accent(theme), 0.7), 1.5)
-        for owner in owners:
-            self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
+        if len(owners) > MANY:
+            look, known = (selection, view.camera, theme.name, view.scale), self._outlined
+            if known is None or known[0] is not sketch or known[1] != look:
+                known = sketch, look, pygame.Surface(view.size, pygame.SRCALPHA, 32)
+                own = view.canvas(known[2])
+                for owner in owners:
+                    self._draw_owner(own, sketch, owner, accent(theme), 2.0)
+                self._outlined = known
+            screen.blit(known[2], (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        else:
+            for owner in owners:
+                self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
         if "handles" not in desk.shown or desk.tool is not selector or not selection:
             return
         box = frame_of(sketch, selection, desk.pixel)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
+import shapely
 
 from robocov.arrays import Array
 from robocov.environment import (
@@ -39,6 +40,7 @@ SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
 
 _ALONG_X = SIDES[:3]
 _MOST_COPIES = 10_000
+_MANY = 100
 
 _ALIKE = 1e-12
 """Relative difference of what is the same but for rounding."""
@@ -326,7 +328,14 @@ def box_of(sketch: Sketch, owner: Owner) -> Box | None:
 
 def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
     """Return the bounding box of what is selected; None of nothing."""
-    boxes = [box for owner in selection.owners if (box := box_of(sketch, owner)) is not None]
+    owners = selection.owners
+    boxes = []
+    if len(owners) > _MANY:  # all at once
+        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, CircleObstacle)]
+        rows = shapely.bounds(sketch.geometries[[sketch.places[key] for key in sharp]])
+        boxes = [(a, b, c, d) for a, b, c, d in rows[np.isfinite(rows).all(axis=1)].tolist()]
+        owners = owners - frozenset(sharp)
+    boxes += [box for owner in owners if (box := box_of(sketch, owner)) is not None]
     boxes += [(*place, *place) for place in (place_of(sketch, vertex) for vertex in selection.vertices)]
     return _around(boxes) if boxes else None
 
