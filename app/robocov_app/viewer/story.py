@@ -18,9 +18,13 @@ from robocov.controllers import remembers
 from robocov.environment import CircleObstacle, Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record, Recorder
+from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.scene import Scene
+from robocov_app.render.theme import theme_named
 from robocov_app.runs.compare import begin_comparison, folder_names, save_comparison
 from robocov_app.runs.cost import built_cost
-from robocov_app.runs.film import FILM_HOLD, FILMS, write_moving
+from robocov_app.runs.film import FILM_HOLD, FILMS, side_by_side, write_moving
 from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers, save_pictures
 from robocov_app.runs.saved import wreck_name
 from robocov_app.terminal.output import write_csv, write_json
@@ -32,7 +36,6 @@ from robocov_app.viewer.session.map_edits import with_obstacle
 
 if TYPE_CHECKING:
     from robocov.files.result_folder import ResultFolder
-    from robocov_app.render.picture import Painter
     from robocov_app.runs.options import RunOptions
     from robocov_app.runs.recording import Frame
     from robocov_app.terminal.interruption import Interruption
@@ -240,10 +243,6 @@ def story_frames(
     options: RunOptions,
 ) -> Iterator[Frame]:
     """Draw a branch from its beginning: trajectories go on through all touches."""
-    from robocov_app.render.picture import Painter, pane_layers, standard_layers
-    from robocov_app.render.theme import theme_named
-    from robocov_app.runs.panes import side_by_side
-
     theme = theme_named(options.theme)
     stride = options.film_speed / options.fps
     painters: dict[int, Painter] = {}
@@ -283,9 +282,6 @@ def story_frames(
 
 def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
     """Return what a frame shows of a pane."""
-    from robocov_app.render.density import cost_words, mean_words
-    from robocov_app.render.scene import Scene
-
     setup, snapshot = pane.circumstances, pane.simulation.snapshot
     known = [
         (begin + time, value)

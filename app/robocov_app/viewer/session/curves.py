@@ -72,6 +72,14 @@ class Curve:
         self._time.append(time)
         self._value.append(value)
 
+    def outline(self, most: int) -> list[list[float]]:
+        """Return times and values of some samples, the last among them, with few digits."""
+        stride = -(-len(self._time) // most)
+        return [
+            [round(time, 3) for time in self._time[::-stride][::-1]],
+            [float(f"{value:.5g}") for value in self._value[::-stride][::-1]],
+        ]
+
     def between(self, begin: float, end: float) -> Curve:
         """Return the samples from a time, s, to another."""
         first = int(np.searchsorted(self._time, begin - 1e-6))

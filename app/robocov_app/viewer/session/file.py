@@ -45,12 +45,16 @@ from robocov_app.viewer.session.changes import (
     SetDensity,
     SetLimits,
 )
+from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.document import Document, Node
 from robocov_app.viewer.session.scenario import Law, Limits, Scenario
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
 
 MOST_STEPS = 100_000_000
+
+MOST_SAMPLES = 30
+"""Samples of a curve that stand in the file, for each touch."""
 
 
 class _Model(BaseModel):
@@ -221,6 +225,9 @@ class TouchModel(_Model):
     name: _Text = ""
     end: _Step
     changes: Annotated[list[ChangeModel], Field(min_length=1)]
+    curves: dict[str, list[list[_Coordinate]]] = Field(
+        {}, description='What was plotted meanwhile: [times, values] of "pane distance" and "pane time"'
+    )
 
 
 class BundledMapModel(_Model):
@@ -342,7 +349,12 @@ def _touch_json(node: Node, maps: list[Any]) -> dict[str, Any]:
     parent = None if node.parent is None else node.parent.number
     named = {"name": node.name} if node.name else {}
     head = {"parent": parent, "at": node.at, "kind": node.kind, "words": node.words, **named}
-    return {**head, "end": node.end, "changes": changes}
+    curves = {
+        f"{pane} {what}": curve.outline(MOST_SAMPLES)
+        for (pane, what), curve in node.curves.items()
+        if len(curve)
+    }
+    return {**head, "end": node.end, "changes": changes, **({"curves": curves} if curves else {})}
 
 
 def _change_json(step: int, change: Change, maps: list[Any]) -> dict[str, Any]:
@@ -471,6 +483,12 @@ class _Reader:
             steps_of = [node.begin, *(step for step, _ in changes)]
             if steps_of != sorted(steps_of) or steps_of[1] != node.begin or node.end < steps_of[-1]:
                 self._refuse((*at, "end"), touch.end, "a step from those of its changes on, in order,")
+            for name, samples in touch.curves.items():
+                pane, _, what = name.partition(" ")
+                if not pane.isdecimal() or what not in ("distance", "time") or len(samples) != 2:
+                    self._refuse((*at, "curves"), name, '"0 distance", "0 time", ... with times and values')
+                for time, value in zip(*samples, strict=False):
+                    node.curves.setdefault((int(pane), what), Curve()).add(time, value)
             nodes.append(node)
         if self._model.head >= len(nodes):
             self._refuse(("head",), self._model.head, f"the number of a touch, 0 to {len(nodes) - 1},")

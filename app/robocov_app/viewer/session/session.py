@@ -469,7 +469,7 @@ class Session:
 
     def _take_over(self, run: Lockstep, node: int, history: History, change: Change | None = None) -> None:
         """Let another moment of the document be the present, and carry out a change there if that can be."""
-        self._stow()
+        self.stow()
         left = self.document.limits(self.head, self._run.step)
         on_the_way, head = run.step <= left.get(node, -1), self.document.nodes[node]
         path, limits = self.document.path(head), self.document.limits(head, run.step)
@@ -495,7 +495,7 @@ class Session:
         self.serial += 1
         self.settled = False
 
-    def _stow(self) -> None:
+    def stow(self) -> None:
         """Remember moments and curves of the present branch in its nodes."""
         moments: dict[int, list[Moment]] = {}
         for moment in self.history.since(0):
@@ -591,7 +591,7 @@ class Session:
         """Begin another scenario at time 0; undo comes back to this one."""
         self.finish_remaking()
         run = Lockstep(scenario)
-        self._stow()
+        self.stow()
         self.head = self.document.add(self.head, self._run.step, "begin", words, Restart(scenario))
         self._run = run
         self.recorded_until = None

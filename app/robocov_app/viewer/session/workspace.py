@@ -67,6 +67,7 @@ class Workspace:
         if not self.session.can_be_made_again:
             return
         self._kept, self._when = state, monotonic()
+        self.session.stow()
         content = session_json(self.session.document, self.session.head, self.session.step_now, view)
         self._autosaver.keep(lambda: {"session": content})
 
@@ -77,6 +78,7 @@ class Workspace:
         """
         session = self.session
         session.require_document()
+        session.stow()
         target = path or self.path or free_name(folder, session.environment.name.lower() or "session", SUFFIX)
         save_session(target, session.document, session.head, session.step_now, view)
         self.path, self._saved = target, session.revision

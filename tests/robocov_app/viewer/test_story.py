@@ -1,0 +1,114 @@
+"""Sessions made again without a window: `robocov run SESSION.robocov`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kept_run import record_of, same_arrays
+from touched_run import HALL, LLOYD, RAPF, begun, stepped, with_curves
+
+from robocov.environment import CircleObstacle
+from robocov.record import Record
+from robocov_app.cli import main
+from robocov_app.viewer.session.file import load_session, save_session
+from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.story import parts_of
+
+SMALL = ["--lattice", "16", "--size", "320x240"]
+
+
+def saved(session: Session, folder: Path) -> str:
+    session.stow()
+    path = folder / "story.robocov"
+    save_session(path, session.document, session.head, session.step_now, {})
+    return str(path)
+
+
+def played() -> Session:
+    """A robot fails; in another branch a circle is drawn and a robot joins."""
+    session = stepped(begun(RAPF, LLOYD), 12)
+    session.fail_robot(2)
+    stepped(session, 12)
+    session.undo()
+    session.edit(with_obstacle(HALL, CircleObstacle((1.5, 3.0), 0.3)), "circle drawn")
+    stepped(session, 12).add_robot((5.0, 3.0))
+    return stepped(session, 12)
+
+
+def test_a_run_that_nobody_touched_is_saved_byte_for_byte_as_run_does(tmp_path: Path) -> None:
+    from robocov.mapfile import load_map
+
+    session = stepped(begun(RAPF, environment=load_map("rooms"), robots=6), 30)
+    plain = ["run", "rooms", "--duration", "0.5", *SMALL, "--out", str(tmp_path / "plain")]
+    assert main(plain) == 0
+    assert main(["run", saved(session, tmp_path), *SMALL, "--out", str(tmp_path / "again")]) == 0
+    for name in ("run.json", "record.npz", "cost.csv", "trajectories.png", "cost.svg"):
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes(), name
+    assert (tmp_path / "again" / "session.robocov").is_file()
+
+
+def test_a_story_is_saved_with_its_parts_costs_and_film(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session, out = played(), tmp_path / "out"
+    command = ["run", saved(session, tmp_path), *SMALL, "--out", str(out), "--video", "--json"]
+    assert main([*command, "--fps", "10", "--film-speed", "1"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [part["words"] for part in answer["parts"]] == ["begun", "circle drawn", "robot 4 joined"]
+    assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])
+    last = Record.load(out / "03-robot-4-joined" / "lloyd")
+    np.testing.assert_array_equal(last.positions[-1], session.lanes[1].simulation.positions)
+    assert len(last.team) == 4 and last.session["began_at_s"] == pytest.approx(0.4)
+    rows = (out / "cost.csv").read_text().splitlines()
+    assert rows[0].startswith("controller,time_s,") and {row.split(",")[0] for row in rows[1:]} == {
+        "rapf",
+        "lloyd",
+    }
+    assert (out / "comparison.mp4").stat().st_size > 1000
+    assert load_session(out / "session.robocov").step == session.step_now
+
+
+def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = saved(played(), tmp_path)
+    assert main(["run", path, *SMALL, "--out", str(tmp_path / "all"), "--all-branches"]) == 0
+    assert sorted(each.name for each in tmp_path.glob("all-*")) == ["all-1", "all-2"]
+    assert main(["run", path, *SMALL, "--out", str(tmp_path / "one"), "--branch", "1"]) == 0
+    assert (tmp_path / "one" / "02-robot-2-failed").is_dir()
+    capsys.readouterr()
+    assert main(["run", path, *SMALL, "--out", str(tmp_path / "no"), "--branch", "9"]) == 2
+    assert (
+        "branch: '9', but one of 1 (robot 2 failed), 2 (robot 4 joined) was wanted" in capsys.readouterr().err
+    )
+    assert not (tmp_path / "no").exists()
+
+
+def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
+    session = stepped(begun(RAPF), 6)
+    session.playing = True
+    for k in range(6):
+        session.grab(2, (3.0 + 0.1 * k, 3.0))
+        session.advance(1 / 60)
+    session.release()
+    stepped(session, 6)
+    (part,) = parts_of(session.document, session.head, session.step_now)
+    record = record_of(session)
+    assert part.begin == 0 and len(record) == 19
+    (touch,) = record.session["touched"]
+    assert touch["robots"] == [2] and touch["from_s"] == pytest.approx(0.1)
+    assert record.session["repeatable"] is False
+    assert same_arrays(record, record_of(session))
+
+
+def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
+    session = begun(RAPF)
+    with_curves(session, 200)
+    session.fail_robot(1)
+    with_curves(session, 30)
+    again = Session.opened(load_session(Path(saved(session, tmp_path))))
+    curve = again.lanes[0].curve
+    assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
+    assert curve.at(2.0) == pytest.approx(1.0, abs=1e-3)
