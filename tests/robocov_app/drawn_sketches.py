@@ -216,7 +216,6 @@ def changes(draw, sketch):
         lambda: vertices.extended(sketch, handles[0], a) if handles else None,
         lambda: vertices.deleted(sketch, selection),
         lambda: vertices.bevelled(sketch, selection, length),
-        lambda: vertices.bevelled(sketch, selection, 0.05, segments=4),
         lambda: vertices.rounded_off(sketch, selection, length),
         lambda: vertices.hole_filled(sketch, key, 1) if key in sketch.places else None,
         lambda: vertices.split(sketch, handles[0]) if handles else None,
@@ -231,9 +230,7 @@ def changes(draw, sketch):
         lambda: simplify.simplified(sketch, selection, length),
         lambda: simplify.straightened(sketch, selection, 20.0),
         lambda: transform.aligned(sketch, selection, side),
-        lambda: transform.aligned(sketch, selection, side, to_boundary=True),
         lambda: transform.distributed(sketch, selection, axis),
-        lambda: transform.distributed(sketch, selection, axis, gap=0.5),
         lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),
     ]
     try:

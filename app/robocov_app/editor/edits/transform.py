@@ -171,16 +171,10 @@ def scaled(
     return _change(sketch, selection, affine, "scaled")
 
 
-def resized(
-    sketch: Sketch,
-    selection: Selection,
-    width: float | None,
-    height: float | None,
-    about: Point | None = None,
-) -> Change:
+def resized(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
     """Scale what is selected so that its bounding box is so many metres wide and high.
 
-    None keeps the proportions by the other. `about` stays where it is: by default the lower left corner.
+    None keeps the proportions by the other. The lower left corner stays where it is.
     """
     bounds = _bounds(sketch, selection)
     now = bounds[2] - bounds[0], bounds[3] - bounds[1]
@@ -189,7 +183,7 @@ def resized(
             raise MapError(f"a {name} from {1000 * SMALLEST:g} mm to {LARGEST / 1000:g} km was wanted")
         if wanted is not None and there < SMALLEST:
             raise MapError(f"it has no {name} that could be scaled")
-    fixed = (bounds[0], bounds[1]) if about is None else about
+    fixed = bounds[0], bounds[1]
     if width is None or height is None:
         if width is None and height is None:
             raise MapError("a width or a height was wanted")
@@ -204,10 +198,8 @@ def resized(
         off = width - (box[2] - box[0]), height - (box[3] - box[1])
         if max(map(abs, off)) <= 2e-4:
             # what is put at its corner is there to the tenth of a millimetre
-            if about is None:
-                shift = Affine.shift(bounds[0] - box[0], bounds[1] - box[1])
-                change = replace(change, sketch=_placed(change.sketch, change.selection, shift))
-            return change
+            shift = Affine.shift(bounds[0] - box[0], bounds[1] - box[1])
+            return replace(change, sketch=_placed(change.sketch, change.selection, shift))
         fx, fy = max(fx + off[0] / now[0], 1e-9), max(fy + off[1] / now[1], 1e-9)
     raise MapError("it cannot get that size: walls keep their width when width and height change apart")
 
@@ -218,19 +210,13 @@ def placed(sketch: Sketch, selection: Selection, x: float | None, y: float | Non
     return moved(sketch, selection, 0.0 if x is None else x - low_x, 0.0 if y is None else y - low_y)
 
 
-def mirrored(sketch: Sketch, selection: Selection, axis: str, at: float | None = None) -> Change:
-    """Mirror what is selected: axis "x" swaps left and right about the vertical line x = at, "y" up and down.
-
-    By default about the middle of its bounding box.
-    """
-    middle = _middle(sketch, selection)
-    if axis == "x":
-        affine = Affine(xx=-1.0, x0=2.0 * (middle[0] if at is None else at))
-    elif axis == "y":
-        affine = Affine(yy=-1.0, y0=2.0 * (middle[1] if at is None else at))
-    else:
+def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
+    """Mirror what is selected about the middle of its box: axis "x" swaps left and right, "y" up and down."""
+    x, y = _middle(sketch, selection)
+    ways = {"x": Affine(xx=-1.0, x0=2.0 * x), "y": Affine(yy=-1.0, y0=2.0 * y)}
+    if axis not in ways:
         raise MapError("an axis x or y was wanted")
-    return _change(sketch, selection, affine, "mirrored")
+    return _change(sketch, selection, ways[axis], "mirrored")
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
@@ -260,8 +246,8 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
     return Change(after, everything, f"{whole.words(sketch)} copied into {columns} × {rows}")
 
 
-def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bool = False) -> Change:
-    """Align the selected obstacles and starts with the side of their common bounding box, or the boundary's.
+def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
+    """Align the selected obstacles and starts with the side of their common bounding box.
 
     The boundary itself stays: when it is selected too, the others align with it. Of single vertices alone:
     gives them the same x or y.
@@ -277,7 +263,7 @@ def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bo
         new = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
         return Change(with_places(sketch, new), selection, f"{selection.words(sketch)} aligned {words}")
     boxes = _boxes(sketch, selection)
-    if to_boundary or selection.boundary:
+    if selection.boundary:
         frame = box_of(sketch, BOUNDARY)
         if frame is None:
             raise MapError("there is no boundary to align with")
@@ -292,21 +278,16 @@ def aligned(sketch: Sketch, selection: Selection, side: Side, *, to_boundary: bo
     return Change(_each_moved(sketch, by), selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
 
 
-def distributed(sketch: Sketch, selection: Selection, axis: Axis, *, gap: float | None = None) -> Change:
-    """Spread three or more selected things so that the gaps between their boxes are equal.
-
-    The first and the last stay where they are; with a `gap` in metres, the first only.
-    """
+def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
+    """Spread three or more selected things, with equal gaps between their boxes; first and last stay."""
     if axis not in ("x", "y"):
         raise MapError("an axis x or y was wanted")
     a = ("x", "y").index(axis)
     boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
-    if len(boxes) < (3 if gap is None else 2):
-        count = "three" if gap is None else "two"
-        raise MapError(f"select {count} or more obstacles or starts to distribute")
-    if gap is None:
-        room = boxes[-1][1][a + 2] - boxes[0][1][a]
-        gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
+    if len(boxes) < 3:
+        raise MapError("select three or more obstacles or starts to distribute")
+    room = boxes[-1][1][a + 2] - boxes[0][1][a]
+    gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
     by: dict[Owner, Point] = {}
     low = boxes[0][1][a]
     for owner, box in boxes:

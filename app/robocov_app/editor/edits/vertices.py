@@ -175,20 +175,15 @@ def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
 # corners cut off and rounded
 
 
-def bevelled(sketch: Sketch, selection: Selection, length: float, *, segments: int = 1) -> Change:
-    """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none.
-
-    With more segments they are rounded, by the arc that touches both edges there.
-    """
+def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
+    """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none."""
     if not (math.isfinite(length) and length > 0.0):
         raise MapError("a bevel needs a length above 0 m")
-    if not 1 <= segments <= _MOST_SEGMENTS:
-        raise MapError(f"1 to {_MOST_SEGMENTS} segments were wanted")
-    return _cut(sketch, selection, lambda turn: (length, segments), "bevelled")
+    return _cut(sketch, selection, lambda turn: (length, 1), "bevelled")
 
 
 def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Round the selected corners with a radius in metres, to a millimetre."""
+    """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
     if not (math.isfinite(radius) and radius > 0.0):
         raise MapError("a radius above 0 m was wanted")
 
