@@ -19,7 +19,7 @@ from robocov_app.terminal.output import finite, write_json
 HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
 """A name that would like to be more than a name."""
 
-LABELS = {"rapf": "RAPF", "rpf": "RPF", "lloyd": "LA"}
+LABELS = {"rapf": "RAPF", "rpf": "RPF", "lloyd": "Lloyd"}
 
 
 def walk(

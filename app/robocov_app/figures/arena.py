@@ -10,7 +10,7 @@ from robocov.arrays import Array, BoolArray
 from robocov_app.figures.page import tone
 from robocov_app.render.density import density_words, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
-from robocov_app.render.scene import CENTROID, GOAL, are_centroids
+from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
 _START, _AIM = 6.2, 8.0
 """Sizes of marks where they have room, in points."""
 
+
+_ARROW = 16.0
+"""Length of the arrow on an obstacle that moves, in points."""
 
 _DOTS = 400
 """Dots of the shading of a density along the longer side of a map."""
@@ -48,8 +51,10 @@ def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
     axes.set_facecolor(tone(theme.background))
 
 
-def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: bool = True) -> None:
-    """Draw the obstacles, what of the region lies outside the boundary, and the region's outline.
+def draw_map(
+    axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
+) -> None:
+    """Draw the obstacles at a time, s, what of the region is outside the boundary, and its outline.
 
     Where places do not count all the same, how much they count is a shading below; without `density` not.
     """
@@ -58,7 +63,7 @@ def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: boo
 
     if density:
         _draw_density(axes, environment, theme)
-    for part in environment.blocked.geoms:
+    for part in environment.at(time).blocked.geoms:
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
         axes.add_patch(
@@ -70,6 +75,8 @@ def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: boo
                 zorder=2,
             )
         )
+    for obstacle in moving_obstacles(environment, time):
+        _draw_motion(axes, environment, obstacle, theme)
     axes.add_patch(
         Polygon(
             environment.region.vertices,
@@ -81,6 +88,34 @@ def draw_map(axes: Axes, environment: Environment, theme: Theme, *, density: boo
             clip_on=False,
             zorder=3,
         )
+    )
+
+
+def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
+    """Draw the path of a moving obstacle, its shape in a colour of its own, and an arrow where it heads."""
+    from matplotlib.patches import Polygon
+
+    region = Polygon(environment.region.vertices, transform=axes.transData)
+    shape = Polygon(
+        np.asarray(obstacle.polygon.exterior.coords),
+        facecolor=tone(theme.moving_obstacle) if not obstacle.polygon.interiors else "none",
+        edgecolor=tone(theme.obstacle_edge),
+        linewidth=1.4,
+        zorder=2.1,
+    )
+    axes.add_patch(shape)
+    shape.set_clip_path(region)
+    ink = tone(theme.ink)
+    axes.plot(*obstacle.path.T, color=ink, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2.2)
+    half = 0.5 * _ARROW * obstacle.heading
+    origin, one = _in_points(axes, np.eye(2)[::-1])
+    half /= abs(float(one[0] - origin[0]))
+    axes.annotate(
+        "",
+        xy=(obstacle.middle + half).tolist(),
+        xytext=(obstacle.middle - half).tolist(),
+        arrowprops={"arrowstyle": "-|>", "color": ink, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0},
+        zorder=2.3,
     )
 
 
@@ -108,7 +143,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     """Draw map, final cells, trajectories, starts, final positions and where robots head."""
     from matplotlib.collections import LineCollection, PolyCollection
 
-    draw_map(axes, record.environment.at(float(record.time[-1])), theme)
+    draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
     cells = record.cells()
@@ -268,6 +303,21 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
                 edgecolor=tone(theme.obstacle_edge),
                 linewidth=0.8,
                 label="obstacle (unknown to robots)",
+            )
+        )
+    if environment.moves:
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=tone(theme.ink),
+                linewidth=0.8,
+                linestyle=(0, (4, 3)),
+                marker="s",
+                markersize=7.0,
+                markerfacecolor=tone(theme.moving_obstacle),
+                markeredgecolor=tone(theme.obstacle_edge),
+                label="moving obstacle and its path",
             )
         )
     words = density_words(environment) if density else ""

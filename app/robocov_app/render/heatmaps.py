@@ -161,7 +161,7 @@ class Distances(_Picture):
     """How far every place is from the nearest robot, around obstacles, as colours."""
 
     name = "distances"
-    title = "Distance to the nearest robot"
+    title = "Distance map"
 
     def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
         # smooth as it is, every second pixel will do
@@ -230,7 +230,7 @@ class ColourBar(Layer):
     """The scale of the colours of `Distances`, at the right."""
 
     name = "colour_bar"
-    title = "Scale of colours"
+    title = "Colour scale"
     in_world = False
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:

@@ -175,7 +175,7 @@ class SensedObstacles(Layer):
     """
 
     name = "sensed"
-    title = "Known of obstacles"
+    title = "Known obstacles"
     default = False
 
     def __init__(self) -> None:
@@ -260,7 +260,7 @@ class SensedObstacles(Layer):
             dots = np.column_stack([x + half * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
             _dots(canvas, dots, _DOT * canvas.scale, self._colour(canvas))
 
-        return [LegendEntry("sensed of the obstacles", glyph)]
+        return [LegendEntry(self.title.lower(), glyph)]
 
     @staticmethod
     def _colour(canvas: Canvas) -> Colour:

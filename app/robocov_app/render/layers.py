@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from robocov_app.render import sprites
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import Canvas, Sprite, premultiplied
 from robocov_app.render.layout import fitted_radii, mark_size
-from robocov_app.render.scene import Scene
+from robocov_app.render.scene import MovingObstacle, Scene
 from robocov_app.render.theme import Colour, mix
 
 READABLE = 9.0
@@ -229,14 +230,39 @@ class Obstacles(Layer):
                 rings.append(inner)
         for corners in rings:
             own.outline(corners, canvas.theme.obstacle_edge, canvas.width(canvas.theme.line))
+        for obstacle in scene.moving:
+            self._draw_motion(own, scene.environment.region.polygon, obstacle)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    @staticmethod
+    def _draw_motion(canvas: Canvas, region: shapely.Polygon, obstacle: MovingObstacle) -> None:
+        """Draw the path of a moving obstacle, its shape, and an arrow where it heads."""
+        theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
+        for part in shapely.get_parts(shapely.intersection(obstacle.polygon, region)):
+            if not isinstance(part, shapely.Polygon):
+                continue
+            corners = camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+            if not part.interiors:
+                canvas.polygon(corners, (*theme.moving_obstacle, 255))
+            canvas.outline(corners, theme.obstacle_edge, 2 * width)
+        for start, end in pairwise(camera.to_pixels(obstacle.path).tolist()):
+            canvas.dashes(start, end, theme.ink, width)
+        middle = camera.to_pixels(obstacle.middle)
+        along = 11.0 * canvas.scale * obstacle.heading * np.array([1.0, -1.0])
+        canvas.arrow((middle - along).tolist(), (middle + along).tolist(), theme.ink, 2.0 * canvas.scale)
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 
+        def moving(canvas: Canvas, x: float, y: float) -> None:
+            canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+            half = 10.0 * canvas.scale
+            canvas.arrow((x - half, y), (x + half, y), canvas.theme.ink, 1.6 * canvas.scale)
+
         found = not scene.environment.blocked.is_empty
-        return [LegendEntry("obstacle (unknown to robots)", glyph)] if found else []
+        entries = [LegendEntry("obstacle (unknown to robots)", glyph)] if found else []
+        return [*entries, LegendEntry("moving obstacle and its path", moving)] if scene.moving else entries
 
 
 class Boundary(Layer):

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
+import shapely.affinity
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
@@ -95,6 +97,36 @@ class Sensed:
         self._count += 1
 
 
+class MovingObstacle(NamedTuple):
+    """An obstacle at one moment: its shape, the path of its middle, (k, 2) m, and its heading, (2,)."""
+
+    polygon: shapely.Polygon
+    middle: Array
+    path: Array
+    heading: Array
+
+
+def moving_obstacles(environment: Environment, time: float) -> list[MovingObstacle]:
+    """Return the moving obstacles of a map at a time, s; the path of a loop ends where it begins."""
+    found = []
+    for obstacle in environment.obstacles:
+        if (path := obstacle.path) is None:
+            continue
+        shift = path.shift(time)
+        ahead = path.shift(time + 1e-3 * min(path.period, 1.0)) - shift
+        middle = np.array(obstacle.polygon.envelope.centroid.coords[0])
+        points = [*path.points, *(path.points[:1] if path.repeat == "loop" else ())]
+        found.append(
+            MovingObstacle(
+                shapely.affinity.translate(obstacle.polygon, *shift.tolist()),
+                middle + shift,
+                np.array(points) - points[0] + middle,
+                ahead / max(float(np.hypot(*ahead)), 1e-12),
+            )
+        )
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """What is drawn; what is None is left out.
@@ -163,6 +195,7 @@ class Scene:
     sensed: Sensed | None = None
     path: Array | None = None
     cell_owners: IntArray | None = None
+    moving: Sequence[MovingObstacle] = ()
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
 
     def failed_radius(self, number: int) -> float:
@@ -193,11 +226,13 @@ class Scene:
         field: Field | None = None,
         field_limit: float = 1.0,
     ) -> Scene:
-        """Return the scene of `snapshot` with the Voronoi cells of all its robots.
+        """Return the scene of `snapshot` with all robots' Voronoi cells, and obstacles where they are then.
 
         The cells that the law used are taken where they are these: not where communication is limited, or
         messages are late or get lost, since they overlap there, nor where a user's law says something else.
         """
+        moving = moving_obstacles(environment, snapshot.time)
+        environment = environment.at(snapshot.time)
         cells = snapshot.decision.cells
         if (
             not isinstance(cells, (VoronoiPartition, WeightedCells))
@@ -226,6 +261,7 @@ class Scene:
             field,
             field_limit,
             cell_owners=owners,
+            moving=moving,
         )
 
 
@@ -243,7 +279,7 @@ def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | N
     fields : Fields or None
         What is known of the distances to the nearest robot, where they are shown.
     """
-    environment = record.environment.at(float(record.time[row]))
+    environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team
     starts, trail = record.positions[0], record.positions[: row + 1]
     more: dict[str, Any] = {}
@@ -255,7 +291,8 @@ def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | N
             "failed": {robot + 1: tuple(snapshot.positions[robot].tolist()) for robot in failed},
         }
         if not len(rows):
-            return Scene(environment, team, label=record.label, cost=cost, **more)
+            moving = moving_obstacles(environment, time)
+            return Scene(environment.at(time), team, moving=moving, label=record.label, cost=cost, **more)
         snapshot, team = snapshot_of(snapshot, rows), team[rows]
         began = np.argmax(record.present, axis=0)
         starts = record.positions[began, np.arange(len(began))][rows]

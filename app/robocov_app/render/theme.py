@@ -132,6 +132,11 @@ class Theme:
     boundary_line: float = 2.0
     arrow_line: float = 2.0
 
+    @property
+    def moving_obstacle(self) -> Colour:
+        """The fill of obstacles that move: paler than that of static ones."""
+        return mix(self.obstacle, self.background, 0.5)
+
     def cell(self, hue: int) -> Colour:
         """Return the fill of a cell of the hue with index `hue`."""
         return mix(self.background, self.robots[hue], self.tint)

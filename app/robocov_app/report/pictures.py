@@ -13,6 +13,7 @@ import shapely
 
 from robocov_app.render.density import density_words
 from robocov_app.render.layout import fitted_radii, mark_size
+from robocov_app.render.scene import MovingObstacle, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
 from robocov_app.report.density_picture import density_picture
 from robocov_app.report.embedding import has_path, lives
@@ -55,7 +56,7 @@ class Frame:
 def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
     """Return a picture of a map as an SVG element, with its facts as its text."""
     frame = Frame(environment, width, height)
-    return _svg(frame, _map_shapes(environment, frame), map_sentence(environment))
+    return _svg(frame, _map_shapes(environment, frame, 0.0), map_sentence(environment))
 
 
 def run_picture(
@@ -83,7 +84,7 @@ def run_picture(
             hue = hues[working[int(owner)]]
             if len(cell) > 2:
                 parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')
-    parts.append(_map_shapes(record.environment.at(float(record.time[-1])), frame))
+    parts.append(_map_shapes(record.environment, frame, float(record.time[-1])))
     tracks = np.moveaxis(frame.at(record.positions), 1, 0)
     if has_path(record) and n <= MOST_ROBOTS:
         # before it joins, a robot goes nowhere
@@ -140,7 +141,9 @@ def map_sentence(environment: Environment) -> str:
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
     count = len(environment.obstacles)
     weighed = density_words(environment)
+    moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
+    obstacles += f" ({moving} moving)" if moving else ""
     return (
         f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m {obstacles}, "
         f"{environment.free_area:.4g} m² free, {blocked:.0f} % of the known region blocked"
@@ -180,16 +183,38 @@ def _svg(frame: Frame, content: str, sentence: str | None) -> str:
     )
 
 
-def _map_shapes(environment: Environment, frame: Frame) -> str:
+def _map_shapes(environment: Environment, frame: Frame, time: float) -> str:
     region = _path([frame.at(environment.region.vertices)], closed=True)
-    blocked = shapely.simplify(environment.blocked, _FINE / frame.zoom)
+    blocked = shapely.simplify(environment.at(time).blocked, _FINE / frame.zoom)
     rings = [
         frame.at(np.asarray(ring.coords)[:-1])
         for part in shapely.get_parts(blocked)
         for ring in (part.exterior, *part.interiors)
     ]
     shapes = f'<path class="blocked" d="{_path(rings, closed=True)}"/>' if rings else ""
+    for obstacle in moving_obstacles(environment, time):
+        shapes += _motion(obstacle, environment, frame)
     return f'{_density_image(environment, frame)}{shapes}<path class="region" d="{region}"/>'
+
+
+def _motion(obstacle: MovingObstacle, environment: Environment, frame: Frame) -> str:
+    """Return a moving obstacle: its shape, its path as a dashed line, and an arrow where it heads."""
+    seen = shapely.get_parts(shapely.intersection(obstacle.polygon, environment.region.polygon))
+    rings = [
+        frame.at(np.asarray(ring.coords)[:-1])
+        for part in seen
+        if isinstance(part, shapely.Polygon)
+        for ring in (part.exterior, *part.interiors)
+    ]
+    along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
+    across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)
+    arrow = [middle - along, middle + along]
+    head = [middle + 0.2 * along + across, middle + along, middle + 0.2 * along - across]
+    return (
+        f'<path class="blocked moving" d="{_path(rings, closed=True)}"/>'
+        f'<path class="motion" d="{_path([frame.at(obstacle.path)])}"/>'
+        f'<path class="heading" d="{_path([np.array(arrow), np.array(head)])}"/>'
+    )
 
 
 def _density_image(environment: Environment, frame: Frame) -> str:

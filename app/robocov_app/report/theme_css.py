@@ -34,6 +34,7 @@ def named_colours(theme: Theme) -> dict[str, Colour]:
         "boundary": theme.boundary,
         "obstacle": theme.obstacle,
         "obstacle-edge": theme.obstacle_edge,
+        "moving-obstacle": theme.moving_obstacle,
         "cell-edge": theme.cell_edge,
         "start": theme.start,
         "final": theme.final,

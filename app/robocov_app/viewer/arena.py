@@ -205,7 +205,7 @@ class Arena:
         cost = "" if known is None else cost_words(what, known.result.mean_distance, known.travel_time)
         starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
         scene = Scene.of(
-            circumstances.environment.at(snapshot.time),
+            circumstances.environment,
             team,
             snapshot,
             starts=starts,

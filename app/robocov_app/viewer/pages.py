@@ -25,14 +25,11 @@ NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection
 """Layers without a check box: a picture without them is no use; they have keys all the same."""
 
 _SHORT = {
-    "Distance to the nearest robot": "Distance map",
     "Nearest obstacle points": "Nearest obstacle",
     "Repulsion from robots": "Repulsion: robots",
     "Repulsion from obstacle": "Repulsion: wall",
     "Path from the cursor": "Path from cursor",
     "Communication range": "Comm. range",
-    "Scale of colours": "Colour scale",
-    "Known of obstacles": "Known obstacles",
 }
 
 _ROW = 27

@@ -234,7 +234,7 @@ def law_labels(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]
         Those at work, which may be of a saved run: they are not loaded.
 
     >>> law_labels(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
-    {'rapf': 'RAPF', 'lloyd': 'LA', 'theirs.py:Mine': 'Mine'}
+    {'rapf': 'RAPF', 'lloyd': 'Lloyd', 'theirs.py:Mine': 'Mine'}
     """
     found: dict[str, str] = {}
     for name in dict.fromkeys([*names, *shown]):

@@ -26,7 +26,7 @@ class Lloyd(Law):
     """
 
     name = "lloyd"
-    label = "LA"
+    label = "Lloyd"
     summary = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
 
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.voronoi import partition
@@ -390,3 +391,19 @@ def test_names_are_words_whatever_is_in_them(name, tmp_path):
 )
 def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
     assert end_label(("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan])), unit) == words
+
+
+def test_moving_obstacles_have_an_arrow_a_path_and_a_legend_entry():
+    cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
+    plain = Environment("hall", ((0, 0), (8, 0), (8, 6), (0, 6)), (CircleObstacle((6, 3), 0.8),))
+    moving = replace(plain, obstacles=(*plain.obstacles, cart))
+    label = "moving obstacle and its path"
+    words = [
+        [text.get_text() for text in plot_environment(each).legends[0].get_texts()]
+        for each in (plain, moving)
+    ]
+    assert label not in words[0]
+    assert label in words[1]
+    axes = plot_environment(moving).axes[0]
+    assert any(np.allclose(line.get_xydata()[0], (1, 1)) for line in axes.lines)
+    assert [text.arrow_patch is not None for text in axes.texts] == [True]

@@ -173,10 +173,10 @@ class TestSensedObstacles:
         scene = replace(scene, numbers=(1, 7, 3, 9))
         frame, painter = drawn(scene, "obstacles", "sensed")
         assert dots(frame, painter) == [False, True, False]
-        assert painter.legend(scene)[-1] == "sensed of the obstacles"
+        assert painter.legend(scene)[-1] == "known obstacles"
         frame = painter.frame(replace(scene, selected=None)).astype(int)
         assert dots(frame, painter) == [True, True, True]
-        assert painter.legend(replace(scene, selected=None))[-1] == "sensed of the obstacles"
+        assert painter.legend(replace(scene, selected=None))[-1] == "known obstacles"
 
     def test_points_come_and_go_with_time(self):
         record = run_of(ROOMS, 4)

@@ -8,14 +8,14 @@ import shapely
 from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 
-from robocov.environment import Environment, PolygonObstacle, UniformStart
+from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
 from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers import drawn_radii
 from robocov_app.render.picture import Painter, standard_layers
-from robocov_app.render.scene import Scene
+from robocov_app.render.scene import Scene, moving_obstacles
 from robocov_app.render.theme import DARK, LIGHT, readable_on, robot_hues
 from robocov_app.render.trajectories import Trajectories
 
@@ -409,3 +409,41 @@ class TestTrajectories:
         assert nearest(frame, old, LIGHT.background, reach=2) == 0
         assert (frame[int(old[1]) - 2 : int(old[1]) + 3, int(old[0]) - 2 : int(old[0]) + 3] == 255).all()
         assert nearest(frame, new, LIGHT.robots[0]) < 110
+
+
+class TestMovingObstacles:
+    CARTS = Environment(
+        "carts",
+        ((0, 0), (8, 0), (8, 6), (0, 6)),
+        (
+            CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1), (5, 4)), 1.0)),
+            CircleObstacle((6, 3), 0.8),
+        ),
+    )
+
+    def scene(self, time: float) -> Scene:
+        return Scene(self.CARTS.at(time), Team.homogeneous(1), moving=moving_obstacles(self.CARTS, time))
+
+    def test_know_where_they_are_and_head(self):
+        (cart,) = moving_obstacles(self.CARTS, 6.0)
+        assert cart.middle == pytest.approx([5.0, 3.0])
+        assert cart.heading == pytest.approx([0.0, 1.0])
+        assert cart.path.tolist() == pytest.approx(np.array([[1, 1], [5, 1], [5, 4], [1, 1]]))
+        assert moving_obstacles(self.CARTS.static, 6.0) == []
+
+    @pytest.mark.parametrize("theme", [LIGHT, DARK])
+    def test_look_different_from_static_ones(self, theme):
+        painter = Painter(self.CARTS, (480, 360), theme)
+        frame = painter.frame(self.scene(2.0))
+
+        def at(x, y):
+            column, row = painter.camera.to_pixels(np.array([x, y])).round().astype(int)
+            return tuple(frame[row, column].tolist())
+
+        assert at(6.0, 3.3) == theme.obstacle
+        assert at(3.0, 1.3) == theme.moving_obstacle != theme.obstacle
+        assert np.abs(np.subtract(at(3.0, 1.0), theme.ink)).max() < 5  # the arrow
+        assert painter.legend(self.scene(2.0))[-1] == "moving obstacle and its path"
+        assert not any(
+            "moving" in words for words in painter.legend(Scene(self.CARTS.static, Team.homogeneous(1)))
+        )

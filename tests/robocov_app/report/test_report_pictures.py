@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
+from robocov.environment import CircleObstacle, ObstaclePath
 from robocov_app.report.pictures import MOST_ROBOTS, Frame, _path, map_picture, run_picture
 
 
@@ -108,3 +109,12 @@ def test_a_very_large_team_makes_no_very_large_picture() -> None:
     root = drawn(run_picture(record, None))
     assert not of_class(root, "cell") and not of_class(root, "way")
     assert len(of_class(root, "robot")) == MOST_ROBOTS + 1
+
+
+def test_moving_obstacles_are_drawn_apart():
+    cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
+    plain = map_picture(ROOMS)
+    assert "moving" not in plain
+    moving = map_picture(replace(ROOMS, obstacles=(cart,)))
+    assert all(f'class="{each}"' in moving for each in ("blocked moving", "motion", "heading"))
+    assert "with one obstacle (1 moving)" in moving

@@ -54,7 +54,7 @@ def test_a_branch_leaves_a_ghost():
     assert session.branch()
     assert session.serial == serial + 1
     assert [ghost.law for ghost in session.ghosts] == ["rapf", "lloyd"]
-    assert [ghost.words for ghost in session.ghosts] == ["RAPF", "LA"]
+    assert [ghost.words for ghost in session.ghosts] == ["RAPF", "Lloyd"]
     for ghost in session.ghosts:
         assert ghost.time[0] == pytest.approx(0.5)
         assert ghost.time[-1] == pytest.approx(59 / 60)
@@ -151,4 +151,4 @@ def test_a_slider_that_is_dragged_is_one_event():
     session.set_limits(Limits(max_speed=3.0))
     session.set_law(session.lanes[0], LLOYD)
     session.set_law(session.lanes[1], LLOYD)
-    assert [event.text for event in session.events][3:] == ["limits changed", *["LA takes over"] * 2]
+    assert [event.text for event in session.events][3:] == ["limits changed", *["Lloyd takes over"] * 2]

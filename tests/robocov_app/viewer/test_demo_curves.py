@@ -84,6 +84,6 @@ def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
 
 
 def test_events_and_ghosts_say_what_they_are():
-    assert Event(1.0, "law", "LA takes over") == Event(1.0, "law", "LA takes over")
+    assert Event(1.0, "law", "Lloyd takes over") == Event(1.0, "law", "Lloyd takes over")
     ghost = Ghost("rapf", "RAPF", np.zeros(2), np.ones(2))
     assert (ghost.law, ghost.words, len(ghost.time)) == ("rapf", "RAPF", 2)

@@ -38,7 +38,7 @@ class Mine:
 class TestLaw:
     def test_its_controller(self):
         assert Law("rapf", {"k_rep": 0.3}).made() == make_controller("rapf", {"k_rep": 0.3})
-        assert [law.label for law in (RAPF, RPF, LLOYD)] == ["RAPF", "RPF", "LA"]
+        assert [law.label for law in (RAPF, RPF, LLOYD)] == ["RAPF", "RPF", "Lloyd"]
 
     def test_its_gains(self):
         law = Law("rapf", {"k_rep": 0.7})

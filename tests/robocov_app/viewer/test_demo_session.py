@@ -145,7 +145,7 @@ def test_another_controller_takes_over_in_one_pane():
     session.set_law(session.lanes[1], LLOYD)
     assert [lane.law for lane in session.lanes] == [RAPF, LLOYD]
     assert session.scenario.laws == (RAPF, LLOYD)
-    assert session.events[-1].text == "LA takes over"
+    assert session.events[-1].text == "Lloyd takes over"
     session.set_law(session.lanes[0], RAPF.with_gain("k_rep", 0.5))
     assert session.events[-1].text == "RAPF: k_rep = 0.5"
     assert len(session.history) == 21

@@ -22,7 +22,7 @@ def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     driver.choose("law:0", "RPF")
     assert driver.session.lanes[0].law.name == "rpf"
     assert driver.window.panel.widgets.find("entry", "k_att") is None
-    driver.choose("law:0", "LA")
+    driver.choose("law:0", "Lloyd")
     assert driver.session.lanes[0].law.name == "lloyd"
 
 

@@ -1,7 +1,7 @@
 // One moment of a run, drawn on a canvas.
 
 const COLOURS = [
-  "background", "panel", "ink", "faint", "grid", "line", "boundary", "obstacle", "obstacle-edge", "cell-edge", "start",
+  "background", "panel", "ink", "faint", "grid", "line", "boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start",
   "final", "on-final", "trajectory", "ring", "rapf", "rpf", "lloyd", "other-0", "other-1", "other-2",
   ...Array.from({ length: 9 }, (_, k) => `cell-${k}`),
 ];
@@ -122,7 +122,7 @@ function drawArena(canvas, run, time, look, show) {
     context.fill(path, "evenodd");
     context.stroke(path);
   }
-  drawMovers(context, run, time, frame, region);
+  drawMovers(context, run, time, frame, region, look);
   context.lineWidth = 2;
   context.strokeStyle = look.boundary;
   context.stroke(region);
@@ -135,16 +135,45 @@ function drawArena(canvas, run, time, look, show) {
 }
 
 /** Obstacles that move, where they are; what sticks out of the region is not seen. */
-function drawMovers(context, run, time, frame, region) {
+function drawMovers(context, run, time, frame, region, look) {
   if (!run.plan.movers.length) return;
   context.save();
   context.clip(region);
   for (const mover of run.plan.movers) {
     const [dx, dy] = shiftOf(mover, (run.begin ?? 0) + Math.min(time, run.end));
     const path = traced(frame, mover.rings.map((ring) => ring.map((value, k) => value + (k % 2 ? dy : dx))));
+    context.lineWidth = 2;
+    context.fillStyle = look["moving-obstacle"];
     context.fill(path, "evenodd");
     context.stroke(path);
+    context.fillStyle = look.obstacle;
   }
+  context.restore();
+  for (const mover of run.plan.movers) drawMotion(context, mover, (run.begin ?? 0) + Math.min(time, run.end), frame, look);
+}
+
+/** The path of a moving obstacle's middle, dashed, and an arrow where it heads. */
+function drawMotion(context, mover, time, frame, look) {
+  const { line, rings } = mover;
+  const [xs, ys] = [0, 1].map((axis) => rings[0].filter((_, k) => k % 2 === axis));
+  const middle = [xs, ys].map((values) => (Math.min(...values) + Math.max(...values)) / 2);
+  const [now, next] = [time, time + 1e-3].map((moment) => shiftOf(mover, moment));
+  context.save();
+  context.strokeStyle = look.ink;
+  context.lineWidth = 1;
+  context.setLineDash([5, 4]);
+  context.beginPath();
+  for (let k = 0; k < line.length; k += 2) {
+    context.lineTo(frame.x(middle[0] + line[k] - line[0]), frame.y(middle[1] + line[k + 1] - line[1]));
+  }
+  context.stroke();
+  context.setLineDash([]);
+  context.lineWidth = 2;
+  context.translate(frame.x(middle[0] + now[0]), frame.y(middle[1] + now[1]));
+  context.rotate(Math.atan2(now[1] - next[1], next[0] - now[0]));
+  context.beginPath();
+  for (const [x, y] of [[-9, 0], [9, 0], [3, -4], [9, 0], [3, 4]]) context.lineTo(x, y);
+  context.stroke();
   context.restore();
 }
 
