@@ -39,6 +39,11 @@ def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
         return kind(), f"{file} could not be read: default settings"
 
 
+def changed_settings(before: Kept, opened: Kept, closed: Kept) -> Kept:
+    """Return settings with what was changed in the window, not with what options asked for this time."""
+    return before.model_copy(update={name: value for name, value in closed if value != getattr(opened, name)})
+
+
 def save_settings(settings: BaseModel, file: Path | None) -> str:
     """Write the settings, whole or not at all; return what to tell if that failed."""
     if file is None:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
 from robocov_app.toolkit.autosave import autosave_folder
+from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.viewer.actions import KEY_REPEAT
 from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.workspace import recoverable
-from robocov_app.viewer.settings import Settings, load_settings, save_settings, settings_file
+from robocov_app.viewer.settings import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -112,6 +113,7 @@ class Opening:
         self.session, self.map_name, self.folder = session, map_name, folder
         self.theme, self.size, self.scale = theme, size, scale
         self.also, self.without = also, without
+        self._only_now = self._not_now = frozenset[str]()
         self.headless, self.laws, self.lattice, self.file = headless, laws, lattice, file
 
     @contextmanager
@@ -127,15 +129,16 @@ class Opening:
         try:
             with display(headless=self.headless):
                 file = None if self.headless else settings_file()
-                settings, trouble = load_settings(file)
+                settings, trouble = loaded(Settings, file)
                 window = self._opened(settings)
                 window.desk.say(trouble)
                 if not self.headless and (left := recoverable(autosave_folder())):
                     window.desk.say(f"{left[0].words}: Ctrl K, “recover” opens it")
-                keeper = window.keeper
+                keeper, begun = window.keeper, self._settings_of(window, settings)
                 try:
                     yield window
-                    save_settings(settings_of(window, settings, self.scale), file)
+                    ended = self._settings_of(window, settings)
+                    save_settings(changed_settings(settings, begun, ended), file)
                 finally:
                     window.desk.workspace.close()
                     window.desk.costs.close()
@@ -155,6 +158,7 @@ class Opening:
         shown = {layer.name for layer in layers if layer.default}
         if settings.shown is not None:
             shown = {layer.name for layer in layers} & set(settings.shown)
+        self._only_now, self._not_now = self.also - shown, self.without & shown
         shown = (shown | self.also) - self.without
         size = self.size or (settings.width, settings.height)
         scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
@@ -175,6 +179,21 @@ class Opening:
         window.panel.show_tab(settings.tab)
         return window
 
+    def _settings_of(self, window: Window, before: Settings) -> Settings:
+        """Return how a window looks, but for layers that options showed or hid."""
+        from robocov_app.viewer.panel import TABS
+
+        width, height = window.windowed or window.screen.get_size()
+        changes = {
+            "theme": window.desk.theme,
+            "fade": window.desk.fade,
+            "shown": tuple(sorted((window.desk.shown - self._only_now) | self._not_now)),
+            "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
+            "width": min(max(width, 900), 7680),
+            "height": min(max(height, 600), 4320),
+        }
+        return before.model_copy(update=changes)
+
 
 def fitting(size: tuple[int, int]) -> tuple[int, int]:
     """Return the size, or what of it the desktop has room for."""
@@ -182,21 +201,3 @@ def fitting(size: tuple[int, int]) -> tuple[int, int]:
 
     wide, high = max(pygame.display.get_desktop_sizes(), default=size)
     return min(size[0], wide), min(size[1], high)
-
-
-def settings_of(window: Window, before: Settings, scale: float | None) -> Settings:
-    """Return what is worth remembering of a window."""
-    from robocov_app.viewer.panel import TABS
-
-    width, height = window.windowed or window.screen.get_size()
-    changes = {
-        "theme": window.desk.theme,
-        "fade": window.desk.fade,
-        "shown": tuple(sorted(window.desk.shown)),
-        "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
-        "width": min(max(width, 900), 7680),
-        "height": min(max(height, 600), 4320),
-    }
-    if scale is not None:
-        changes["scale"] = scale
-    return before.model_copy(update=changes)

@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
-from robocov.errors import OutputError
-from robocov.files.atomic import written
-
-FOLDER = "ROBOCOV_SETTINGS"
-"""Environment variable with another folder for the settings; empty for none."""
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class Settings(BaseModel):
@@ -27,46 +19,3 @@ class Settings(BaseModel):
     shown: tuple[str, ...] | None = None
     tab: str = "parameters"
     fade: bool = False
-
-
-Kept = TypeVar("Kept", bound=BaseModel)
-
-
-def settings_file(name: str = "window.json") -> Path | None:
-    """Return where the settings are kept, None where they are not to be."""
-    named = os.environ.get(FOLDER)
-    if named is not None:
-        return Path(named) / name if named else None
-    from platformdirs import user_config_path
-
-    return user_config_path("robocov", appauthor=False) / name
-
-
-def load_settings(file: Path | None) -> tuple[Settings, str]:
-    """Return the settings, and what to tell if they could not be read: the defaults are used then."""
-    return loaded(Settings, file)
-
-
-def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
-    """Return settings of a kind, and what to tell if they could not be read: the defaults are used then."""
-    if file is None:
-        return kind(), ""
-    try:
-        return kind.model_validate_json(file.read_bytes()), ""
-    except FileNotFoundError:
-        return kind(), ""
-    except (OSError, ValidationError, ValueError):
-        return kind(), f"{file} could not be read: default settings"
-
-
-def save_settings(settings: BaseModel, file: Path | None) -> str:
-    """Write the settings, whole or not at all; return what to tell if that failed."""
-    if file is None:
-        return ""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with written(file) as part:
-            part.write_text(settings.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    except (OSError, OutputError) as error:
-        return f"settings not saved: {error}"
-    return ""

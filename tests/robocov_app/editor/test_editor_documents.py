@@ -23,7 +23,7 @@ from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.opening import EditorOpening, offer
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
-from robocov_app.viewer.settings import FOLDER
+from robocov_app.toolkit.settings import FOLDER
 
 
 @pytest.fixture
@@ -259,6 +259,15 @@ def test_settings_are_remembered(places: Path) -> None:
         desk = window.desk
         assert (desk.theme, desk.grid, window.panel.tab) == ("dark", 0.25, "snap")
         assert "edges" not in desk.snaps and desk.recent == [str(places / "x.json")]
+
+
+def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
+    with opening(places, theme="dark").window() as window:
+        assert window.desk.theme == "dark"
+        window.documents.leaving = True
+    with opening(places).window() as window:
+        assert window.desk.theme == "light"
+        window.documents.leaving = True
 
 
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:

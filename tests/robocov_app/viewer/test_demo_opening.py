@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -17,8 +18,8 @@ from touched_run import begun
 
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
+from robocov_app.toolkit.settings import FOLDER
 from robocov_app.viewer.opening import NO_DISPLAY, Opening, display, fitting, screen_scale
-from robocov_app.viewer.settings import FOLDER
 
 SHORT = ("--lattice", "8", "--size", "900x600")
 
@@ -183,6 +184,20 @@ def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, mo
         assert "default settings" in window.desk.message
         window.close()
     assert '"theme": "light"' in (tmp_path / "window.json").read_text()
+
+
+def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    kept = tmp_path / "window.json"
+    kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
+    asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "also": frozenset({"scan"})}
+    asked["without"] = frozenset({"cells"})
+    with Opening(begun(), "hall", tmp_path, lattice=4, **asked).window() as window:
+        assert window.desk.shown == {"robots", "scan"} and window.desk.theme == "dark"
+        window.desk.shown.add("trails")
+    settings = json.loads(kept.read_text())
+    assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
+    assert settings["shown"] == ["cells", "robots", "trails"]
 
 
 def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:

@@ -1,13 +1,17 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.viewer.settings import FOLDER, Settings, load_settings, save_settings, settings_file
+from robocov_app.toolkit.settings import FOLDER, changed_settings, loaded, save_settings, settings_file
+from robocov_app.viewer.settings import Settings
+
+load_settings = partial(loaded, Settings)
 
 OTHERS = Settings(
     theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
@@ -113,3 +117,10 @@ def test_where_they_are_kept(tmp_path, monkeypatch):
     assert file.name == "window.json"
     assert "robocov" in file.parts
     assert not Path(tmp_path / "config").exists()
+
+
+def test_only_what_was_changed_is_kept():
+    before, opened = Settings(width=1000), Settings(theme="dark", width=1300)
+    assert changed_settings(before, opened, opened) == before
+    closed = opened.model_copy(update={"fade": True, "width": 1400})
+    assert changed_settings(before, opened, closed) == Settings(width=1400, fade=True)

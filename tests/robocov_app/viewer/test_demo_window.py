@@ -13,10 +13,10 @@ from driven_window import FRAME, Driver, opened, resized
 from PIL import Image
 from touched_run import RAPF, begun
 
+from robocov_app.toolkit.settings import FOLDER
 from robocov_app.viewer.opening import Opening
 from robocov_app.viewer.overlays import Palette
 from robocov_app.viewer.screen import show_compiling
-from robocov_app.viewer.settings import FOLDER
 from robocov_app.viewer.status import cursor_words
 
 # playing
@@ -293,11 +293,13 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv(FOLDER, str(tmp_path / "settings"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
-    def window(size: tuple[int, int] | None = None):
-        opening = Opening(begun(), "hall", tmp_path, size=size, lattice=4)
-        return opening.window()
+    (tmp_path / "settings").mkdir()
+    (tmp_path / "settings/window.json").write_text('{"width": 1000, "height": 640}')
 
-    with window((1000, 640)) as first:
+    def window():
+        return Opening(begun(), "hall", tmp_path, lattice=4).window()
+
+    with window() as first:
         driver = Driver(first)
         driver.key("t")
         driver.key("shift+t")

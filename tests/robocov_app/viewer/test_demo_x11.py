@@ -14,7 +14,7 @@ import pytest
 from called import COMMAND
 from x11_hands import MARKS, Hands, ended, invisible_display, run_window, said
 
-from robocov_app.viewer.settings import FOLDER
+from robocov_app.toolkit.settings import FOLDER
 
 pytestmark = MARKS
 

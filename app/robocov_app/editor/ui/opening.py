@@ -16,8 +16,8 @@ from robocov_app.editor.ui.documents import heading, lay_under, opened
 from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
 from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
 from robocov_app.toolkit.autosave import autosave_folder, discard
+from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.viewer.opening import display, fitting, screen_scale
-from robocov_app.viewer.settings import loaded, save_settings, settings_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -96,9 +96,10 @@ class EditorOpening:
                     offer(window, recoverable(drafts))
                 if self.path is not None and not isinstance(found, Document):
                     window.documents.ask_import(self.path, found)
+                begun = settings_of(window, settings)
                 try:
                     yield window
-                    save_settings(settings_of(window, settings, self.scale), file)
+                    save_settings(changed_settings(settings, begun, settings_of(window, settings)), file)
                     ended = True
                 finally:
                     window.close()
@@ -162,7 +163,7 @@ def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
     desk.asked = Question("Recover unsaved work?", words, answers)
 
 
-def settings_of(window: EditorWindow, before: EditorSettings, scale: float | None) -> EditorSettings:
+def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     """Return what is worth remembering of a window."""
     desk = window.desk
     width, height = window.windowed or window.screen.get_size()
@@ -180,6 +181,4 @@ def settings_of(window: EditorWindow, before: EditorSettings, scale: float | Non
         "width": min(max(width, 900), 7680),
         "height": min(max(height, 600), 4320),
     }
-    if scale is not None:
-        changes["scale"] = scale
     return before.model_copy(update=changes)
