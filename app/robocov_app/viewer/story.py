@@ -16,7 +16,7 @@ import numpy as np
 
 from robocov.controllers import remembers
 from robocov.environment import CircleObstacle, Environment
-from robocov.metrics import CostHistory
+from robocov.metrics import CostHistory, summarise
 from robocov.record import Record, Recorder
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
@@ -200,11 +200,14 @@ def save_story(
             (result.new / folder).mkdir(exist_ok=True)
             begin_comparison(result.new / folder, names)
         costs = []
-        for name, record in zip(names, records, strict=True):
+        for number, name, record in zip(part.setups, names, records, strict=True):
             place = result.new / folder / (name if len(records) > 1 else "")
             record.save(place)
-            costs.append(built_cost(record.environment, options.lattice, quiet=True))
-            runs[name] = evaluated(record, costs[-1], stop, quiet=options.json)
+            # as in the window, robots that failed count as no obstacles of the cost
+            bare = replace(record, environment=part.setups[number].environment)
+            costs.append(built_cost(bare.environment, options.lattice, quiet=True))
+            history = evaluated(bare, costs[-1], stop, quiet=options.json).history
+            runs[name] = Run(record, history, summarise(record, history))
             save_numbers(runs[name], place, options.lattice)
             histories.append((part.begin * dt, name, runs[name].history))
             rows.append(
