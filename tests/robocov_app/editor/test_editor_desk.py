@@ -17,6 +17,7 @@ from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import GROUPS, REPEATING, all_actions, told_actions
 from robocov_app.editor.ui.desk import GRIDS
+from robocov_app.editor.ui.dialogs import Commands
 from robocov_app.editor.ui.fields import FIELDS, coordinate
 from robocov_app.editor.ui.menus import offered
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, EditorSettings, kinds_of
@@ -394,3 +395,20 @@ def test_a_problem_is_mended_by_a_key(hands: Hands) -> None:
     hands.settle()
     hands.frames(3)
     assert not any(problem.grave for problem in hands.desk.problems)
+
+
+@pytest.mark.parametrize("word", sorted(COMMANDS))
+def test_commands_that_take_a_value_are_found_by_typing(word: str) -> None:
+    palette = Commands()
+    palette.show()
+    palette.type(word)
+    assert f"type:{word}" in [action.name for action in palette.found]
+    assert not palette.is_command()
+
+
+def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -> None:
+    with opened_editor(tmp_path) as hands:
+        hands.key("ctrl+k")
+        hands.type("array")
+        hands.key("return")
+        assert hands.window.palette.open and hands.window.palette.text == "array "

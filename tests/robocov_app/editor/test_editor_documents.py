@@ -270,6 +270,23 @@ def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
         window.documents.leaving = True
 
 
+def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places: Path) -> None:
+    Image.new("RGB", (40, 30)).save(places / "plan.png")
+    with opening(places).window() as window:
+        window.desk.shown.discard("picture")
+        window.documents.leaving = True
+    with opening(places, background=places / "plan.png").window() as window:
+        assert "picture" in window.desk.shown and window.desk.sketch.background is not None
+
+
+def test_recent_files_are_found_from_every_folder(
+    hands: Hands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hands.window.documents.remember(Path("x.json"))
+    assert hands.desk.recent == [str(tmp_path / "x.json")]
+
+
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
     lost = Document(sheet(), places / "drafts")
     lost.history.do(create.circle_drawn(lost.history.sketch, (5, 5), 1.0))

@@ -133,3 +133,20 @@ def test_nothing_is_brought_back_where_nothing_was_changed() -> None:
     assert brought_back(sketch, environment, sketch.environment()) is None
     other = of_map("rooms").environment()
     assert brought_back(sketch, environment, other) is None
+
+
+def test_a_key_that_is_held_down_while_it_opens_does_not_lead_back(tmp_path: Path) -> None:
+    with opened_editor(tmp_path, of_map("square")) as hands:
+        press = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_F5, mod=0, unicode="")
+        for _ in range(3):
+            pygame.event.post(press)
+        hands.frames(2)
+        pygame.event.post(press)
+        hands.frames(2)
+        trial = hands.window.trial
+        assert trial is not None and not trial.ended
+        pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_F5, mod=0, unicode=""))
+        pygame.event.post(press)
+        pygame.event.post(press)
+        hands.frames(3)
+        assert hands.window.trial is None

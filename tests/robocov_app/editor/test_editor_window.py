@@ -406,3 +406,23 @@ def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path
             hands.frames(2)
             pictures.append(pygame.surfarray.array3d(hands.window.screen).astype(int))
     assert np.abs(pictures[0] - pictures[1]).max() < 8
+
+
+def test_a_window_that_nobody_touches_is_not_drawn_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened_editor(tmp_path) as hands:
+        hands.move(300, 300)
+        hands.frames(3)
+        hands.desk.message = ""
+        hands.frames(2)
+        drawn: list[int] = []
+        monkeypatch.setattr(pygame.display, "flip", lambda: drawn.append(1))
+        hands.frames(30)
+        assert not drawn
+        hands.move(310, 300)
+        assert drawn
+        hands.desk.say("something new")
+        drawn.clear()
+        hands.frames(1)
+        assert drawn

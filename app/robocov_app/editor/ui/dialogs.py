@@ -11,10 +11,10 @@ from robocov_app.editor.ui.actions import told_actions
 from robocov_app.editor.ui.asking import ROWS, FileQuestion, ListQuestion, Question
 from robocov_app.editor.ui.import_view import ImportView
 from robocov_app.editor.ui.importing import ImportQuestion
-from robocov_app.editor.ui.typed import COMMANDS, GHOST
+from robocov_app.editor.ui.typed import COMMANDS, GHOST, VALUES
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, mix
-from robocov_app.viewer.actions import key_words
+from robocov_app.viewer.actions import Action, key_words
 from robocov_app.viewer.overlays import CommandList, card, dim, wrapped
 from robocov_app.viewer.typed import parted
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from robocov_app.editor.ui.desk import Desk
     from robocov_app.render.theme import Theme
-    from robocov_app.viewer.actions import Action
     from robocov_app.viewer.layout import Layout
 
 _ROW = 27
@@ -195,7 +194,8 @@ class Dialogs:
         box.center = width // 2, round(height * 0.42)
         card(screen, box, theme, scale)
         left = box.left + round(24 * scale)
-        screen.blit(label(asked.title, bold, theme.ink, True), (left, box.top + round(18 * scale)))
+        title = shortened(asked.title, bold, wide - 48 * scale, True)
+        screen.blit(label(title, bold, theme.ink, True), (left, box.top + round(18 * scale)))
         for k, line in enumerate(lines):
             ink = mix(theme.panel, theme.ink, 0.85)
             screen.blit(label(line, size, ink), (left, box.top + round((48 + 20 * k) * scale)))
@@ -238,10 +238,11 @@ class Dialogs:
         card(screen, box, theme, scale)
         self._boxes.append((box, -1))
         left, size, small = box.left + round(18 * scale), round(14 * scale), round(12.5 * scale)
-        screen.blit(
-            label(asked.title, round(12 * scale), theme.faint, True), (left, box.top + round(12 * scale))
-        )
         room = box.width - 36 * scale
+        title = label(
+            shortened(asked.title, round(12 * scale), room, True), round(12 * scale), theme.faint, True
+        )
+        screen.blit(title, (left, box.top + round(12 * scale)))
         text = asked.text
         while text and text_width(f"…{text}▏", size) > room:  # the end of a path counts
             text = text[1:]
@@ -276,7 +277,13 @@ class Commands(CommandList):
     """The editor's commands by name; or a command such as ``rotate 30``."""
 
     def __init__(self) -> None:
-        super().__init__(told_actions(), GHOST)
+        valued = [Action(f"type:{word}", f"{word} {value}", "", ()) for word, value in VALUES.items()]
+        super().__init__([*told_actions(), *valued], GHOST)
+
+    def show(self, text: str = "") -> None:
+        """Open it, with the beginning of a command."""
+        super().show()
+        self.text = text
 
     def is_command(self) -> bool:
         """Whether what is typed is a command with a value, not the name of an action."""

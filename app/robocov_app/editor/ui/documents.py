@@ -188,7 +188,7 @@ class Documents:
 
     def remember(self, path: Path) -> None:
         """Note a file as one that was open lately."""
-        name = str(path)
+        name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
         self.desk.recent = [name, *(each for each in self.desk.recent if each != name)][:MOST_RECENT]
 
     # saving
@@ -362,6 +362,7 @@ def lay_under(desk: Desk, path: Path) -> None:
     laid = picture_laid(_from_map(path, desk.document.path), pixels)
     if bounds is not None and desk.sketch.background is None:
         laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
+    desk.shown.add("picture")
     desk.change(underlaid(desk.sketch, laid))
 
 

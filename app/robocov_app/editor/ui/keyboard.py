@@ -34,6 +34,10 @@ class Keyboard(DemoKeyboard):
         super().__init__(desk, panel, palette, all_actions(), do, REPEATING)
         self._editor, self._dialogs = desk, dialogs
 
+    def hold(self, key: int) -> None:
+        """Note a key as one that is held down."""
+        self._down.add(key)
+
     def _pressed(self, event: pygame.event.Event) -> None:
         name = key_of(event)
         if self._dialogs.open and event.key != pygame.K_F12:

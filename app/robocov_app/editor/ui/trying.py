@@ -64,6 +64,8 @@ class Trial(Window):
     ----------
     ended : bool
         Back to the editor.
+    held : int or None
+        The key that began it, until it comes up: its repeated presses are none of their own.
     """
 
     desk: TrialDesk
@@ -71,10 +73,15 @@ class Trial(Window):
 
     def __init__(self, desk: TrialDesk, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
         self.ended = False
+        self.held: int | None = None
         super().__init__(desk, screen.get_size(), scale, patient=patient, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
+        if event.type == pygame.WINDOWFOCUSLOST or (event.type == pygame.KEYUP and event.key == self.held):
+            self.held = None
+        if event.type == pygame.KEYDOWN and self.held is not None and event.key == self.held:
+            return
         if event.type == pygame.KEYDOWN and key_of(event) in BACK:
             self.ended = True
             return

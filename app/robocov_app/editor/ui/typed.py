@@ -176,6 +176,35 @@ def _array(desk: Desk, text: str) -> None:
     desk.change(transform.arrayed(desk.sketch, _selected(desk), columns, rows, dx, dy))
 
 
+VALUES: dict[str, str] = {
+    "grid": "0.25: distance of the grid's lines",
+    "angle": "15: lines snap to multiples of it",
+    "radius": "0.2: of a robot",
+    "robots": "8: of the team",
+    "seed": "3: of the team's places",
+    "wall": "0.1: width of walls that are drawn",
+    "move": "1 0.5: what is selected",
+    "place": "2 3: lower left corner",
+    "rotate": "30: by degrees",
+    "scale": "150%: what is selected",
+    "size": "3 x 2: width and height",
+    "width": "0.2: of walls",
+    "circle": "0.5: radius of circles",
+    "bevel": "0.3: cut corners off",
+    "round": "0.3: round corners",
+    "simplify": "0.05: leave vertices out, to a tolerance",
+    "floor": "0.1: density away from hot spots",
+    "weight": "2: of a hot spot",
+    "density": "none: takes it away",
+    "speed": "0.5: along a path, m/s",
+    "offset": "0.2: grow, or shrink with -",
+    "array": "3 x 2 1.5 1.5: columns, rows, distances",
+    "name": "pillar: of what is selected",
+    "note": "words: on what is selected",
+    "title": "Hall: of the map",
+}
+"""What is typed after each command, and what it is, as the palette shows it."""
+
 COMMANDS: dict[str, Callable[[Desk, str], None]] = {
     "grid": _set_grid,
     "angle": _set_angle,

@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 _SELDOM = 0.1
 """Seconds after which the panel looks at its widgets also while nobody is near."""
 
+_CALM = 0.5
+"""Seconds without anything new after which the window waits for events."""
+
 _PAN = 60
 """Pixels that a key pans."""
 
@@ -90,7 +93,10 @@ class EditorWindow:
         self._tried: Environment | None = None
         self._caption = ""
         self._rate = float(FPS)
-        self._unseen = 0.0
+        self._unseen = self._calm = 0.0
+        self._come: list[pygame.event.Event] = []
+        self._touched = False
+        self._drawn: tuple[object, ...] | None = None
         self._arrange()
         self.arena.fit()
         desk.ask_readings()
@@ -107,7 +113,10 @@ class EditorWindow:
                 now = perf_counter()
                 self.frame(now - before)
                 before = now
-                clock.tick(FPS)
+                if self._calm < _CALM or self.trial is not None:
+                    clock.tick(FPS)
+                elif (event := pygame.event.wait(round(1000 * _SELDOM))).type != pygame.NOEVENT:
+                    self._come.append(event)
 
     def close(self) -> None:
         """End what is going on beside the window."""
@@ -123,16 +132,39 @@ class EditorWindow:
             self._try_on(seconds)
             return
         self.advance(seconds)
-        if not self.closed and self.trial is None:
+        if self.closed or self.trial is not None:
+            return
+        shown = self._what_is_shown()
+        self._calm = self._calm + seconds if shown is not None and shown == self._drawn else 0.0
+        if self._calm == 0.0:
             self.draw()
+        self._drawn = shown
+
+    def _what_is_shown(self) -> tuple[object, ...] | None:
+        """Return all on which it depends what the window looks like; None where it always changes."""
+        desk, arena = self.desk, self.arena
+        animated = self._touched or self.panel.busy or desk.moves_since is not None or desk.asked is not None
+        if animated or inside(self.layout.panel, self.pointer.at):
+            return None
+        return (
+            *(desk.version, desk.message, desk.trouble, desk.typed, desk.readings.busy, desk.problem),
+            *(desk.sketch, desk.selection, desk.measurement, desk.tool, desk.cursor, frozenset(desk.shown)),
+            *(arena.team, arena.camera, arena.hovered, self.help, self.palette.open, self.menu),
+            *(self._arranged, self._caption, desk.grid, frozenset(desk.snaps)),
+        )
 
     def advance(self, seconds: float) -> None:
         """Take what has happened, and let so many seconds pass."""
-        for event in pygame.event.get():
-            self.take(event)
-            if self.trial is not None:
-                return
-        if seconds > 0:
+        come, self._come = [*self._come, *pygame.event.get()], []
+        self._touched = bool(come)
+        for event in come:
+            if self.trial is None:
+                self.take(event)
+            else:  # what came while it was opened
+                self.trial.take(event)
+        if self.trial is not None:
+            return
+        if seconds > 0 and self._calm < _CALM:
             self._rate += 0.05 * (min(1.0 / seconds, 1000.0) - self._rate)
         desk = self.desk
         desk.pass_time(seconds)
@@ -215,6 +247,8 @@ class EditorWindow:
             self.help = self.palette.open = False
         elif kind == "tool":
             desk.attempt(lambda: desk.choose(what))
+        elif kind == "type":
+            self.palette.show(f"{what} ")
         elif kind in ("show", "snap"):
             desk.attempt(lambda: desk.switch(kind, what))
         else:
@@ -325,6 +359,8 @@ class EditorWindow:
         if change is not None and not trial.desk.elsewhere:
             desk.change(change)
         self.keyboard.leave()
+        if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
+            self.keyboard.hold(pygame.K_F5)
         self._arrange()
         desk.version += 1
         if leaving:
@@ -350,6 +386,8 @@ class EditorWindow:
             self._key_of_menu(event)
         elif event.type == pygame.KEYDOWN:
             self.keyboard.press(event)
+            if self.trial is not None:
+                self.trial.held = event.key
         elif event.type == pygame.TEXTINPUT and self.dialogs.open:
             self.dialogs.letters(event.text)
         elif event.type == pygame.TEXTINPUT and self.palette.open:
